@@ -1,0 +1,52 @@
+"""Control laws, one a file, found by looking into this folder; and the gains that the paper prints."""
+
+import tomllib
+from functools import cache
+from importlib import import_module
+from importlib.resources import files
+from inspect import isabstract
+from pkgutil import iter_modules
+
+from quakedesign.controllers.base import Controller, LoopField, Signals
+from quakedesign.controllers.sliding_mode import SlidingMode
+from quakedesign.errors import UnknownNameError
+
+__all__ = ["Controller", "LoopField", "Signals", "SlidingMode", "control_law", "control_laws", "published"]
+
+
+@cache
+def control_laws() -> dict[str, type[Controller]]:
+    """Every control law of the package, by name."""
+    laws: dict[str, type[Controller]] = {}
+    for info in iter_modules(__path__):
+        module = import_module(f"{__name__}.{info.name}")
+        for item in vars(module).values():
+            if isinstance(item, type) and issubclass(item, Controller) and not isabstract(item):
+                laws[item.name] = item
+    return laws
+
+
+def control_law(name: str) -> type[Controller]:
+    """Control law of a given name.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    laws = control_laws()
+    if name not in laws:
+        raise UnknownNameError(f"controller must be one of {', '.join(laws)}. Received {name!r}.")
+    return laws[name]
+
+
+def published(fault_name: str) -> dict[str, Controller]:
+    """Controllers with the gains that the paper prints for a preset fault; empty for any other fault."""
+    data = tomllib.loads((files(__name__) / "published.toml").read_text(encoding="utf-8"))
+    found: dict[str, Controller] = {}
+    for name, entry in data.get(fault_name, {}).items() if fault_name in ("real-fault", "lab-fault") else ():
+        more = {k: v for k, v in entry.items() if k != "gains"}
+        law = control_law(name)
+        if issubclass(law, SlidingMode):
+            more["divisor"] = data["divisor"]
+        found[name] = law.from_values(tuple(entry["gains"]), **more)
+    return found

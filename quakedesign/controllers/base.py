@@ -1,0 +1,120 @@
+"""What every control law offers."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from types import MappingProxyType
+from typing import ClassVar
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError
+from quakedesign.rationals import rational
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signals:
+    """What a control law may read.
+
+    Attributes
+    ----------
+    slip, slip_rate : Expr
+        x1 [m], x2 [m/s].
+    slip_error, slip_rate_error : Expr
+        e1 = x1 − r [m], e2 = x2 − r' [m/s].
+    integrals : tuple of Expr
+        The law's own states ξ.
+    """
+
+    slip: sp.Expr
+    slip_rate: sp.Expr
+    slip_error: sp.Expr
+    slip_rate_error: sp.Expr
+    integrals: tuple[sp.Expr, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopField:
+    """A closed loop as an uncertain vector field, the subject of a certificate.
+
+    Attributes
+    ----------
+    states : dict of Symbol to int
+        States and their weights.
+    field : dict of Symbol to Expr
+        Time derivative of every state, in gains, constants and uncertain parameters.
+    gains, constants, uncertain : tuple of Symbol
+    domain : str
+        ``"cells"`` for signed powers, ``"reals"`` for polynomials.
+    """
+
+    states: dict[sp.Symbol, int]
+    field: dict[sp.Symbol, sp.Expr]
+    gains: tuple[sp.Symbol, ...]
+    constants: tuple[sp.Symbol, ...]
+    uncertain: tuple[sp.Symbol, ...]
+    domain: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller(ABC):
+    """A control law with exact gains.
+
+    Attributes
+    ----------
+    gains : mapping of str to Fraction
+        Exact gains, in the units of `gain_units`; numbers and texts are converted.
+
+    Raises
+    ------
+    ParameterError
+        For a missing, unknown, or not finite gain.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    source: ClassVar[str]
+    gain_units: ClassVar[Mapping[str, str]]
+    integral_units: ClassVar[tuple[str, ...]]
+
+    gains: Mapping[str, Fraction]
+
+    def __post_init__(self) -> None:
+        if set(self.gains) != set(self.gain_units):
+            raise ParameterError(
+                f"{self.name} needs the gains {', '.join(self.gain_units)}. Received {', '.join(self.gains) or 'none'}."
+            )
+        exact = {name: rational(self.gains[name], f"gain {name}") for name in self.gain_units}
+        object.__setattr__(self, "gains", MappingProxyType(exact))
+
+    @abstractmethod
+    def pressure(self, signals: Signals) -> sp.Expr:
+        """Fluid pressure p [Pa] that the law asks for."""
+
+    @abstractmethod
+    def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
+        """Time derivatives of the law's own states."""
+
+    @classmethod
+    @abstractmethod
+    def loop_field(cls) -> LoopField:
+        """Return the closed loop in symbols, derived from the law, as certificates need it."""
+
+    @classmethod
+    def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more) -> "Controller":
+        """Return a law from gains in order.
+
+        Raises
+        ------
+        ParameterError
+            When their number is wrong.
+        """
+        if len(values) != len(cls.gain_units):
+            raise ParameterError(
+                f"{cls.name} needs {len(cls.gain_units)} gains ({', '.join(cls.gain_units)}). Received {len(values)}."
+            )
+        return cls(gains=dict(zip(cls.gain_units, values, strict=True)), **more)
+
+    def _exact_gains(self) -> list[sp.Rational]:
+        return [sp.Rational(v.numerator, v.denominator) for v in self.gains.values()]

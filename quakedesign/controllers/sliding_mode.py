@@ -1,0 +1,96 @@
+"""What the continuous sliding-mode laws share: p = ν/(μ0N̂0), one integral state, homogeneity."""
+
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import ClassVar, Self
+
+import sympy as sp
+
+from quakedesign.controllers.base import Controller, LoopField, Signals
+from quakedesign.errors import ParameterError
+from quakedesign.rationals import rational
+
+beta, d = sp.symbols("beta d", real=True)
+e1, e2, e3 = sp.symbols("e1 e2 e3", real=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingMode(Controller):
+    """A homogeneous law ν(e1, e2, ξ1) with weights (3, 2, 1) and degree −1.
+
+    Attributes
+    ----------
+    scale : Fraction
+        λ [-], which stretches the loop: e → λe maps the loop with λ = 1 onto this one.
+    divisor : Fraction
+        μ0N̂0 of eq. ps [m²/kg].
+    """
+
+    integral_units: ClassVar[tuple[str, ...]] = ("m^3/(kg Pa^-1 s^2)",)
+    weights: ClassVar[tuple[int, int, int]] = (3, 2, 1)
+
+    scale: Fraction = Fraction(1)
+    divisor: Fraction = Fraction(1)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("scale", "divisor"):
+            value = rational(getattr(self, name), name)
+            if value <= 0:
+                raise ParameterError(f"{name} must be positive. Received {value}.")
+            object.__setattr__(self, name, value)
+
+    @staticmethod
+    @abstractmethod
+    def virtual_control(error: sp.Expr, rate_error: sp.Expr, integral: sp.Expr, gains, scale) -> sp.Expr:
+        """ν, in the unit of an acceleration when the divisor is the true μN̂."""
+
+    @staticmethod
+    @abstractmethod
+    def integral_rate(error: sp.Expr, rate_error: sp.Expr, gains, scale) -> sp.Expr:
+        """ξ1'."""
+
+    @property
+    @abstractmethod
+    def lipschitz_limit(self) -> Fraction:
+        """Bound on |h'| that no Lyapunov function can exceed with these gains (ERRATA, end)."""
+
+    def scaled(self, scale: Fraction) -> Self:
+        """Return the same base gains with another λ."""
+        return replace(self, gains=dict(self.gains), scale=scale)
+
+    def pressure(self, signals: Signals) -> sp.Expr:
+        """Return p [Pa] = ν/(μ0N̂0), eq. ps."""
+        nu = self.virtual_control(
+            signals.slip_error, signals.slip_rate_error, signals.integrals[0], self._exact_gains(), self._exact_scale()
+        )
+        return nu / sp.Rational(self.divisor.numerator, self.divisor.denominator)
+
+    def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
+        """ξ1' as one entry."""
+        args = (signals.slip_error, signals.slip_rate_error, self._exact_gains(), self._exact_scale())
+        return (self.integral_rate(*args),)
+
+    @classmethod
+    def loop_field(cls) -> LoopField:
+        """Return the loop in e1, e2 and e3 = ξ1 + h with λ = 1, eqs. clsystem1 and clsystem2; d stands for h'."""
+        gains = tuple(sp.Symbol(name, real=True) for name in cls.gain_units)
+        h = sp.Symbol("h", real=True)
+        nu = cls.virtual_control(e1, e2, e3 - h, gains, sp.Integer(1))
+        field = {
+            e1: e2,
+            e2: sp.expand(beta * sp.expand(nu + h)),
+            e3: sp.expand(cls.integral_rate(e1, e2, gains, sp.Integer(1)) + d),
+        }
+        return LoopField(
+            states=dict(zip((e1, e2, e3), cls.weights, strict=True)),
+            field=field,
+            gains=gains,
+            constants=(),
+            uncertain=(beta, d),
+            domain="cells",
+        )
+
+    def _exact_scale(self) -> sp.Rational:
+        return sp.Rational(self.scale.numerator, self.scale.denominator)

@@ -1,0 +1,40 @@
+"""The exceptions of quakedesign: one small tree, each message says what, expected, received, remedy."""
+
+
+class QuakedesignError(Exception):
+    """Anything that quakedesign refuses; the command line prints it as one line and exits with 2."""
+
+
+class ParameterError(QuakedesignError, ValueError):
+    """An unphysical or meaningless value."""
+
+
+class UnitError(QuakedesignError, ValueError):
+    """A quantity with an unknown unit, or with one of the wrong dimension."""
+
+
+class ScenarioError(QuakedesignError, ValueError):
+    """A fault description that cannot be read or is incomplete."""
+
+
+class UnknownNameError(QuakedesignError, KeyError):
+    """A preset, law or controller that does not exist."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class KinkError(QuakedesignError, ArithmeticError):
+    """A derivative asked for at a point where the expression has none."""
+
+
+class CertificateError(QuakedesignError, ValueError):
+    """A certificate file that is not one, or whose proof does not hold."""
+
+
+class SimulationError(QuakedesignError, RuntimeError):
+    """A closed loop that cannot be integrated as asked."""
+
+
+class OutputError(QuakedesignError, OSError):
+    """A result that cannot be written."""

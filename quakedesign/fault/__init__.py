@@ -1,0 +1,23 @@
+"""What is controlled: parameters in SI, uncertainty, reference and disturbance."""
+
+from quakedesign.fault.disturbance import Disturbance
+from quakedesign.fault.friction import FrictionLaw, friction_law, friction_laws
+from quakedesign.fault.parameters import Fault
+from quakedesign.fault.reference import Reference
+from quakedesign.fault.scenario import load_fault, parse_fault, presets
+from quakedesign.fault.uncertainty import BOXES, UncertaintyBox, uncertainty_box
+
+__all__ = [
+    "BOXES",
+    "Disturbance",
+    "Fault",
+    "FrictionLaw",
+    "Reference",
+    "UncertaintyBox",
+    "friction_law",
+    "friction_laws",
+    "load_fault",
+    "parse_fault",
+    "presets",
+    "uncertainty_box",
+]

@@ -1,0 +1,60 @@
+"""What acts on the fault besides the spring, the dashpot, friction and the injected fluid."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from quakedesign.fault.checks import require_finite, require_nonnegative
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disturbance:
+    """Acceleration φ̂_e(x1, x2, t) = constant + amplitude·sin(frequency·t) + slip_growth·x1 + rate_growth·x2.
+
+    Attributes
+    ----------
+    constant : float
+        [m/s²].
+    amplitude : float
+        [m/s²], not negative.
+    frequency : float
+        Angular frequency [rad/s], not negative.
+    slip_growth : float
+        [1/s²].
+    rate_growth : float
+        [1/s].
+    """
+
+    constant: float = 0.0
+    amplitude: float = 0.0
+    frequency: float = 0.0
+    slip_growth: float = 0.0
+    rate_growth: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite(constant=self.constant, slip_growth=self.slip_growth, rate_growth=self.rate_growth)
+        require_nonnegative(amplitude=self.amplitude, frequency=self.frequency)
+
+    def acceleration(self, slip: "sp.Expr", rate: "sp.Expr", time: "sp.Expr") -> "sp.Expr":
+        """φ̂_e [m/s²] at a slip [m], slip rate [m/s] and time [s]."""
+        import sympy as sp
+
+        return self.explicit(time) + sp.Float(self.slip_growth) * slip + sp.Float(self.rate_growth) * rate
+
+    def explicit(self, time: "sp.Expr") -> "sp.Expr":
+        """Part of φ̂_e [m/s²] that depends on time [s] alone."""
+        import sympy as sp
+
+        return self.constant + self.amplitude * sp.sin(sp.Float(self.frequency) * time)
+
+    @property
+    def largest_explicit(self) -> float:
+        """Bound on the part of φ̂_e that depends on time alone [m/s²]."""
+        return abs(self.constant) + self.amplitude
+
+    @property
+    def largest_rate(self) -> float:
+        """Bound on the time derivative of that part [m/s³]."""
+        return self.amplitude * self.frequency

@@ -1,0 +1,43 @@
+"""Friction laws, one a file, found by looking into this folder."""
+
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from quakedesign.errors import UnknownNameError
+from quakedesign.fault.friction.base import FrictionLaw
+
+__all__ = ["FrictionLaw", "friction_law", "friction_laws"]
+
+
+@cache
+def friction_laws() -> dict[str, type[FrictionLaw]]:
+    """Every friction law of the package, by name; a module of this folder that defines none is an error."""
+    laws: dict[str, type[FrictionLaw]] = {}
+    for info in iter_modules(__path__):
+        if info.name == "base":
+            continue
+        module = import_module(f"{__name__}.{info.name}")
+        found = [
+            item
+            for item in vars(module).values()
+            if isinstance(item, type) and issubclass(item, FrictionLaw) and item.__module__ == module.__name__
+        ]
+        if not found:
+            raise ImportError(f"{module.__name__} defines no FrictionLaw")
+        laws |= {law.name: law for law in found}
+    return laws
+
+
+def friction_law(name: str) -> type[FrictionLaw]:
+    """Friction law of a given name.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is none.
+    """
+    laws = friction_laws()
+    if name not in laws:
+        raise UnknownNameError(f"friction law must be one of {', '.join(sorted(laws))}. Received {name!r}.")
+    return laws[name]

@@ -1,0 +1,154 @@
+"""One fault as a spring-slider, in SI units."""
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault.checks import require_nonnegative, require_positive
+from quakedesign.fault.disturbance import Disturbance
+from quakedesign.fault.friction import FrictionLaw
+from quakedesign.fault.reference import Reference
+from quakedesign.fault.uncertainty import UncertaintyBox, uncertainty_box
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """Spring-slider analogue of one fault, eq. springmodel.
+
+    Attributes
+    ----------
+    name : str
+    source : str
+        Where the numbers come from.
+    density : float
+        ρ of the host rock [kg/m³].
+    shear_modulus : float
+        G of the host rock [Pa].
+    length : float
+        L_ac, length of the activated fault [m].
+    damping : float
+        η [kg/s], not negative.
+    effective_normal_stress : float
+        σ'_n [Pa], positive in compression.
+    friction : FrictionLaw
+    reference : Reference
+        Slip to follow.
+    sampling_time : float
+        T_s [s].
+    disturbance : Disturbance
+    box : UncertaintyBox
+
+    Raises
+    ------
+    ParameterError
+        When a value is unphysical or not finite.
+    """
+
+    name: str
+    source: str
+    density: float
+    shear_modulus: float
+    length: float
+    damping: float
+    effective_normal_stress: float
+    friction: FrictionLaw
+    reference: Reference
+    sampling_time: float
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    box: UncertaintyBox = field(default_factory=lambda: uncertainty_box("paper"))
+
+    def __post_init__(self) -> None:
+        require_positive(
+            density=self.density,
+            shear_modulus=self.shear_modulus,
+            length=self.length,
+            sampling_time=self.sampling_time,
+        )
+        require_positive(
+            "Compression is positive here; check the sign.", effective_normal_stress=self.effective_normal_stress
+        )
+        require_nonnegative(damping=self.damping)
+        if self.reference.operation_time < 1000 * self.sampling_time:
+            raise ParameterError(
+                f"sampling_time must be at most a thousandth of the operation time "
+                f"({self.reference.operation_time!r} s). Received {self.sampling_time!r} s."
+            )
+        require_positive(
+            "The numbers are so extreme that derived quantities overflow.",
+            mass=self.mass,
+            stiffness=self.stiffness,
+            authority=self.authority,
+            natural_frequency=self.natural_frequency,
+        )
+
+    def with_box(self, name: str) -> "Fault":
+        """Return the same fault with a named uncertainty box."""
+        return replace(self, box=uncertainty_box(name))
+
+    def with_disturbance(self, disturbance: Disturbance) -> "Fault":
+        """Return the same fault under another disturbance."""
+        return replace(self, disturbance=disturbance)
+
+    @property
+    def mass(self) -> float:
+        """m = ρL³ [kg]."""
+        return self.density * self.length**3
+
+    @property
+    def area(self) -> float:
+        """A = L² [m²]."""
+        return self.length**2
+
+    @property
+    def stiffness(self) -> float:
+        """k = G·L [N/m] (the paper prints G/L: ERRATA 3)."""
+        return self.shear_modulus * self.length
+
+    @property
+    def authority(self) -> float:
+        """N̂ = A/m [m²/kg]."""
+        return self.area / self.mass
+
+    @property
+    def specific_stiffness(self) -> float:
+        """k̂ = k/m [1/s²]."""
+        return self.stiffness / self.mass
+
+    @property
+    def specific_damping(self) -> float:
+        """η̂ = η/m [1/s]."""
+        return self.damping / self.mass
+
+    @property
+    def natural_frequency(self) -> float:
+        """ω_n = √(k/m) [rad/s]."""
+        return math.sqrt(self.specific_stiffness)
+
+    @property
+    def damping_ratio(self) -> float:
+        """ζ = η/(2mω_n) [-]."""
+        return self.specific_damping / (2 * self.natural_frequency)
+
+    @property
+    def stress_drop(self) -> float:
+        """Δτ = (μ_max − μ_res)σ'_n [Pa]."""
+        low, high = self.friction.bounds
+        return (high - low) * self.effective_normal_stress
+
+    @property
+    def seismic_moment(self) -> float:
+        """M0 = L³Δτ [N·m], eq. magnitude."""
+        return self.length**3 * self.stress_drop
+
+    @property
+    def magnitude(self) -> float:
+        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity without a stress drop."""
+        return 2 / 3 * math.log10(self.seismic_moment) - 6.07 if self.seismic_moment > 0 else -math.inf
+
+    @cached_property
+    def rest_slip(self) -> float:
+        """Slip [m] at which the fault comes to rest next: the stable root of the statics; 0 for a stable fault."""
+        from quakedesign.fault.statics import rest_slip
+
+        return rest_slip(self)

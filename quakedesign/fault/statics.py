@@ -1,0 +1,33 @@
+"""Where a fault that starts to slip comes to rest."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from quakedesign.fault.parameters import Fault
+
+_SCAN = 4096
+
+
+def rest_slip(fault: "Fault") -> float:
+    """Smallest positive slip [m] where the excess of strength over load turns from driving to resisting.
+
+    The excess is (μ(0) − μ(x))σ'_n A − kx at zero pressure (statics of eq. shift). All roots lie below
+    (μ_max − μ_min)σ'_n A/k. A fault whose origin is stable stays where it is.
+    """
+    import mpmath
+    import sympy as sp
+
+    x = sp.Symbol("x", nonnegative=True)
+    law = fault.friction.coefficient
+    load = fault.effective_normal_stress * fault.area
+    drive = sp.lambdify(x, law(sp.Integer(0), 0) - law(x, 0) - fault.stiffness / load * x, "mpmath")
+    low, high = fault.friction.bounds
+    furthest = (high - low) * load / fault.stiffness * 1.0001
+    if furthest == 0:
+        return 0.0
+    grid = [furthest * i / _SCAN for i in range(_SCAN + 1)]
+    if drive(grid[1] / _SCAN) <= 0:
+        return 0.0
+    after = next(i for i, slip in enumerate(grid) if i and drive(slip) <= 0)
+    before = grid[after - 1] if after > 1 else grid[1] / _SCAN
+    return float(mpmath.findroot(drive, (before, grid[after]), solver="anderson", tol=1e-36, maxsteps=100, verify=False))

@@ -1,0 +1,63 @@
+"""The one place where numbers become exact: decimal text and floats in, `fractions.Fraction` out."""
+
+import math
+import re
+from fractions import Fraction
+
+from quakedesign.errors import ParameterError
+
+_NUMBER = re.compile(r"[+-]?(\d+(/\d+)?|(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)")
+
+
+def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
+    """Exact value of a decimal, an exponent form, a fraction p/q, or a float read as its shortest decimal.
+
+    Parameters
+    ----------
+    value : float, int, str or Fraction
+        Number; a float means the decimal that Python prints for it, so 0.1 is 1/10.
+    name : str
+        What the number is, for the message.
+
+    Returns
+    -------
+    Fraction
+
+    Raises
+    ------
+    ParameterError
+        When the value is not a finite number of at most 300 characters.
+    """
+    if isinstance(value, Fraction):
+        return value
+    text = value.strip() if isinstance(value, str) else repr(value + 0)
+    if len(text) > 300 or not _NUMBER.fullmatch(text) or re.search(r"/0+$", text):
+        raise ParameterError(
+            f"{name} must be a finite number: a decimal, an exponent form or p/q. Received {text[:60]!r}. "
+            "Write for example 2.3, 4.51e-4 or 23/10."
+        )
+    return Fraction(text)
+
+
+def nearest(value: float, denominator: int) -> Fraction:
+    """Multiple of 1/denominator that is nearest to a float.
+
+    Raises
+    ------
+    ParameterError
+        When the float is not finite.
+    """
+    if not math.isfinite(value):
+        raise ParameterError(f"a finite number is needed for rounding. Received {value!r}.")
+    return Fraction(round(Fraction(value) * denominator), denominator)
+
+
+def text(value: Fraction) -> str:
+    """Canonical text of a rational: ``p`` or ``p/q`` in lowest terms."""
+    return str(Fraction(value))
+
+
+def decimal(value: Fraction, digits: int = 6) -> str:
+    """Short display of a rational; exact when it fits, else rounded to `digits` significant digits."""
+    short = f"{float(value):.{digits}g}"
+    return short if Fraction(short) == value else f"≈{short}"

@@ -1,0 +1,141 @@
+"""From the force balance to the shifted plant, the error dynamics and the instability conditions.
+
+Nothing here is typed in but the force balance; SymPy derives the rest.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import sympy as sp
+
+from quakedesign.fault import Fault, FrictionLaw
+from quakedesign.rationals import rational
+
+t = sp.Symbol("t", nonnegative=True)
+x1, x2 = sp.symbols("x_1 x_2", real=True)
+p = sp.Symbol("p", real=True)
+m, k, A, eta, sigma = sp.symbols(r"m k A eta \sigma_n'", positive=True)
+k_hat, eta_hat, N_hat = sp.symbols(r"\hat{k} \hat{\eta} \hat{N}", positive=True)
+mu_star = sp.Symbol(r"\mu^*", positive=True)
+divisor = sp.Symbol(r"\mu_0\hat{N}_0", positive=True)
+nu = sp.Symbol("nu", real=True)
+e1, e2 = sp.symbols("e_1 e_2", real=True)
+mu = sp.Function("mu", real=True)
+disturbance = sp.Function(r"\hat{\varphi}_e", real=True)
+reference = sp.Function("r", real=True)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorDynamics:
+    """e1' = e2, e2' = β(ν + h), eqs. esystem3: the two expressions that a controller must live with.
+
+    Attributes
+    ----------
+    beta : Expr
+        Control coefficient β [-].
+    h : Expr
+        Matched perturbation [m/s²·μ0N̂0·kg/m², the unit of ν].
+    """
+
+    beta: sp.Expr
+    h: sp.Expr
+
+    def _repr_latex_(self) -> str:
+        return (
+            rf"$\displaystyle \dot e_1=e_2,\; \dot e_2=\beta(\nu+h),\; \beta={sp.latex(self.beta)},\; "
+            rf"h={sp.latex(self.h)}$"
+        )
+
+
+@cache
+def force_balance() -> sp.Eq:
+    """Eq. springmodel for slip z and slip rate v, with a fixed far end (its drift is slow: ERRATA 24)."""
+    z, v, acceleration, far = sp.symbols("z v a delta_far", real=True)
+    friction_force = mu(z, v) * A * (sigma - p)
+    return sp.Eq(m * acceleration, -friction_force + k * (far - z) - eta * v + m * disturbance(z, v, t))
+
+
+@cache
+def shifted_acceleration() -> sp.Expr:
+    """x2' of eq. shift: the force balance measured from the equilibrium without pressure and disturbance."""
+    z, v, acceleration, far, z_star = sp.symbols("z v a delta_far z^*", real=True)
+    balance = force_balance()
+    rest = balance.subs({acceleration: 0, v: 0, p: 0, z: z_star})
+    rest = rest.replace(disturbance, lambda *_: sp.Integer(0)).replace(mu, lambda *_: mu_star)
+    far_end = sp.solve(rest, far)[0]
+    moving = sp.solve(balance.subs(far, far_end), acceleration)[0].subs({z: x1 + z_star, v: x2})
+    origin = moving.replace(mu, lambda z_, v_: mu(z_ - z_star, v_)).replace(
+        disturbance, lambda z_, v_, t_: disturbance(z_ - z_star, v_, t_)
+    )
+    hats = {A: N_hat * m, k: k_hat * m, eta: eta_hat * m}
+    f = sp.expand(sp.simplify(origin.subs(hats)))
+    return sum(
+        (sp.factor(sp.collect(part, N_hat)) for part in _by_kind(f)), start=sp.Integer(0)
+    )
+
+
+def _by_kind(f: sp.Expr) -> list[sp.Expr]:
+    """Split into friction without pressure, friction with pressure, and the rest, for reading."""
+    with_pressure = sp.expand(f.coeff(p)) * p
+    friction = sp.expand(f.coeff(p, 0).coeff(N_hat)) * N_hat
+    rest = sp.expand(f - with_pressure - friction)
+    return [friction, with_pressure, *sp.Add.make_args(rest)]
+
+
+slip_slope, rate_slope = sp.symbols(r"\mu_{x_1} \mu_{x_2}", real=True)
+
+
+@cache
+def jacobian() -> sp.Matrix:
+    """Jacobian of eq. shift without disturbance at the origin, with pressure p (ERRATA 1).
+
+    μ_x1 [1/m] and μ_x2 [s/m] stand for the slopes of friction at the origin, μ* for friction there.
+    """
+    field = sp.Matrix([x2, shifted_acceleration().replace(disturbance, lambda *_: sp.Integer(0))])
+    friction = mu(x1, x2)
+    named = {friction.diff(x1): slip_slope, friction.diff(x2): rate_slope, friction: mu_star}
+    return field.jacobian([x1, x2]).subs(named).subs({x1: 0, x2: 0})
+
+
+@cache
+def instability() -> sp.Or:
+    """Condition for an unstable origin: det J < 0 or trace J > 0, solved for k̂ and η̂ (ERRATA 2)."""
+    J = jacobian()
+    determinant, trace = sp.expand(J.det()), sp.expand(J.trace())
+    stiffness_limit = sp.factor(sp.solve(determinant, k_hat)[0])
+    damping_limit = sp.factor(sp.solve(trace, eta_hat)[0])
+    return sp.Or(sp.StrictLessThan(k_hat, stiffness_limit), sp.StrictLessThan(eta_hat, damping_limit))
+
+
+@cache
+def error_dynamics() -> ErrorDynamics:
+    """β and h of eq. esystem3, from eq. shift, p = ν/(μ0N̂0) and e = x − (r, r')."""
+    r = reference(t)
+    shifted = shifted_acceleration().subs(p, nu / divisor).subs({x1: e1 + r, x2: e2 + r.diff(t)}, simultaneous=True)
+    acceleration = shifted - r.diff(t, 2)
+    beta = sp.simplify(sp.expand(acceleration).coeff(nu))
+    rest = acceleration.subs(nu, 0)
+    return ErrorDynamics(beta=beta, h=rest / beta)
+
+
+def with_law(expression: sp.Expr, law: FrictionLaw, *, extended: bool = False) -> sp.Expr:
+    """Insert a friction law (with symbols, or `law.exact()` with numbers) for μ, and μ(0, 0) for μ*."""
+    coefficient = law.extended if extended else law.coefficient
+    start = sp.sympify(law.coefficient(sp.Integer(0), sp.Integer(0)))
+    return expression.replace(mu, coefficient).subs(mu_star, start)
+
+
+def with_disturbance(expression: sp.Expr, fault: Fault) -> sp.Expr:
+    """Insert the fault's disturbance for φ̂_e."""
+    return expression.replace(disturbance, fault.disturbance.acceleration)
+
+
+@cache
+def plant_values(fault: Fault) -> dict[sp.Symbol, sp.Rational]:
+    """Exact nominal value of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] and σ'_n [Pa], from m = ρL³, A = L², k = GL."""
+    rho, G, L, damping, stress = (
+        sp.Rational(str(rational(v)))
+        for v in (fault.density, fault.shear_modulus, fault.length, fault.damping, fault.effective_normal_stress)
+    )
+    mass = rho * L**3
+    return {k_hat: G * L / mass, eta_hat: damping / mass, N_hat: L**2 / mass, sigma: stress}
