@@ -47,6 +47,8 @@ class LoopField:
     gains, constants, uncertain : tuple of Symbol
     domain : str
         ``"cells"`` for signed powers, ``"reals"`` for polynomials.
+    degree : int
+        Degree of the Lyapunov functions to try.
     """
 
     states: dict[sp.Symbol, int]
@@ -55,6 +57,7 @@ class LoopField:
     constants: tuple[sp.Symbol, ...]
     uncertain: tuple[sp.Symbol, ...]
     domain: str
+    degree: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,6 +118,16 @@ class Controller(ABC):
                 f"{cls.name} needs {len(cls.gain_units)} gains ({', '.join(cls.gain_units)}). Received {len(values)}."
             )
         return cls(gains=dict(zip(cls.gain_units, values, strict=True)), **more)
+
+    @classmethod
+    def counterexample(
+        cls, gains: Mapping[str, Fraction], uncertain: Mapping[str, tuple[Fraction, Fraction]]
+    ) -> Mapping[str, Mapping[str, Fraction]] | None:
+        """Suggest a Filippov equilibrium away from the origin, as ``parameters``, ``point`` and ``weights``.
+
+        Only a suggestion, to be checked in exact arithmetic; None where the law knows of none.
+        """
+        return None
 
     def _exact_gains(self) -> list[sp.Rational]:
         return [sp.Rational(v.numerator, v.denominator) for v in self.gains.values()]

@@ -45,3 +45,23 @@ class ContinuousTwisting(SlidingMode):
     def lipschitz_limit(self) -> Fraction:
         """λ(k3 − |k4|): from there on a Filippov equilibrium e1 ≠ 0 exists for a constant h'."""
         return self.scale * (self.gains["k3"] - abs(self.gains["k4"]))
+
+    @classmethod
+    def counterexample(
+        cls, gains: Mapping[str, Fraction], uncertain: Mapping[str, tuple[Fraction, Fraction]]
+    ) -> Mapping[str, Mapping[str, Fraction]] | None:
+        """On e2 = 0, e3 = k1⌈e1⌋^⅓ a constant h' ≥ k3 − |k4| holds the loop in place (ERRATA, end)."""
+        k1, _, k3, k4 = gains.values()
+        pull = max(Fraction(0), k3 - abs(k4))
+        if not k1 or pull > uncertain["d"][1] or pull < uncertain["d"][0]:
+            return None
+        share = ((k3 - pull) / abs(k4) + 1) / 2 if k4 else Fraction(1)
+        if share > 1 or share < 0:
+            return None
+        towards, away = ("-", "+") if k4 >= 0 else ("+", "-")
+        last = "+" if k1 > 0 else "-"
+        return {
+            "parameters": {"beta": uncertain["beta"][0], "d": pull},
+            "point": {"e1": Fraction(1), "e2": Fraction(0), "e3": k1},
+            "weights": {f"+{towards}{last}": share, f"+{away}{last}": 1 - share},
+        }

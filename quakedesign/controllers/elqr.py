@@ -69,4 +69,5 @@ class ExtendedLQR(Controller):
             constants=(authority,),
             uncertain=(beta, s, w),
             domain="reals",
+            degree=2,
         )

@@ -90,6 +90,7 @@ class SlidingMode(Controller):
             constants=(),
             uncertain=(beta, d),
             domain="cells",
+            degree=5,
         )
 
     def _exact_scale(self) -> sp.Rational:

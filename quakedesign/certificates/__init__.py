@@ -1,0 +1,16 @@
+"""Claims about closed loops, their files, and the exact decision."""
+
+from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, loop_of
+from quakedesign.certificates.files import certificate_text, load_certificate, parse_certificate, save_certificate
+
+__all__ = [
+    "Certificate",
+    "Equilibrium",
+    "Loop",
+    "Verdict",
+    "certificate_text",
+    "load_certificate",
+    "loop_of",
+    "parse_certificate",
+    "save_certificate",
+]

@@ -1,0 +1,41 @@
+"""Positive definiteness of rational matrices, decided exactly."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import lcm
+
+
+def full_matrix(upper: Sequence[Fraction], size: int) -> list[list[Fraction]]:
+    """Symmetric matrix (size × size) from its upper triangle, row by row.
+
+    Raises
+    ------
+    ValueError
+        When the number of entries is not size(size+1)/2.
+    """
+    if len(upper) != size * (size + 1) // 2:
+        raise ValueError(f"an upper triangle of size {size} has {size * (size + 1) // 2} entries, not {len(upper)}.")
+    entries = iter(upper)
+    rows = [[Fraction(0)] * size for _ in range(size)]
+    for i in range(size):
+        for j in range(i, size):
+            rows[i][j] = rows[j][i] = next(entries)
+    return rows
+
+
+def positive_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
+    """Whether a symmetric rational matrix is positive definite (Sylvester, by fraction-free elimination).
+
+    Parameters
+    ----------
+    rows : sequence of n sequences of n Fraction
+        Assumed symmetric; only then is the answer meaningful.
+    """
+    from flint import fmpz_mat
+
+    size = len(rows)
+    scale = lcm(1, *(value.denominator for row in rows for value in row))
+    integers = fmpz_mat([[value.numerator * (scale // value.denominator) for value in row] for row in rows])
+    permutation, _, _, upper = integers.fflu()
+    unmoved = all(permutation[i, i] == 1 for i in range(size))
+    return unmoved and all(upper[i, i] > 0 for i in range(size))

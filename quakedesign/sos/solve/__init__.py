@@ -1,0 +1,1 @@
+"""The part of the engine that searches: floating point proposes, `sos.exact` decides."""

@@ -1,0 +1,172 @@
+"""Sums of products of signed powers as plain data, and their polynomials on sign cells."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import sympy as sp
+
+from quakedesign.errors import CertificateError
+from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
+
+Factor = tuple[str, Fraction, str]
+"""State, exponent, kind: ``s`` for ⌈x⌋^a, ``a`` for |x|^a."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Term:
+    """coefficient · parameters · factors.
+
+    Attributes
+    ----------
+    coefficient : Fraction
+    parameters : tuple of str
+        Names, each as often as it multiplies.
+    factors : tuple of (state, exponent, kind)
+        At most one for every state.
+    """
+
+    coefficient: Fraction
+    parameters: tuple[str, ...]
+    factors: tuple[Factor, ...]
+
+
+def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ...]:
+    """Expand an expression into terms, with equal products collected, in a fixed order.
+
+    Raises
+    ------
+    CertificateError
+        When a part is not a product of rational number, parameters and signed powers of single states.
+    """
+    order = {state: i for i, state in enumerate(states)}
+    collected: dict[tuple[tuple[str, ...], tuple[Factor, ...]], Fraction] = {}
+    for part in sp.Add.make_args(sp.expand(expression)):
+        coefficient, parameters, powers = _split(part, order)
+        factors = tuple(
+            (state.name, exponent, kind) for state, (exponent, kind) in sorted(powers.items(), key=lambda i: order[i[0]])
+        )
+        key = (tuple(sorted(parameters)), factors)
+        collected[key] = collected.get(key, Fraction(0)) + coefficient
+    return tuple(sorted(Term(c, *key) for key, c in collected.items() if c))
+
+
+def _split(part: sp.Expr, states: Mapping[sp.Symbol, int]):
+    coefficient, parameters = Fraction(1), list[str]()
+    powers: dict[sp.Symbol, tuple[Fraction, str]] = {}
+    for base, power in (factor.as_base_exp() for factor in sp.Mul.make_args(part)):
+        if base.is_Rational and power.is_Integer:
+            coefficient *= Fraction(int(base.p), int(base.q)) ** int(power)
+        elif base.is_Symbol and base not in states and power.is_Integer and power > 0:
+            parameters += [base.name] * int(power)
+        else:
+            state, exponent, kind = _power(base, power, states)
+            powers[state] = _combined(powers.get(state), (exponent, kind))
+    kept = {s: p for s, p in powers.items() if p != (0, "a")}
+    return coefficient, parameters, kept
+
+
+def _power(base: sp.Expr, power: sp.Expr, states: Mapping[sp.Symbol, int]) -> tuple[sp.Symbol, Fraction, str]:
+    if base in states and power.is_Integer and power > 0:
+        return base, Fraction(int(power)), "s" if power % 2 else "a"
+    if isinstance(base, SignedPower | AbsolutePower) and power.is_Integer and power > 0:
+        state, exponent = base.args
+        if state in states and exponent.is_Rational:
+            odd = isinstance(base, SignedPower) and power % 2 == 1
+            return state, Fraction(int(exponent.p), int(exponent.q)) * int(power), "s" if odd else "a"
+    raise CertificateError(
+        f"a certificate needs products of signed powers of single states. Received the factor {base**power}. "
+        "Nested powers need a change of coordinates first."
+    )
+
+
+def _combined(first: tuple[Fraction, str] | None, second: tuple[Fraction, str]) -> tuple[Fraction, str]:
+    if first is None:
+        return second
+    return first[0] + second[0], "a" if first[1] == second[1] else "s"
+
+
+def from_terms(terms: Iterable[Term], symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
+    """SymPy expression of terms; `symbols` gives the symbol of every name."""
+    kinds = {"s": SignedPower, "a": AbsolutePower}
+    total = sp.Integer(0)
+    for term in terms:
+        product = sp.Rational(term.coefficient.numerator, term.coefficient.denominator)
+        for name in term.parameters:
+            product *= symbols[name]
+        for state, exponent, kind in term.factors:
+            product *= kinds[kind](symbols[state], sp.Rational(exponent.numerator, exponent.denominator))
+        total += product
+    return total
+
+
+def lie_derivative(function: sp.Expr, field: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """Σ ∂V/∂x_i · f_i.
+
+    Raises
+    ------
+    KinkError
+        When the function is not continuously differentiable.
+    """
+    return sum((function.diff(state) * rate for state, rate in field.items()), start=sp.Integer(0))
+
+
+def value(term: Term, parameters: Mapping[str, Fraction]) -> Fraction:
+    """Coefficient with numbers for the parameters."""
+    product = term.coefficient
+    for name in term.parameters:
+        product *= parameters[name]
+    return product
+
+
+def cell_polynomial(
+    terms: Iterable[Term],
+    weights: Mapping[str, int],
+    signs: Mapping[str, int],
+    parameters: Mapping[str, Fraction],
+) -> dict[tuple[int, ...], Fraction]:
+    """Polynomial in u_i ≥ 0 after x_i = s_i·u_i^{r_i}.
+
+    Parameters
+    ----------
+    terms : iterable of Term
+    weights : mapping of state to r_i
+        In the order of the variables.
+    signs : mapping of state to ±1
+    parameters : mapping of name to Fraction
+
+    Raises
+    ------
+    CertificateError
+        When an exponent does not become an integer.
+    """
+    total: dict[tuple[int, ...], Fraction] = {}
+    for term in terms:
+        coefficient, exponents = value(term, parameters), dict.fromkeys(weights, 0)
+        for state, exponent, kind in term.factors:
+            degree = exponent * weights[state]
+            if degree.denominator != 1 or degree < 0:
+                raise CertificateError(f"⌈{state}⌋^{exponent} with weight {weights[state]} is no polynomial on a cell.")
+            exponents[state] = degree.numerator
+            coefficient *= signs[state] if kind == "s" else 1
+        key = tuple(exponents.values())
+        total[key] = total.get(key, Fraction(0)) + coefficient
+    return {e: c for e, c in total.items() if c}
+
+
+def real_polynomial(
+    terms: Iterable[Term], states: Sequence[str], parameters: Mapping[str, Fraction]
+) -> dict[tuple[int, ...], Fraction]:
+    """Polynomial on ℝⁿ of terms whose factors are integer powers of the right parity.
+
+    Raises
+    ------
+    CertificateError
+        When a factor is not a polynomial.
+    """
+    terms = tuple(terms)
+    for term in terms:
+        for state, exponent, kind in term.factors:
+            if exponent.denominator != 1 or (kind == "s") != (exponent % 2 == 1):
+                raise CertificateError(f"{kind}-power {exponent} of {state} is no polynomial on the reals.")
+    return cell_polynomial(terms, dict.fromkeys(states, 1), dict.fromkeys(states, 1), parameters)
