@@ -54,7 +54,8 @@ def _sorted(loop: Loop) -> dict[str, list[Term]]:
 def _check_proof(certificate: Certificate) -> None:
     loop, claims = certificate.loop, certificate.claims
     second = "decrease" if loop.domain == "cells" else "rate"
-    require(set(claims) == {"positive", second}, f"the claims must be positive and {second}.")
+    required, allowed = {"positive", second}, {f"bound_{state}" for state in loop.states}
+    require(required <= set(claims) <= required | allowed, f"the claims must be positive, {second} and bounds of states.")
     require(all(c > 0 for c in claims.values()), "a claim must be positive.")
     uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.uncertain)
     require(not uncertain, "V must not depend on an uncertain parameter.")

@@ -146,7 +146,7 @@ def _certificate(raw: dict[str, Any]) -> Certificate:
     return Certificate(
         loop=loop,
         lyapunov=_terms(raw["V"], loop),
-        claims=_rationals(raw["claims"], "claims", 2),
+        claims=_rationals(raw["claims"], "claims", 2 + _LIMITS["states"]),
         witnesses=witnesses,
     )
 

@@ -50,10 +50,10 @@ class Obligations:
             vertex = dict(zip(self.loop.uncertain, values, strict=True))
             yield " ".join(f"{name}={v}" for name, v in vertex.items()), vertex
 
-    def function(self) -> Iterator[tuple[str, Polynomial]]:
-        """V on every cell."""
+    def function(self, claim: str = "positive") -> Iterator[tuple[str, Polynomial]]:
+        """V on every cell; `claim` begins the names."""
         for cell, signs in self.cells():
-            yield " ".join(filter(None, ("positive", cell))), self._polynomial(self.lyapunov, signs, {})
+            yield " ".join(filter(None, (claim, cell))), self._polynomial(self.lyapunov, signs, {})
 
     def decrease(self, claim: str) -> Iterator[tuple[str, Polynomial]]:
         """−V̇ on every cell and vertex; `claim` begins the names."""
@@ -104,6 +104,10 @@ def claimed(loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fractio
     require(loop.domain == "cells" or m % 2 == 0, "V has odd degree on the reals.")
     for name, polynomial in function:
         yield name, difference(polynomial, power_sum(variables, m, claims["positive"]))
+    for i, state in enumerate(loop.states):
+        for name, polynomial in obligations.function(f"bound_{state}") if f"bound_{state}" in claims else ():
+            corner = {tuple(m if j == i else 0 for j in range(variables)): claims[f"bound_{state}"]}
+            yield name, difference(polynomial, corner)
     second = "decrease" if loop.domain == "cells" else "rate"
     decrease = list(obligations.decrease(second))
     n = degree([p for _, p in decrease], "V̇")

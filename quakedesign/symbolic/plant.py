@@ -139,3 +139,42 @@ def plant_values(fault: Fault) -> dict[sp.Symbol, sp.Rational]:
     )
     mass = rho * L**3
     return {k_hat: G * L / mass, eta_hat: damping / mass, N_hat: L**2 / mass, sigma: stress}
+
+
+phi, phi_t, phi_1, phi_2 = sp.symbols(r"\varphi \varphi_t \varphi_1 \varphi_2", real=True)
+friction_value = sp.Symbol("mu", positive=True)
+r0, r1, r2, r3 = sp.symbols("r_0 r_1 r_2 r_3", real=True)
+acceleration_error = sp.Symbol(r"\dot{e}_2", real=True)
+
+
+@cache
+def matched_rate() -> sp.Expr:
+    """h' along a solution, in values of friction, its slopes, the reference and its derivatives, and e1, e2, e2'.
+
+    The disturbance enters by its value φ, its explicit rate φ_t and its growth φ_1 in slip and φ_2 in slip rate. The
+    control acts on h' through e2' = β(ν + h) (ERRATA 16).
+    """
+    a, b = sp.Function("a", real=True)(t), sp.Function("b", real=True)(t)
+    r = reference(t)
+    slip, rate = a + r, b + r.diff(t)
+    h = error_dynamics().h.subs({e1: a, e2: b}, simultaneous=True)
+    value = sp.Function("m_v", positive=True)(t)
+    force = sp.Function("f_v", real=True)(t)
+    h = h.replace(lambda e: isinstance(e, sp.core.function.AppliedUndef) and e.func == mu, lambda _: value)
+    h = h.replace(lambda e: isinstance(e, sp.core.function.AppliedUndef) and e.func == disturbance, lambda _: force)
+    chain = {
+        value.diff(t): slip_slope * slip.diff(t) + rate_slope * rate.diff(t),
+        force.diff(t): phi_t + phi_1 * slip.diff(t) + phi_2 * rate.diff(t),
+    }
+    total = h.diff(t).subs(chain)
+    steps: list[dict[sp.Expr, sp.Expr]] = [
+        {r.diff(t, 3): r3},
+        {r.diff(t, 2): r2},
+        {r.diff(t): r1},
+        {b.diff(t): acceleration_error, a.diff(t): e2},
+        {a: e1, b: e2, r: r0, value: friction_value, force: phi},
+    ]
+    for step in steps:
+        total = total.subs(step)
+    inner = sp.expand(sp.simplify(total * N_hat * friction_value**2 / divisor))
+    return divisor / N_hat * sp.collect(inner, [slip_slope, rate_slope, r3, phi_t]) / friction_value**2

@@ -13,7 +13,7 @@ from quakedesign.rationals import nearest
 from quakedesign.sos import Polynomial, Witness
 from quakedesign.sos.solve.cone import Cone
 from quakedesign.sos.solve.rounding import find_witness, monomial, scaled
-from quakedesign.sos.solve.search import Family, GramSearch, propose
+from quakedesign.sos.solve.search import Family, GramSearch, largest_multiple, propose
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
 
@@ -123,7 +123,8 @@ def find_certificate(loop: Loop, degree: int) -> Certificate | None:
             _below(proposal.margin * float(min(1 / r**degree for r in scale))),
             _below(proposal.margin * float(pace * min(1 / r**n for r in scale))),
         )
-        certificate = finish(loop, lyapunov, claims_of(loop, lyapunov, margins), scale)
+        claims = claims_of(loop, lyapunov, margins) | bounds_of(loop, lyapunov, scale)
+        certificate = finish(loop, lyapunov, claims, scale)
         if certificate is not None:
             return certificate
     return None
@@ -161,6 +162,23 @@ def claims_of(
     if loop.domain == "cells":
         return {"positive": margins[0] * _GIVE_AWAY, "decrease": margins[1] * _GIVE_AWAY}
     return {"positive": margins[0] * _GIVE_AWAY, "rate": _below(0.99 * quadratic_rate(loop, lyapunov))}
+
+
+def bounds_of(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> dict[str, Fraction]:
+    """Claims V ≥ γ u_x^m for every state, 10 % below the largest γ that the solver finds."""
+    polynomials = {tuple(sorted(p.items())): p for _, p in Obligations(loop, lyapunov).function()}
+    seen = [scaled(p, scale) for p in polynomials.values()]
+    degree = sum(next(iter(seen[0])))
+    cone = cone_of(len(loop.states), degree, loop.domain)
+    size = max(abs(c) for p in seen for c in p.values())
+    seen = [{e: c / size for e, c in p.items()} for p in seen]
+    claims = {}
+    for i, state in enumerate(loop.states):
+        corner = {tuple(degree if j == i else 0 for j in range(len(loop.states))): Fraction(1)}
+        gamma = _below(0.9 * largest_multiple(cone, seen, corner)) * size / scale[i] ** degree
+        if gamma > 0:
+            claims[f"bound_{state}"] = gamma
+    return claims
 
 
 def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:

@@ -71,4 +71,4 @@ class ExponentialSlipWeakening(FrictionLaw):
     @property
     def rate_slope(self) -> float:
         """Zero: the law does not depend on the slip rate [s/m]."""
-        return 0.0
+        return 0

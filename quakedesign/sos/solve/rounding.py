@@ -30,7 +30,10 @@ def find_witness(polynomial: Polynomial, search: GramSearch, scale: Sequence[Fra
     cone = search.cone
     if not polynomial:
         return Witness(multiplier={(0,) * cone.variables: Fraction(1)})
-    grams = search(scaled(polynomial, scale))
+    if all(len(entries) == 1 for entries in cone.positions.values()):
+        grams = [[[0.0] * len(basis) for _ in basis] for _, basis in cone.blocks]
+    else:
+        grams = search(scaled(polynomial, scale))
     if grams is None:
         return None
     largest = max(abs(float(c)) for c in scaled(polynomial, scale).values())

@@ -60,6 +60,20 @@ def propose(families: Sequence[Family], decisions: int) -> Proposal | None:
     return Proposal([float(a) for a in decision.value], float(margin.value))
 
 
+def largest_multiple(cone: Cone, polynomials: Sequence[Polynomial], direction: Polynomial) -> float:
+    """Largest g for which the solver finds all P − g·direction in the cone; 0 if it finds none. Proves nothing."""
+    import cvxpy as cp
+    import numpy as np
+
+    multiple = cp.Variable()
+    towards = np.array(cone.vector(direction))
+    constraints = [
+        np.array(cone.vector(p)) - multiple * towards == _sum_of_blocks(cone) for p in polynomials
+    ]
+    problem = cp.Problem(cp.Maximize(multiple), constraints)
+    return max(0.0, float(multiple.value)) if solve(problem) and multiple.value is not None else 0.0
+
+
 def _sum_of_blocks(cone: Cone):
     import cvxpy as cp
 
