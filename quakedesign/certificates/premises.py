@@ -263,7 +263,7 @@ class Domain:
         return {"level": self.level, "slip_error": self.slip_error, "slip_rate_error": self.slip_rate_error}
 
 
-def certified_domain(fault: Fault, controller: SlidingMode, certificate: Certificate, doublings: int = 80) -> Domain:
+def certified_domain(fault: Fault, controller: SlidingMode, certificate: Certificate, doublings: int = 400) -> Domain:
     """Largest level 2^−n on which the premise on |h'| proves itself, rigorous but not sharp."""
     sets = LevelSets(certificate, controller.scale)
     allowed = certified_lipschitz(certificate) * controller.scale

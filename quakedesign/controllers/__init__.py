@@ -1,6 +1,7 @@
 """Control laws, one a file, found by looking into this folder; and the gains that the paper prints."""
 
 import tomllib
+from fractions import Fraction
 from functools import cache
 from importlib import import_module
 from importlib.resources import files
@@ -11,7 +12,7 @@ from quakedesign.controllers.base import Controller, LoopField, Signals
 from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.errors import UnknownNameError
 
-__all__ = ["Controller", "LoopField", "Signals", "SlidingMode", "control_law", "control_laws", "published"]
+__all__ = ["Controller", "LoopField", "Signals", "SlidingMode", "control_law", "control_laws", "family", "published"]
 
 
 @cache
@@ -50,3 +51,18 @@ def published(fault_name: str) -> dict[str, Controller]:
             more["divisor"] = data["divisor"]
         found[name] = law.from_values(tuple(entry["gains"]), **more)
     return found
+
+
+def family(name: str) -> tuple[Fraction, tuple[Controller, ...]]:
+    """Lipschitz bound and base gains of the sets that synthesis tries for a law, in order.
+
+    Raises
+    ------
+    UnknownNameError
+        When there are none for the law.
+    """
+    data = tomllib.loads((files(__name__) / "families.toml").read_text(encoding="utf-8"))
+    if name not in data:
+        raise UnknownNameError(f"base gains exist for {', '.join(data)}. Received {name!r}.")
+    law = control_law(name)
+    return Fraction(data[name]["lipschitz"]), tuple(law.from_values(tuple(g)) for g in data[name]["gains"])

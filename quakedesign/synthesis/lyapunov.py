@@ -120,8 +120,8 @@ def find_certificate(loop: Loop, degree: int) -> Certificate | None:
             if a
         )
         margins = (
-            _below(proposal.margin * float(min(1 / r**degree for r in scale))),
-            _below(proposal.margin * float(pace * min(1 / r**n for r in scale))),
+            below(proposal.margin * float(min(1 / r**degree for r in scale))),
+            below(proposal.margin * float(pace * min(1 / r**n for r in scale))),
         )
         claims = claims_of(loop, lyapunov, margins) | bounds_of(loop, lyapunov, scale)
         certificate = finish(loop, lyapunov, claims, scale)
@@ -161,7 +161,7 @@ def claims_of(
     """Claims with room to spare: half of the margins, and on the reals 99 % of the decay rate of V."""
     if loop.domain == "cells":
         return {"positive": margins[0] * _GIVE_AWAY, "decrease": margins[1] * _GIVE_AWAY}
-    return {"positive": margins[0] * _GIVE_AWAY, "rate": _below(0.99 * quadratic_rate(loop, lyapunov))}
+    return {"positive": margins[0] * _GIVE_AWAY, "rate": below(0.99 * quadratic_rate(loop, lyapunov))}
 
 
 def bounds_of(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> dict[str, Fraction]:
@@ -175,10 +175,26 @@ def bounds_of(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction])
     claims = {}
     for i, state in enumerate(loop.states):
         corner = {tuple(degree if j == i else 0 for j in range(len(loop.states))): Fraction(1)}
-        gamma = _below(0.9 * largest_multiple(cone, seen, corner)) * size / scale[i] ** degree
+        gamma = below(0.9 * largest_multiple(cone, seen, corner)) * size / scale[i] ** degree
         if gamma > 0:
             claims[f"bound_{state}"] = gamma
     return claims
+
+
+def quadratic_matrix(loop: Loop, lyapunov: tuple[Term, ...]):
+    """Matrix of a quadratic V, as floats (n × n)."""
+    return _matrix(next(iter(Obligations(loop, lyapunov).function()))[1], len(loop.states))
+
+
+def _matrix(polynomial: Polynomial, size: int):
+    import numpy as np
+
+    full = np.zeros((size, size))
+    for exponents, c in polynomial.items():
+        i, *rest = [k for k, e in enumerate(exponents) for _ in range(e)]
+        full[i, rest[0]] += float(c) / 2
+        full[rest[0], i] += float(c) / 2
+    return full
 
 
 def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
@@ -186,21 +202,13 @@ def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
     import numpy as np
     from scipy.linalg import eigh
 
-    def matrix(polynomial: Polynomial):
-        size = len(loop.states)
-        full = np.zeros((size, size))
-        for exponents, c in polynomial.items():
-            i, *rest = [k for k, e in enumerate(exponents) for _ in range(e)]
-            full[i, rest[0]] += float(c) / 2
-            full[rest[0], i] += float(c) / 2
-        return full
-
     obligations = Obligations(loop, lyapunov)
-    V = matrix(next(iter(obligations.function()))[1])
+    size = len(loop.states)
+    V = quadratic_matrix(loop, lyapunov)
     diagonal = np.diag(1 / np.sqrt(np.abs(np.diag(V))))
     try:
         return min(
-            float(eigh(diagonal @ matrix(p) @ diagonal, diagonal @ V @ diagonal, eigvals_only=True)[0]) / 2
+            float(eigh(diagonal @ _matrix(p, size) @ diagonal, diagonal @ V @ diagonal, eigvals_only=True)[0]) / 2
             for _, p in obligations.decrease("rate")
         )
     except np.linalg.LinAlgError:
@@ -237,7 +245,7 @@ def _exponents(term: Term, loop: Loop) -> list[int]:
     return [int(powers.get(state, 0)) for state in loop.states]
 
 
-def _below(number: float) -> Fraction:
+def below(number: float) -> Fraction:
     """Positive number rounded down to about three digits, as a short rational; zero stays zero."""
     import math
 

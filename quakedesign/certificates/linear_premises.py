@@ -1,0 +1,170 @@
+"""What the linear feedback's certificate needs of a fault: sectors about any constant reference (ERRATA 6 to 12)."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import sympy as sp
+
+from quakedesign.certificates.claim import Certificate, require
+from quakedesign.certificates.premises import (
+    Premise,
+    Range,
+    coefficient_range,
+    friction_range,
+    least_authority,
+    plant_ranges,
+)
+from quakedesign.controllers import Controller
+from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.balls import upper_bound
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sectors:
+    """Chords of everything that depends on the state, about the equilibrium of any constant reference.
+
+    x2' = s·x1 − w·x2 + β·b·p with all three anywhere in their ranges, at every time.
+
+    Attributes
+    ----------
+    authority : Fraction
+        b = μ_res·N̂_min [m²/kg] (ERRATA 9).
+    beta : (Fraction, Fraction)
+        Range of μN̂/b [-].
+    slip : (Fraction, Fraction)
+        Range of s [1/s²]: friction's weakening, spring, growth of the disturbance.
+    rate : (Fraction, Fraction)
+        Range of w [1/s]: damping, friction's slope in slip rate (ERRATA 10), growth of the disturbance.
+    row_bounds : (Fraction, Fraction)
+        g1 [Pa/m] and g2 [Pa·s/m] with |h| ≤ g1|x1| + g2|x2| about the nominal k̂, η̂ (ERRATA 6, 7).
+    largest_effective_stress : Fraction
+        max |σ' − p*| [Pa] over the constant references up to the target slip (ERRATA 8).
+    """
+
+    authority: Fraction
+    beta: Range
+    slip: Range
+    rate: Range
+    row_bounds: Range
+    largest_effective_stress: Fraction
+
+    def ranges(self) -> dict[str, Range]:
+        """Ranges by the names of the e-LQR's loop field."""
+        return {"beta": self.beta, "s": self.slip, "w": self.rate}
+
+
+def sectors(fault: Fault) -> Sectors:
+    """Sector bounds of a fault over its uncertainty box, exact or rounded outwards."""
+    ranges, b = plant_ranges(fault), least_authority(fault)
+    law, disturbance = fault.friction.exact(), fault.disturbance
+    stress, positive = effective_stress(fault)
+    load = ranges[plant.N_hat][1] * stress
+    slip_chord = load * _fraction(law.slip_slope)
+    rate_chord = load * _fraction(law.rate_slope)
+    slip_growth, rate_growth = (rational(g) for g in (disturbance.slip_growth, disturbance.rate_growth))
+    k, eta = ranges[plant.k_hat], ranges[plant.eta_hat]
+    slip = ((Fraction(0) if positive else -slip_chord) - k[1] + slip_growth, slip_chord - k[0] + slip_growth)
+    rate = (eta[0] - rate_chord - rate_growth, eta[1] + rate_chord - rate_growth)
+    nominal = {name: _fraction(v) for name, v in plant.plant_values(fault).items()}
+    return Sectors(
+        authority=b,
+        beta=coefficient_range(fault, b),
+        slip=slip,
+        rate=rate,
+        row_bounds=(
+            max(abs(s + nominal[plant.k_hat]) for s in slip) / b,
+            max(abs(w - nominal[plant.eta_hat]) for w in rate) / b,
+        ),
+        largest_effective_stress=stress,
+    )
+
+
+def effective_stress(fault: Fault) -> tuple[Fraction, bool]:
+    """Rigorous bound on |σ' − p*(r0)| [Pa] for 0 ≤ r0 ≤ target slip, and whether σ' − p* stays positive.
+
+    p* balances friction, spring and the disturbance's growth at rest at r0 (ERRATA 8); friction there is anything that
+    the box allows.
+    """
+    r, value = sp.Symbol("r_0", nonnegative=True), sp.Symbol("mu", positive=True)
+    static = friction_range(fault)[1]
+    ranges = plant_ranges(fault)
+    mu_star, growth = (_sympy(v) for v in (static, rational(fault.disturbance.slip_growth)))
+    balance = plant.shifted_acceleration().replace(plant.disturbance, lambda x, *_: growth * x)
+    balance = balance.replace(plant.mu, lambda *_: value).subs({plant.x1: r, plant.x2: 0, plant.mu_star: mu_star})
+    net = sp.expand(plant.sigma - sp.solve(balance, plant.p)[0])
+    numerator = sp.collect(sp.expand(net * value), r)
+    target = rational(fault.reference.target_slip)
+    least = sp.Max(_sympy(friction_range(fault)[0]), mu_star - _sympy(_fraction(fault.friction.exact().slip_slope)) * r)
+    box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)} | {r: (Fraction(0), target)}
+    stress = upper_bound(numerator / least, box, pieces=400)
+    lowest = numerator.subs(r, _sympy(target)).subs(
+        {plant.k_hat: _sympy(box[plant.k_hat][1]), plant.N_hat: _sympy(box[plant.N_hat][0])}
+    )
+    return stress, bool(lowest.subs(plant.sigma, _sympy(box[plant.sigma][0])) > 0)
+
+
+def linear_premises(fault: Fault, controller: Controller, certificate: Certificate | None) -> list[Premise]:
+    """Premises of the linear feedback: sectors inside the certified ones; constant reference; vanishing disturbance.
+
+    The certificate speaks about constant references and disturbances that vanish at the equilibrium. The last two
+    premises say by how much a task leaves that (ERRATA 8, 11): errors then stay bounded, but no bound is certified.
+
+    Raises
+    ------
+    CertificateError
+        When the certificate is about other gains.
+    """
+    needed = sectors(fault)
+    proved = certificate is not None
+    ranges = certificate.loop.uncertain if certificate is not None else needed.ranges()
+    if certificate is not None:
+        require(
+            certificate.loop.law == controller.name
+            and dict(certificate.loop.gains) == dict(controller.gains)
+            and certificate.loop.constants.get("b") == needed.authority,
+            "the certificate is about other gains, or another fault.",
+        )
+    inside = ranges["s"][0] <= needed.slip[0] and ranges["w"][0] <= needed.rate[0] <= needed.rate[1] <= ranges["w"][1]
+    peak_rate = Fraction(15, 8) * rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
+    return [
+        Premise(
+            name="control_coefficient",
+            required=float(needed.beta[1]),
+            certified=float(ranges["beta"][1]),
+            unit="-",
+            proved=proved and ranges["beta"][0] <= needed.beta[0],
+        ),
+        Premise(
+            name="friction_slope",
+            required=float(needed.slip[1]),
+            certified=float(ranges["s"][1]),
+            unit="1/s^2",
+            proved=proved and inside,
+            note=f"net chord in slip about any constant reference; σ'-p* up to {float(needed.largest_effective_stress):.4g} Pa",
+        ),
+        Premise(
+            name="constant_reference",
+            required=float(peak_rate),
+            certified=0.0,
+            unit="m/s",
+            note="the certificate holds about constant references; for a moving one the errors are bounded, not certified",
+        ),
+        Premise(
+            name="vanishing_disturbance",
+            required=fault.disturbance.largest_explicit,
+            certified=0.0,
+            unit="m/s^2",
+            note="a disturbance that does not vanish leaves a bounded error, not certified",
+        ),
+    ]
+
+
+def _fraction(value) -> Fraction:
+    exact = sp.nsimplify(value, rational=True)
+    return Fraction(int(exact.p), int(exact.q))
+
+
+def _sympy(value: Fraction) -> sp.Rational:
+    return sp.Rational(value.numerator, value.denominator)

@@ -1,0 +1,297 @@
+"""From a fault to gains with a proof, and from given gains to a verdict."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
+from quakedesign.certificates.linear_premises import linear_premises, sectors
+from quakedesign.certificates.premises import (
+    Domain,
+    Premise,
+    coefficient_range,
+    least_authority,
+    sliding_mode_premises,
+)
+from quakedesign.controllers import Controller, SlidingMode, control_law, family
+from quakedesign.errors import CertificateError, KinkError, ParameterError, UnknownNameError
+from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.synthesis.lyapunov import balance, bounds_of, claims_of, find_certificate, finish, refute
+from quakedesign.synthesis.riccati import riccati_design
+
+DESIGNABLE = ("cta", "elqr")
+_HEADROOM = Fraction(11, 10)
+_SHARES = (Fraction(99, 100), Fraction(9, 10), Fraction(1, 2))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """A controller for one fault, what is proved of it, and under which premises.
+
+    Attributes
+    ----------
+    fault : Fault
+    name : str
+        Name of the control law.
+    verdict : Verdict
+    controller : Controller or None
+        None only when no gains with a proof were found.
+    certificate : Certificate or None
+        Proof for the base gains (λ = 1), or the counterexample.
+    premises : tuple of Premise
+    domain : Domain or None
+        Certified domain of the self-consistent premise on |h'|.
+    details : mapping
+        What synthesis decided: exact numbers as texts.
+    """
+
+    fault: Fault
+    name: str
+    verdict: Verdict
+    controller: Controller | None
+    certificate: Certificate | None
+    premises: tuple[Premise, ...]
+    domain: Domain | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def gains(self) -> dict[str, Fraction]:
+        """Exact gains; for a sliding mode also ``scale`` λ and ``divisor`` μ0N̂0 [m²/kg]."""
+        if self.controller is None:
+            return {}
+        more = (
+            {"scale": self.controller.scale, "divisor": self.controller.divisor}
+            if isinstance(self.controller, SlidingMode)
+            else {}
+        )
+        return {**self.controller.gains, **more}
+
+    @property
+    def title(self) -> str:
+        """Name for people."""
+        return control_law(self.name).title
+
+    def with_premise(self, premise: Premise) -> "Design":
+        """Return the design with one more premise, such as one read off a run."""
+        return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
+
+    def _repr_html_(self) -> str:
+        from quakedesign.report.summary import design_html
+
+        return design_html(self)
+
+
+def design(fault: Fault, controller: str = "cta") -> Design:
+    """Find gains with a proof for a fault.
+
+    2-CTA: base gains from the literature are proved for the fault's range of β and scaled by λ = ρ⁶ (ρ rational, so that
+    every scaled gain is rational) until L̄ exceeds by a tenth what the reference and the disturbance need.
+    e-LQR: Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : str
+        ``"cta"`` or ``"elqr"``.
+
+    Returns
+    -------
+    Design
+        With verdict ``UNDECIDED`` and no controller when no proof was found.
+
+    Raises
+    ------
+    UnknownNameError
+        For a controller that cannot be designed.
+    """
+    if controller not in DESIGNABLE:
+        raise UnknownNameError(f"controller to design must be one of {', '.join(DESIGNABLE)}. Received {controller!r}.")
+    return _design_linear(fault) if controller == "elqr" else _design_sliding_mode(fault, controller)
+
+
+def _design_sliding_mode(fault: Fault, name: str) -> Design:
+    divisor = least_authority(fault)
+    lipschitz, bases = family(name)
+    for base in bases:
+        loop = sliding_mode_loop(base, lipschitz, coefficient_range(fault, divisor))
+        certificate = find_certificate(loop, control_law(name).loop_field().degree)
+        if certificate is not None:
+            break
+    else:
+        return Design(
+            fault=fault,
+            name=name,
+            verdict=Verdict.UNDECIDED,
+            controller=None,
+            certificate=None,
+            premises=(),
+            details={"reason": "no base gains of the family were proved for the fault's range of β"},
+        )
+    needed = required_lipschitz(fault, base, divisor)
+    rho = smallest_root(needed * _HEADROOM / lipschitz)
+    controller = type(base)(gains=dict(base.gains), scale=rho**6, divisor=divisor)  # type: ignore[call-arg]
+    return _judged(fault, controller, certificate, {"rho": str(rho), "base_lipschitz": str(lipschitz)})
+
+
+def required_lipschitz(fault: Fault, law: Controller, divisor: Fraction) -> Fraction:
+    """Bound on |h'| [m/s³] that the reference, the disturbance and the uncertainty need while the errors are zero."""
+    from quakedesign.certificates.premises import Errors, largest_matched_rate
+
+    zero = Errors(slip=Fraction(0), rate=Fraction(0), acceleration=Fraction(0))
+    return largest_matched_rate(fault, divisor, zero)
+
+
+def smallest_root(scale: Fraction) -> Fraction:
+    """Smallest ρ with three significant digits and ρ⁶ ≥ scale."""
+    import math
+
+    estimate = float(scale) ** (1 / 6)
+    unit = Fraction(10) ** (math.floor(math.log10(estimate)) - 2)
+    steps = math.floor(Fraction(estimate) / unit)
+    while (steps * unit) ** 6 < scale:
+        steps += 1
+    return steps * unit
+
+
+def sliding_mode_loop(controller: Controller, lipschitz: Fraction, beta: tuple[Fraction, Fraction]) -> Loop:
+    """Loop of base gains for |h'| ≤ lipschitz and a range of β.
+
+    Raises
+    ------
+    CertificateError
+        When the law has parts that certificates cannot express.
+    """
+    uncertain = {"beta": beta, "d": (-lipschitz, lipschitz)}
+    return loop_of(controller.name, controller.loop_field(), gains=controller.gains, uncertain=uncertain)
+
+
+def linear_loop(fault: Fault, controller: Controller) -> Loop:
+    """Loop of the linear feedback about any constant reference, over the fault's sectors."""
+    needed = sectors(fault)
+    return loop_of(
+        controller.name,
+        controller.loop_field(),
+        gains=controller.gains,
+        constants={"b": needed.authority},
+        uncertain=needed.ranges(),
+    )
+
+
+def _design_linear(fault: Fault) -> Design:
+    found = riccati_design(fault)
+    loop = linear_loop(fault, found.controller)
+    scale = balance(loop)
+    margin = _least_eigenvalue(loop, found.lyapunov)
+    claims = claims_of(loop, found.lyapunov, (margin, Fraction(0)))
+    claims |= bounds_of(loop, found.lyapunov, scale)
+    certificate = finish(loop, found.lyapunov, claims, scale) if min(claims.values()) > 0 else None
+    certificate = certificate or find_certificate(loop, 2)
+    details = {
+        "R": found.R,
+        "poles": [[float(z.real), float(z.imag)] for z in found.E],
+        "fastest_pole": found.fastest_pole,
+        "rate": str(certificate.claims["rate"]) if certificate else None,
+    }
+    return _judged(fault, found.controller, certificate, details)
+
+
+def _least_eigenvalue(loop: Loop, lyapunov) -> Fraction:
+    """Lower bound on the smallest eigenvalue of a quadratic V: 1/trace of the inverse."""
+    from quakedesign.synthesis.lyapunov import below, quadratic_matrix
+
+    import numpy as np
+
+    V = quadratic_matrix(loop, lyapunov)
+    scale = 1 / np.sqrt(np.abs(np.diag(V)))
+    inverse = np.linalg.inv(scale[:, None] * V * scale[None, :]) * scale[:, None] * scale[None, :]
+    return below(float(1 / np.trace(inverse)))
+
+
+def assess(fault: Fault, controller: Controller) -> Design:
+    """Judge given gains on a fault: verdict, certificate and premises.
+
+    Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's sectors.
+    A law that certificates cannot express yet is ``UNDECIDED``.
+    """
+    if not isinstance(controller, SlidingMode):
+        return _judged(fault, controller, find_certificate(linear_loop(fault, controller), 2), {})
+    limit = controller.lipschitz_limit / controller.scale
+    beta = coefficient_range(fault, controller.divisor)
+    for share in _SHARES if limit > 0 else ():
+        try:
+            certificate = find_certificate(sliding_mode_loop(controller, limit * share, beta), controller.loop_field().degree)
+        except (CertificateError, KinkError):
+            break
+        if certificate is not None:
+            return _judged(fault, controller, certificate, {"base_lipschitz": str(limit * share)})
+    return _judged(fault, controller, None, {})
+
+
+def _judged(fault: Fault, controller: Controller, certificate: Certificate | None, details: Mapping[str, Any]) -> Design:
+    domain = None
+    if isinstance(controller, SlidingMode):
+        premises, domain = sliding_mode_premises(fault, controller, certificate)
+    else:
+        premises = linear_premises(fault, controller, certificate)
+    return Design(
+        fault=fault,
+        name=controller.name,
+        verdict=certificate.check() if certificate is not None else Verdict.UNDECIDED,
+        controller=controller,
+        certificate=certificate,
+        premises=tuple(premises),
+        domain=domain,
+        details=dict(details),
+    )
+
+
+def certify(
+    law: str,
+    gains: tuple[str | float | Fraction, ...],
+    *,
+    lipschitz: str | float | Fraction,
+    gain_range: tuple[str | float | Fraction, str | float | Fraction] = (1, 1),
+) -> tuple[Verdict, Certificate | None]:
+    """Decide whether gains (λ = 1) make the origin finite-time stable for |h'| ≤ lipschitz and all β of a range.
+
+    Parameters
+    ----------
+    law : str
+        Name of a sliding-mode law.
+    gains : tuple of number or text
+        Exact: decimals, exponents or p/q; order of the law.
+    lipschitz : number or text
+        L̄ [unit of ν per s], not negative.
+    gain_range : tuple of two
+        b_m and b_M [-], positive.
+
+    Returns
+    -------
+    verdict : Verdict
+    certificate : Certificate or None
+        Proof or counterexample; None when undecided.
+
+    Raises
+    ------
+    ParameterError
+        For gains or ranges that are no numbers, or a range that is empty or not positive.
+    UnknownNameError
+        For an unknown law.
+    """
+    controller = control_law(law).from_values(gains)
+    if not isinstance(controller, SlidingMode):
+        raise ParameterError(f"a Lipschitz bound applies to sliding-mode laws. Received {law!r}.")
+    bound = rational(lipschitz, "lipschitz")
+    low, high = (rational(v, "gain_range") for v in gain_range)
+    if bound < 0 or not 0 < low <= high:
+        raise ParameterError(
+            f"lipschitz must not be negative and gain_range must be 0 < b_m <= b_M. Received {bound}, [{low}, {high}]."
+        )
+    try:
+        loop = sliding_mode_loop(controller, bound, (low, high))
+    except CertificateError:
+        return Verdict.UNDECIDED, None
+    certificate = refute(loop, type(controller)) or find_certificate(loop, controller.loop_field().degree)
+    return (certificate.check(), certificate) if certificate else (Verdict.UNDECIDED, None)
