@@ -78,9 +78,16 @@ class Design:
         return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
 
     def _repr_html_(self) -> str:
-        from quakedesign.report.summary import design_html
+        from html import escape
 
-        return design_html(self)
+        gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in self.gains.items())
+        rows = "".join(
+            f"<tr><td>{escape(p.name)}</td><td>{p.required:.4g} {p.unit}</td><td>{p.certified:.4g} {p.unit}</td>"
+            f"<td>{'yes' if p.holds else 'no'}</td></tr>"
+            for p in self.premises
+        )
+        head = "<tr><th>premise</th><th>required</th><th>certified</th><th>holds</th></tr>"
+        return f"<b>{self.title}: {self.verdict}</b><br>{escape(gains)}<table>{head}{rows}</table>"
 
 
 def design(fault: Fault, controller: str = "cta") -> Design:

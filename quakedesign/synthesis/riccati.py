@@ -1,7 +1,9 @@
 """e-LQR from the Riccati equation with a bound on the uncertainty that the plant can meet (ERRATA 6, 7, 9, 10)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 from quakedesign.certificates.linear_premises import Sectors, sectors
@@ -129,16 +131,8 @@ class _Scaled:
 
     def fastest_pole(self, K: Any) -> float:
         """Largest modulus of a pole over the vertices of the uncertainty [rad/s]."""
-        import numpy as np
-
-        largest = 0.0
-        for beta in self.needed.beta:
-            for s in self.needed.slip:
-                for w in self.needed.rate:
-                    A = self.A.copy()
-                    A[1, :2] = float(s) / self.pace**2, -float(w) / self.pace
-                    largest = max(largest, float(np.abs(np.linalg.eigvals(A - float(beta) * self.B @ K)).max()))
-        return largest * self.pace
+        gains = [self.pressure * float(k) / u for k, u in zip(K[0], self.units, strict=True)]
+        return max(abs(pole) for pole in vertex_poles(self.needed, gains))
 
     def finished(self, R: float) -> RiccatiDesign:
         """Return the design in SI with exact gains and an exact V."""
@@ -155,6 +149,18 @@ class _Scaled:
             E=E * self.pace,
             fastest_pole=self.fastest_pole(K),
         )
+
+
+def vertex_poles(needed: Sectors, gains: Sequence[float | Fraction]) -> list[complex]:
+    """Closed-loop poles [1/s] at all vertices of the uncertainty, for gains in SI."""
+    import numpy as np
+
+    b, poles = float(needed.authority), list[complex]()
+    for beta, s, w in product(needed.beta, needed.slip, needed.rate):
+        feedback = [-float(beta) * b * float(k) for k in gains]
+        row = [feedback[0] + float(s), feedback[1] - float(w), *feedback[2:]]
+        poles += [complex(z) for z in np.linalg.eigvals(np.array([[0, 1, 0, 0], row, [1, 0, 0, 0], [0, 0, 1, 0]]))]
+    return poles
 
 
 def _decimal(value: float) -> Fraction:

@@ -1,0 +1,5 @@
+"""``python -m quakedesign``."""
+
+from quakedesign.cli import main
+
+main()

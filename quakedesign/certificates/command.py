@@ -1,0 +1,69 @@
+"""Re-checking files for people: a verdict and what exactly was verified."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from quakedesign.certificates.claim import Certificate, Verdict
+from quakedesign.certificates.files import load_certificate
+from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.premises import coefficient_range, least_authority
+from quakedesign.errors import CertificateError
+from quakedesign.fault import Fault, load_fault
+from quakedesign.symbolic.terms import from_terms
+
+
+def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tuple[str, list[str]]]:
+    """Verdict (``proved``, ``refuted`` or ``invalid: reason``) and statement for every file.
+
+    Raises
+    ------
+    CertificateError
+        For a file that cannot be read.
+    QuakedesignError
+        For a fault that cannot be read.
+    """
+    plant = load_fault(fault) if fault else None
+    return {str(path): _checked(path, plant) for path in paths}
+
+
+def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
+    if not path.is_file():
+        raise CertificateError(f"certificate file must exist. Received {path}. Check the path.")
+    try:
+        certificate = load_certificate(path)
+        verdict = certificate.check()
+        if fault is not None and verdict is Verdict.PROVED:
+            _covers(certificate, fault)
+    except CertificateError as error:
+        return f"invalid: {' '.join(str(error).split())}", []
+    return str(verdict), statement(certificate)
+
+
+def _covers(certificate: Certificate, fault: Fault) -> None:
+    """Refuse a certificate whose constants or ranges do not cover a fault (designed gains, divisor μ_res·N̂_min)."""
+    loop = certificate.loop
+    if loop.domain == "reals":
+        needed = sectors(fault)
+        if loop.constants != {"b": needed.authority}:
+            raise CertificateError(f"the control authority is not that of {fault.name}")
+        ranges = needed.ranges()
+    else:
+        ranges = {"beta": coefficient_range(fault, least_authority(fault))}
+    for name, (low, high) in ranges.items():
+        if not loop.uncertain[name][0] <= low <= high <= loop.uncertain[name][1]:
+            raise CertificateError(f"the certified range of {name} does not cover {fault.name}")
+
+
+def statement(certificate: Certificate) -> list[str]:
+    """What a certificate says, in lines."""
+    loop, symbols = certificate.loop, certificate.loop.symbols
+    lines = [f"law {loop.law}, field re-derived from the law and equal to the file's"]
+    lines.append(", ".join(f"{name} = {v}" for name, v in loop.parameters.items()))
+    lines.append(", ".join(f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()))
+    lines += [f"{state}' = {from_terms(terms, symbols)}" for state, terms in loop.field.items()]
+    if certificate.refutation is not None:
+        point = ", ".join(f"{name}: {v}" for name, v in certificate.refutation.point.items())
+        return [*lines, f"Filippov equilibrium away from the origin, in cell coordinates {point}"]
+    lines.append(f"V = {from_terms(certificate.lyapunov, symbols)}")
+    lines.append(", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
+    return lines

@@ -1,0 +1,114 @@
+"""The folder of results, complete or not there."""
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from quakedesign.certificates import certificate_text
+from quakedesign.errors import OutputError
+from quakedesign.report.comparison import Comparison
+from quakedesign.report.facts import fault_dict, fault_sentences
+
+_PACKAGES = ("quakedesign", "sympy", "cvxpy", "clarabel", "casadi", "numpy", "scipy", "control", "python-flint")
+
+
+def prepare(out: Path, *, force: bool) -> None:
+    """Refuse early a folder that cannot be written or that holds results.
+
+    Raises
+    ------
+    OutputError
+    """
+    if out.exists() and not force:
+        raise OutputError(f"output folder must be new. Received {out}, which exists. Give --force to replace it.")
+    if out.exists() and not (out / "results.json").is_file():
+        raise OutputError(f"only a folder with results.json is replaced. Received {out}. Choose another --out.")
+    parent = out.absolute().parent
+    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
+        raise OutputError(f"output folder must be in a folder that can be written. Received {out}. Choose another --out.")
+
+
+def results(comparison: Comparison) -> dict[str, Any]:
+    """Everything of a comparison that JSON can hold, with the keys of DESIGN.md and the versions of all libraries."""
+    found = {"fault": fault_dict(comparison.fault), **comparison.to_dict()}
+    for origin, group in (("designed", "controllers"), ("published", "published")):
+        for entry in comparison.of(origin):
+            if entry.design.certificate is not None:
+                found[group][entry.design.name]["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
+    found["versions"] = {package: version(package) for package in _PACKAGES}
+    return found
+
+
+def _file(origin: str, name: str) -> str:
+    return f"{name}.json" if origin == "designed" else f"{origin}-{name}.json"
+
+
+def write_folder(
+    comparison: Comparison, out: Path, *, force: bool, tell: Callable[[str, float], None] = lambda _what, _done: None
+) -> dict[str, Any]:
+    """Write certificates, figures, results and the page into a folder that appears whole.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    out : Path
+    force : bool
+        Replace a folder of earlier results.
+    tell : callable
+        Progress.
+
+    Returns
+    -------
+    dict
+        What ``results.json`` holds.
+
+    Raises
+    ------
+    OutputError
+    """
+    prepare(out, force=force)
+    found = results(comparison)
+    try:
+        partial = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.absolute().parent))
+        try:
+            _fill(partial, comparison, found, tell)
+            partial.chmod(0o755)
+            _swap(partial, out)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+    except OSError as error:
+        raise OutputError(f"{out} cannot be written: {error.strerror}. Choose another --out.") from None
+    return found
+
+
+def _fill(folder: Path, comparison: Comparison, found: dict[str, Any], tell: Callable[[str, float], None]) -> None:
+    from quakedesign.report.page import page_html
+
+    for name in ("certificates", "figures"):
+        (folder / name).mkdir()
+    for entry in comparison.entries:
+        if entry.design.certificate is not None:
+            path = folder / "certificates" / _file(entry.origin, entry.design.name)
+            path.write_text(certificate_text(entry.design.certificate), encoding="utf-8")
+    drawn = comparison.figures()
+    for i, (name, drawing) in enumerate(drawn.items()):
+        tell(f"figure {name}", i / len(drawn))
+        drawing.savefig(folder / "figures" / f"{name}.png", metadata={"Software": None})
+    page = page_html(comparison, fault_sentences(comparison.fault), drawn)
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    (folder / "results.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _swap(partial: Path, out: Path) -> None:
+    if not out.exists():
+        partial.rename(out)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{out.name}-old-", dir=out.absolute().parent))
+    out.rename(old / out.name)
+    partial.rename(out)
+    shutil.rmtree(old, ignore_errors=True)

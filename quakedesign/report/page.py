@@ -1,0 +1,68 @@
+"""The report as one HTML page beside its figures."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.report.comparison import headline
+from quakedesign.report.tables import COLUMNS, rows
+
+if TYPE_CHECKING:
+    from quakedesign.report.comparison import Comparison
+
+_TABLE = """<table><thead><tr>{% for c in columns %}<th>{{ c }}</th>{% endfor %}</tr></thead><tbody>
+{% for row in rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}</tbody></table>"""
+
+_PAGE = (
+    """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>quakedesign: {{ fault.name }}</title><style>
+body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
+table{border-collapse:collapse;margin:1rem 0;font-size:.85rem}
+th,td{border-bottom:1px solid #ccc;padding:.3rem .6rem;text-align:right}
+th:first-child,td:first-child,th:nth-child(2),td:nth-child(2){text-align:left}
+img{max-width:100%}code{background:#f3f3f3;padding:0 .2rem}</style></head><body>
+<h1>{{ fault.name }}</h1><p>{{ fault.source }}. Uncertainty box: {{ fault.box.name }}.</p>
+<h2>The fault</h2><ul>{% for line in facts %}<li>{{ line }}</li>{% endfor %}</ul>
+<h2>Comparison</h2>"""
+    + _TABLE
+    + """<p>Errors count after a quarter of the task. Scheme <code>continuous</code>: the law is evaluated in every
+Runge–Kutta stage.</p><h2>What is proved, and under which premises</h2>
+{% for e in entries %}<h3>{{ e.label }}</h3><p>{{ headline(e) }}.</p>
+<p>Gains: {% for n, v in e.design.gains.items() %}<code>{{ n }} = {{ number(v) }}</code> {% endfor %}</p>
+<table><thead><tr><th>premise</th><th>note</th><th>required</th><th>certified</th><th>ratio</th><th>holds</th></tr></thead>
+<tbody>{% for p in e.design.premises %}<tr><td>{{ p.name }}</td><td>{{ p.note }}</td>
+<td>{{ "%.4g"|format(p.required) }} {{ p.unit }}</td><td>{{ "%.4g"|format(p.certified) }} {{ p.unit }}</td>
+<td>{{ "–" if p.ratio is none else "%.3g"|format(p.ratio) }}</td><td>{{ "yes" if p.holds else "no" }}</td></tr>
+{% endfor %}</tbody></table>{% endfor %}
+<h2>Figures</h2>{% for name in figures %}<p><img src="figures/{{ name }}.png" alt="{{ name }}"></p>{% endfor %}
+<p>Certificates: <code>certificates/*.json</code>; re-check with <code>quakedesign check</code>.</p></body></html>
+"""
+)
+
+
+def _environment() -> Any:
+    from jinja2 import Environment, StrictUndefined
+
+    return Environment(autoescape=True, undefined=StrictUndefined)
+
+
+def table_html(comparison: "Comparison") -> str:
+    """Table of a comparison as HTML."""
+    return _environment().from_string(_TABLE).render(columns=COLUMNS, rows=rows(comparison))
+
+
+def page_html(comparison: "Comparison", facts: Iterable[str], figures: Iterable[str]) -> str:
+    """Whole report as HTML; figures are expected at ``figures/NAME.png``."""
+    return (
+        _environment()
+        .from_string(_PAGE)
+        .render(
+            fault=comparison.fault,
+            facts=list(facts),
+            columns=COLUMNS,
+            rows=rows(comparison),
+            entries=comparison.entries,
+            headline=headline,
+            number=lambda v: f"{float(v):.6g}",
+            figures=list(figures),
+        )
+    )

@@ -1,0 +1,51 @@
+"""Comparisons and runs on a terminal."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+
+from quakedesign.report.comparison import Comparison, headline
+from quakedesign.report.facts import fault_sentences
+from quakedesign.report.tables import COLUMNS, rows
+
+if TYPE_CHECKING:
+    from quakedesign.certificates.premises import Premise
+    from quakedesign.simulation import Trajectory
+
+
+def print_comparison(comparison: Comparison, console: Any) -> None:
+    """Fault, gains, verdicts with premises, and one table."""
+    console.print(f"[bold]{comparison.fault.name}[/bold] ({comparison.fault.source})")
+    for line in fault_sentences(comparison.fault):
+        console.print(f"  {line}")
+    for entry in (*comparison.of("designed"), *comparison.of("published")):
+        gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in entry.design.gains.items())
+        console.print(f"\n[bold]{entry.label}[/bold]: {headline(entry)}")
+        console.print(f"  gains: {gains or 'none'}", markup=False)
+        for premise in entry.design.premises:
+            console.print(f"  {_line(premise)}", markup=False)
+    table = Table(*COLUMNS, title="\nclosed loop; errors after a quarter of the task", title_justify="left")
+    for row in rows(comparison):
+        table.add_row(*row)
+    console.print(table, soft_wrap=False, width=max(console.width, 150))
+
+
+def _line(premise: "Premise") -> str:
+    ratio = "nothing is certified" if premise.ratio is None else f"ratio {premise.ratio:.3g}"
+    sign = "holds" if premise.holds else "FAILS"
+    unit = "" if premise.unit == "-" else f" {premise.unit}"
+    values = f"required {premise.required:.4g}{unit}, certified {premise.certified:.4g}{unit}"
+    return f"premise {premise.name} {sign}: {values}, {ratio}"
+
+
+def print_run(run: "Trajectory", premises: "Sequence[Premise]", console: Any) -> None:
+    """Metrics with units, events and premises of one run."""
+    console.print(f"[bold]{run.name}[/bold]")
+    for name, number in run.metrics.to_dict().items():
+        if number is not None:
+            console.print(f"  {name} = {number:.6g} {run.metrics.unit(name)}".rstrip(), markup=False)
+    for name, time in run.events.items():
+        console.print(f"  {name} first at {time:.6g} s")
+    for premise in premises:
+        console.print(f"  {_line(premise)}", markup=False)
