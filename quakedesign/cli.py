@@ -244,7 +244,9 @@ def certify(
     if json:
         _print(found)
     else:
-        _console().print(f"{found['verdict']}: {law} {' '.join(gains)}, |h'| <= {lipschitz}, beta in {list(gain_range)}")
+        _console().print(
+            f"{found['verdict']}: {law} {' '.join(gains)}, |h'| <= {lipschitz}, beta in {list(gain_range)}"
+        )
     return 0 if found["verdict"] == "proved" else 1
 
 
@@ -323,7 +325,13 @@ def simulate(
     found = load_fault(fault)
     with _progress() as tell:
         trajectory, premises = run_single(
-            found, controller, gains, step=step, scheme=scheme, method=method, tell=lambda done: tell("simulation", done)
+            found,
+            controller,
+            gains,
+            step=step,
+            scheme=scheme,
+            method=method,
+            tell=lambda done: tell("simulation", done),
         )
     if out is not None:
         trajectory.save(out)

@@ -1,4 +1,4 @@
-"""The exact decision: does a certificate prove, or refute, what it claims?"""
+"""The exact decision: whether a certificate proves, or refutes, what it claims."""
 
 from fractions import Fraction
 from itertools import product
@@ -25,9 +25,7 @@ def _same_field(loop: Loop) -> None:
     laws = control_laws()
     require(loop.law in laws, f"the law {loop.law!r} is unknown, so its field cannot be derived again.")
     model = laws[loop.law].loop_field()
-    derived = loop_of(
-        loop.law, model, gains=loop.gains, uncertain=loop.uncertain, constants=loop.constants
-    )
+    derived = loop_of(loop.law, model, gains=loop.gains, uncertain=loop.uncertain, constants=loop.constants)
     names = (model.gains, model.constants, model.uncertain)
     given = (loop.gains, loop.constants, loop.uncertain)
     require(
@@ -55,7 +53,9 @@ def _check_proof(certificate: Certificate) -> None:
     loop, claims = certificate.loop, certificate.claims
     second = "decrease" if loop.domain == "cells" else "rate"
     required, allowed = {"positive", second}, {f"bound_{state}" for state in loop.states}
-    require(required <= set(claims) <= required | allowed, f"the claims must be positive, {second} and bounds of states.")
+    require(
+        required <= set(claims) <= required | allowed, f"the claims must be positive, {second} and bounds of states."
+    )
     require(all(c > 0 for c in claims.values()), "a claim must be positive.")
     uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.uncertain)
     require(not uncertain, "V must not depend on an uncertain parameter.")
@@ -74,7 +74,8 @@ def _check_proof(certificate: Certificate) -> None:
             fits and proves(polynomial, witness, orthant=loop.domain == "cells"),
             f"the witness of {name!r} does not prove its polynomial.",
         )
-    require(expected == list(certificate.witnesses), "there are witnesses that no obligation needs, or in another order.")
+    extra = "there are witnesses that no obligation needs, or in another order."
+    require(expected == list(certificate.witnesses), extra)
 
 
 def _check_equilibrium(loop: Loop, equilibrium: Equilibrium) -> None:

@@ -169,7 +169,13 @@ def _loop(raw: dict[str, Any]) -> Loop:
         _need(low <= high, f"the range of {name} is not ordered")
         ranges[name] = (low, high)
     bare = Loop(
-        law=raw["law"], gains=gains, constants=constants, states=states, domain=raw["domain"], uncertain=ranges, field={}
+        law=raw["law"],
+        gains=gains,
+        constants=constants,
+        states=states,
+        domain=raw["domain"],
+        uncertain=ranges,
+        field={},
     )
     rates = _keys(raw["field"], set(states))
     field = {state: _terms(rates[state], bare) for state in states}
@@ -196,7 +202,9 @@ def _factor(raw: Any, loop: Loop) -> tuple[str, Fraction, str]:
     state, exponent, kind = _list(raw, "a factor", length=3)
     power = _rational(exponent)
     _need(isinstance(state, str) and state in loop.states, "a factor has an unknown state")
-    _need(kind in ("s", "a") and 0 <= power <= 24 and (kind == "s" or power > 0), "a factor has a wrong kind or exponent")
+    _need(
+        kind in ("s", "a") and 0 <= power <= 24 and (kind == "s" or power > 0), "a factor has a wrong kind or exponent"
+    )
     return state, power, kind
 
 
@@ -209,7 +217,9 @@ def _exponents(raw: Any, variables: int, largest: int) -> tuple[int, ...]:
 def _witness(raw: dict[str, Any], variables: int) -> Witness:
     multiplier: dict[tuple[int, ...], Fraction] = {}
     for key, number in _object(raw["multiplier"], "multiplier", _LIMITS["basis"]).items():
-        _need(re.fullmatch(r"(0|[1-9][0-9]{0,2})(,(0|[1-9][0-9]{0,2}))*", key) is not None, "a multiplier has a wrong key")
+        _need(
+            re.fullmatch(r"(0|[1-9][0-9]{0,2})(,(0|[1-9][0-9]{0,2}))*", key) is not None, "a multiplier has a wrong key"
+        )
         multiplier[_exponents([int(part) for part in key.split(",")], variables, 999)] = _rational(number)
     blocks = []
     for entry in _list(raw["squares"], "squares", 1 << variables):

@@ -142,14 +142,14 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
             certified=float(ranges["s"][1]),
             unit="1/s^2",
             proved=proved and inside,
-            note=f"net chord in slip about any constant reference; σ'-p* up to {float(needed.largest_effective_stress):.4g} Pa",
+            note=f"net chord in slip; effective stress up to {float(needed.largest_effective_stress):.4g} Pa",
         ),
         Premise(
             name="constant_reference",
             required=float(peak_rate),
             certified=0.0,
             unit="m/s",
-            note="the certificate holds about constant references; for a moving one the errors are bounded, not certified",
+            note="certified about constant references; a moving one leaves a bounded error",
         ),
         Premise(
             name="vanishing_disturbance",

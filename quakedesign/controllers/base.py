@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from types import MappingProxyType
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import sympy as sp
 
@@ -105,7 +105,7 @@ class Controller(ABC):
         """Return the closed loop in symbols, derived from the law, as certificates need it."""
 
     @classmethod
-    def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more) -> "Controller":
+    def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
         """Return a law from gains in order.
 
         Raises
@@ -117,7 +117,8 @@ class Controller(ABC):
             raise ParameterError(
                 f"{cls.name} needs {len(cls.gain_units)} gains ({', '.join(cls.gain_units)}). Received {len(values)}."
             )
-        return cls(gains=dict(zip(cls.gain_units, values, strict=True)), **more)
+        named = {name: rational(v, f"gain {name}") for name, v in zip(cls.gain_units, values, strict=True)}
+        return cls(gains=named, **more)
 
     @classmethod
     def counterexample(

@@ -185,7 +185,7 @@ def headline(entry: Entry) -> str:
         parts.append(f"the largest T_s for which the run does not is about {entry.largest_step:g} s")
     if entry.growth_per_step is not None:
         stable = "stable" if entry.growth_per_step < 1 else "UNSTABLE"
-        parts.append(f"{stable} at the step used (growth {entry.growth_per_step:.3g} per step)")
+        parts.append(f"{stable} at the step used")
     if entry.run is not None and "diverged" in entry.run.events:
         parts.append(f"the run diverges at {entry.run.events['diverged']:.4g} s")
     return "; ".join(parts)
@@ -197,7 +197,7 @@ def _holds(premises: Iterable[Any], name: str) -> bool:
 
 _SAID = {
     "along_reference": "the reference and the disturbance alone leave the premise on |h'| {:.3g}-fold",
-    "level_set": "from a start with unknown phase of the disturbance the premise on |h'| is not certified ({:.3g}-fold)",
+    "level_set": "from a start at an unknown phase of the disturbance |h'| is not certified ({:.3g}-fold)",
     "on_trajectory": "this run leaves the premise on |h'| {:.3g}-fold",
     "control_coefficient": "β leaves its certified range {:.3g}-fold",
     "friction_slope": "the friction slope exceeds the certified sector {:.3g}-fold",
@@ -207,4 +207,6 @@ _SAID = {
 
 
 def _broken(premises: Iterable[Any]) -> list[str]:
-    return [_SAID[p.name].format(p.ratio) for p in premises if not p.holds and (p.proved or p.name == "along_reference")]
+    return [
+        _SAID[p.name].format(p.ratio) for p in premises if not p.holds and (p.proved or p.name == "along_reference")
+    ]

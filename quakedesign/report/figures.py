@@ -6,6 +6,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from quakedesign.report.comparison import Comparison, Entry
+    from quakedesign.simulation import Trajectory
 
 _COLOURS = {"cta": "#0072B2", "dia": "#009E73", "elqr": "#D55E00"}
 _STYLES = {"published": (0, (4, 2)), "designed": "solid"}
@@ -34,8 +35,14 @@ def _figure(rows: int, height: float, columns: int = 1) -> tuple[Any, Any]:
     return drawing, axes
 
 
-def _runs(comparison: "Comparison") -> "list[Entry]":
-    return [e for e in comparison.entries if e.run is not None]
+def _runs(comparison: "Comparison") -> "list[tuple[Entry, Trajectory]]":
+    return [(e, e.run) for e in comparison.entries if e.run is not None]
+
+
+def _known(values: np.ndarray | None) -> np.ndarray:
+    """Values of a controlled run, which always has a reference."""
+    assert values is not None
+    return values
 
 
 def _style(entry: "Entry") -> dict[str, Any]:
@@ -72,37 +79,38 @@ def _uncontrolled(comparison: "Comparison") -> Any:
 
 def _states(comparison: "Comparison") -> Any:
     drawing, (slip, rate) = _figure(2, 5.6)
-    entries = _runs(comparison)
-    reference = entries[0].run
-    assert reference is not None
-    size, unit = _length(float(np.max(reference.reference)))
-    for entry in entries:
-        assert entry.run is not None
-        slip.plot(_hours(entry.run.time), entry.run.slip / size, **_style(entry))
-        rate.plot(_hours(entry.run.time), np.abs(entry.run.slip_rate), **_style(entry) | {"linewidth": 0.5})
-    slip.plot(_hours(reference.time), reference.reference / size, color="black", linestyle=":", label="reference")
+    runs = _runs(comparison)
+    first = runs[0][1]
+    hours, reference, reference_rate = _hours(first.time), _known(first.reference), np.abs(_known(first.reference_rate))
+    size, unit = _length(float(reference.max()))
+    for entry, run in runs:
+        slip.plot(_hours(run.time), run.slip / size, **_style(entry))
+        rate.plot(*_envelope(_hours(run.time), np.abs(run.slip_rate)), **_style(entry))
+    slip.plot(hours, reference / size, color="black", linestyle=":", label="reference")
     peak = comparison.uncontrolled.metrics.peak_slip_rate
     if peak:
-        rate.axhline(peak, color="black", linestyle="--", label="peak without control")
-    rate.plot(_hours(reference.time), np.abs(reference.reference_rate), color="black", linestyle=":", label="reference")
+        rate.axhline(peak, color="black", linestyle="--", label="uncontrolled peak")
+    rate.plot(hours, reference_rate, color="black", linestyle=":", label="reference")
     rate.set_yscale("log")
-    bottom = float(np.max(np.abs(reference.reference_rate))) * 1e-2
-    rate.set_ylim(bottom=bottom)
+    rate.set_ylim(bottom=float(reference_rate.max()) * 1e-2)
     slip.set_ylabel(f"slip [{unit}]")
     rate.set_ylabel("|slip rate| [m/s]")
     rate.set_xlabel("time [h]")
-    slip.legend(loc="upper left", fontsize=8, ncols=2)
-    drawing.suptitle(f"{comparison.fault.name}: states in closed loop")
+    drawing.legend(*rate.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
+    drawing.suptitle(f"{comparison.fault.name}: states in closed loop (slip rate: largest of every 40 samples)")
     return drawing
 
 
 def _pressure(comparison: "Comparison") -> Any:
-    entries = _runs(comparison)
-    drawing, axes = _figure(len(entries), 1.1 + 1.25 * len(entries))
+    runs = _runs(comparison)
+    drawing, axes = _figure(len(runs), 1.1 + 1.25 * len(runs))
     size, unit = (1e6, "MPa") if comparison.fault.effective_normal_stress > 1e6 else (1e3, "kPa")
-    for axis, entry in zip(axes, entries, strict=True):
-        assert entry.run is not None
-        axis.plot(_hours(entry.run.time), entry.run.pressure / size, **_style(entry) | {"linestyle": "solid", "linewidth": 0.6})
+    for axis, (entry, run) in zip(axes, runs, strict=True):
+        axis.plot(
+            _hours(run.time),
+            run.pressure / size,
+            **_style(entry) | {"linestyle": "solid", "linewidth": 0.6},
+        )
         axis.set_title(entry.label, fontsize=9)
         axis.set_ylabel(f"p [{unit}]")
     axes[-1].set_xlabel("time [h]")
@@ -112,10 +120,9 @@ def _pressure(comparison: "Comparison") -> Any:
 
 def _errors(comparison: "Comparison") -> Any:
     drawing, (slip, rate) = _figure(2, 6)
-    for entry in _runs(comparison):
-        assert entry.run is not None
-        for axis, values in ((slip, entry.run.slip_error), (rate, entry.run.slip_rate_error)):
-            time, envelope = _envelope(_hours(entry.run.time), np.abs(values))
+    for entry, run in _runs(comparison):
+        for axis, values in ((slip, run.slip_error), (rate, run.slip_rate_error)):
+            time, envelope = _envelope(_hours(run.time), np.abs(_known(values)))
             axis.plot(time, envelope, **_style(entry))
     for axis, label in ((slip, "|slip error| [m]"), (rate, "|slip-rate error| [m/s]")):
         axis.set_yscale("log")
@@ -140,9 +147,10 @@ def _metrics(comparison: "Comparison") -> Any:
         "pressure_total_variation": "total variation of pressure [Pa]",
     }
     drawing, axes = _figure(2, 6.5, columns=2)
-    entries = [e for e in _runs(comparison) if e.run is not None and e.run.metrics.max_slip_error is not None]
+    settled = [(e, run.metrics) for e, run in _runs(comparison) if run.metrics.max_slip_error is not None]
+    entries = [e for e, _ in settled]
     for axis, (name, label) in zip(axes, shown.items(), strict=True):
-        values = [getattr(e.run.metrics, name) for e in entries if e.run is not None]
+        values = [getattr(figures, name) for _, figures in settled]
         bars = axis.barh(range(len(entries)), values, color=[_COLOURS.get(e.design.name, "#555555") for e in entries])
         for bar, entry in zip(bars, entries, strict=True):
             bar.set_alpha(0.45 if entry.origin == "published" else 1.0)

@@ -30,7 +30,9 @@ def prepare(out: Path, *, force: bool) -> None:
         raise OutputError(f"only a folder with results.json is replaced. Received {out}. Choose another --out.")
     parent = out.absolute().parent
     if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
-        raise OutputError(f"output folder must be in a folder that can be written. Received {out}. Choose another --out.")
+        raise OutputError(
+            f"output folder must be in a folder that can be written. Received {out}. Choose another --out."
+        )
 
 
 def results(comparison: Comparison) -> dict[str, Any]:

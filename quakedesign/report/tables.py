@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from quakedesign.report.comparison import Comparison
+    from quakedesign.simulation import Trajectory
 
 COLUMNS = (
     "controller",
@@ -27,7 +28,7 @@ _METRICS = (
 
 def rows(comparison: "Comparison") -> list[tuple[str, ...]]:
     """One row a controller under `COLUMNS`; errors count after a quarter of the task, a dash means not applicable."""
-    runs = [("uncontrolled", "", comparison.uncontrolled)]
+    runs: list[tuple[str, str, Trajectory | None]] = [("uncontrolled", "", comparison.uncontrolled)]
     runs += [(e.label, str(e.design.verdict), e.run) for e in comparison.entries]
     found = []
     for label, verdict, run in runs:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from rich.markup import escape
 from rich.table import Table
 
 from quakedesign.report.comparison import Comparison, headline
@@ -25,7 +26,9 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
         console.print(f"  gains: {gains or 'none'}", markup=False)
         for premise in entry.design.premises:
             console.print(f"  {_line(premise)}", markup=False)
-    table = Table(*COLUMNS, title="\nclosed loop; errors after a quarter of the task", title_justify="left")
+    table = Table(
+        *map(escape, COLUMNS), title="\nclosed loop; errors after a quarter of the task", title_justify="left"
+    )
     for row in rows(comparison):
         table.add_row(*row)
     console.print(table, soft_wrap=False, width=max(console.width, 150))

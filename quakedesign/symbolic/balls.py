@@ -114,13 +114,22 @@ def _power(base: Any, exponent: sp.Expr) -> Any:
     from flint import arb, fmpq
 
     if exponent.is_Integer:
-        n = int(exponent)
-        if n > 0 and n % 2 == 0:
-            return abs(base) ** n
-        return base**n
+        positive = _integer_power(base, abs(int(exponent)))
+        return positive if exponent > 0 else 1 / positive
     if exponent.is_Rational:
         return base ** arb(fmpq(int(exponent.p), int(exponent.q)))
     raise NotImplementedError(f"no enclosure for the exponent {exponent}")
+
+
+def _integer_power(base: Any, n: int) -> Any:
+    """Tight enclosure of base^n, n ≥ 1, from its ends; arb's own power is not finite about a zero midpoint."""
+
+    def at(end: Any) -> Any:
+        return reduce(lambda a, b: a * b, [end] * n)
+
+    if n % 2:
+        return at(base.lower()).union(at(base.upper()))
+    return at(base.abs_lower()).union(at(base.abs_upper()))
 
 
 def _function(e: sp.Expr, values: list[Any]) -> Any:

@@ -18,7 +18,14 @@ from quakedesign.controllers import Controller, SlidingMode, control_law, family
 from quakedesign.errors import CertificateError, KinkError, ParameterError, UnknownNameError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.synthesis.lyapunov import balance, bounds_of, claims_of, find_certificate, finish, refute
+from quakedesign.synthesis.lyapunov import (
+    balance,
+    claims_of,
+    find_certificate,
+    finish,
+    quadratic_margin,
+    refute,
+)
 from quakedesign.synthesis.riccati import riccati_design
 
 DESIGNABLE = ("cta", "elqr")
@@ -93,8 +100,8 @@ class Design:
 def design(fault: Fault, controller: str = "cta") -> Design:
     """Find gains with a proof for a fault.
 
-    2-CTA: base gains from the literature are proved for the fault's range of β and scaled by λ = ρ⁶ (ρ rational, so that
-    every scaled gain is rational) until L̄ exceeds by a tenth what the reference and the disturbance need.
+    2-CTA: base gains from the literature are proved for the fault's range of β and scaled by λ = ρ⁶ (ρ rational, so
+    that every scaled gain is rational) until L̄ exceeds by a tenth what the reference and the disturbance need.
     e-LQR: Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
 
     Parameters
@@ -190,9 +197,8 @@ def _design_linear(fault: Fault) -> Design:
     found = riccati_design(fault)
     loop = linear_loop(fault, found.controller)
     scale = balance(loop)
-    margin = _least_eigenvalue(loop, found.lyapunov)
+    margin = quadratic_margin(loop, found.lyapunov)
     claims = claims_of(loop, found.lyapunov, (margin, Fraction(0)))
-    claims |= bounds_of(loop, found.lyapunov, scale)
     certificate = finish(loop, found.lyapunov, claims, scale) if min(claims.values()) > 0 else None
     certificate = certificate or find_certificate(loop, 2)
     details = {
@@ -204,23 +210,11 @@ def _design_linear(fault: Fault) -> Design:
     return _judged(fault, found.controller, certificate, details)
 
 
-def _least_eigenvalue(loop: Loop, lyapunov) -> Fraction:
-    """Lower bound on the smallest eigenvalue of a quadratic V: 1/trace of the inverse."""
-    from quakedesign.synthesis.lyapunov import below, quadratic_matrix
-
-    import numpy as np
-
-    V = quadratic_matrix(loop, lyapunov)
-    scale = 1 / np.sqrt(np.abs(np.diag(V)))
-    inverse = np.linalg.inv(scale[:, None] * V * scale[None, :]) * scale[:, None] * scale[None, :]
-    return below(float(1 / np.trace(inverse)))
-
-
 def assess(fault: Fault, controller: Controller) -> Design:
     """Judge given gains on a fault: verdict, certificate and premises.
 
-    Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's sectors.
-    A law that certificates cannot express yet is ``UNDECIDED``.
+    Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's
+    sectors. A law that certificates cannot express yet is ``UNDECIDED``.
     """
     if not isinstance(controller, SlidingMode):
         return _judged(fault, controller, find_certificate(linear_loop(fault, controller), 2), {})
@@ -228,7 +222,9 @@ def assess(fault: Fault, controller: Controller) -> Design:
     beta = coefficient_range(fault, controller.divisor)
     for share in _SHARES if limit > 0 else ():
         try:
-            certificate = find_certificate(sliding_mode_loop(controller, limit * share, beta), controller.loop_field().degree)
+            certificate = find_certificate(
+                sliding_mode_loop(controller, limit * share, beta), controller.loop_field().degree
+            )
         except (CertificateError, KinkError):
             break
         if certificate is not None:
@@ -236,7 +232,9 @@ def assess(fault: Fault, controller: Controller) -> Design:
     return _judged(fault, controller, None, {})
 
 
-def _judged(fault: Fault, controller: Controller, certificate: Certificate | None, details: Mapping[str, Any]) -> Design:
+def _judged(
+    fault: Fault, controller: Controller, certificate: Certificate | None, details: Mapping[str, Any]
+) -> Design:
     domain = None
     if isinstance(controller, SlidingMode):
         premises, domain = sliding_mode_premises(fault, controller, certificate)

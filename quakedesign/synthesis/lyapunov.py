@@ -1,9 +1,11 @@
 """Search for a Lyapunov function of given gains, finished in exact arithmetic. One pipeline for every law."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+from itertools import pairwise
 
 from quakedesign.certificates import Certificate, Equilibrium, Loop
 from quakedesign.certificates.obligations import Obligations, claimed
@@ -31,8 +33,8 @@ def balance(loop: Loop) -> tuple[Fraction, ...]:
     states = tuple(loop.states)
     rows, sides = [], []
     for terms in loop.field.values():
-        entries = [_logarithm(term, loop, states) for term in terms if term.factors]
-        for (e, c), (f, d) in zip(entries, entries[1:], strict=False):
+        entries = [_logarithm(term, loop, states) for term in terms if term.factors and _size(term, loop)]
+        for (e, c), (f, d) in pairwise(entries):
             if max(e) and max(f):
                 rows.append([a - b for a, b in zip(e, f, strict=True)])
                 sides.append(d - c)
@@ -43,16 +45,18 @@ def balance(loop: Loop) -> tuple[Fraction, ...]:
 
 
 def _logarithm(term: Term, loop: Loop, states: Sequence[str]) -> tuple[list[float], float]:
-    import math
-
-    size = Fraction(abs(term.coefficient))
-    for name in term.parameters:
-        ends = loop.uncertain.get(name, (loop.parameters.get(name, Fraction(0)),) * 2)
-        size *= max(abs(ends[0]), abs(ends[1]))
     exponents = [0.0] * len(states)
     for state, exponent, _ in term.factors:
         exponents[states.index(state)] = float(exponent * loop.states[state])
-    return exponents, math.log2(size) if size else -40.0
+    return exponents, math.log2(_size(term, loop))
+
+
+def _size(term: Term, loop: Loop) -> Fraction:
+    size = Fraction(abs(term.coefficient))
+    for name in term.parameters:
+        ends = loop.uncertain.get(name) or (loop.parameters[name],) * 2
+        size *= max(abs(ends[0]), abs(ends[1]))
+    return size
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,9 +159,7 @@ def finish(
         return None
 
 
-def claims_of(
-    loop: Loop, lyapunov: tuple[Term, ...], margins: tuple[Fraction, Fraction]
-) -> dict[str, Fraction]:
+def claims_of(loop: Loop, lyapunov: tuple[Term, ...], margins: tuple[Fraction, Fraction]) -> dict[str, Fraction]:
     """Claims with room to spare: half of the margins, and on the reals 99 % of the decay rate of V."""
     if loop.domain == "cells":
         return {"positive": margins[0] * _GIVE_AWAY, "decrease": margins[1] * _GIVE_AWAY}
@@ -195,6 +197,16 @@ def _matrix(polynomial: Polynomial, size: int):
         full[i, rest[0]] += float(c) / 2
         full[rest[0], i] += float(c) / 2
     return full
+
+
+def quadratic_margin(loop: Loop, lyapunov: tuple[Term, ...]) -> Fraction:
+    """Lower bound on the smallest eigenvalue of a quadratic V, 1/trace of the inverse; a proposal, not a proof."""
+    import numpy as np
+
+    V = quadratic_matrix(loop, lyapunov)
+    scale = 1 / np.sqrt(np.abs(np.diag(V)))
+    inverse = np.linalg.inv(scale[:, None] * V * scale[None, :]) * scale[:, None] * scale[None, :]
+    return below(float(1 / np.trace(inverse)))
 
 
 def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
@@ -247,8 +259,6 @@ def _exponents(term: Term, loop: Loop) -> list[int]:
 
 def below(number: float) -> Fraction:
     """Positive number rounded down to about three digits, as a short rational; zero stays zero."""
-    import math
-
     if not number > 0 or not math.isfinite(number):
         return Fraction(0)
     shift = Fraction(2) ** (9 - math.floor(math.log2(number)))

@@ -9,7 +9,6 @@ from typing import Any
 from quakedesign.certificates.linear_premises import Sectors, sectors
 from quakedesign.controllers import control_law
 from quakedesign.controllers.elqr import ExtendedLQR
-from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.symbolic import plant
@@ -62,11 +61,7 @@ def riccati_design(fault: Fault, *, bandwidth: float | None = None) -> RiccatiDe
     Returns
     -------
     RiccatiDesign
-
-    Raises
-    ------
-    ParameterError
-        When the bandwidth cannot be met: it is below what the uncertainty forces.
+        With the nearest bandwidth that weights R from 1e-14 to 1 reach, where the wanted one is out of reach.
     """
     import numpy as np
     from scipy.optimize import brentq
@@ -78,12 +73,11 @@ def riccati_design(fault: Fault, *, bandwidth: float | None = None) -> RiccatiDe
     def excess(log_weight: float) -> float:
         return float(np.log(design.fastest_pole(design.solve(10.0**log_weight)[0]) / target))
 
-    low, high = -14.0, 6.0
-    if excess(low) < 0 or excess(high) > 0:
-        raise ParameterError(
-            f"bandwidth must lie between what the uncertainty forces and what the weights allow. Received {target:.3g} rad/s. "
-            "A slow sampling time asks for too little: give a shorter one."
-        )
+    low, high = -14.0, 0.0
+    if excess(low) <= 0:
+        return design.finished(10.0**low)
+    if excess(high) >= 0:
+        return design.finished(10.0**high)
     R = 10.0 ** float(brentq(excess, low, high, xtol=1e-6))
     return design.finished(R)
 
@@ -126,7 +120,9 @@ class _Scaled:
 
         if min(self.g) == 0:
             return answer(0.5)
-        best = minimize_scalar(lambda w: answer(w)[1].trace(), bounds=(0.01, 0.99), method="bounded", options={"xatol": 1e-4})
+        best = minimize_scalar(
+            lambda w: answer(w)[1].trace(), bounds=(0.01, 0.99), method="bounded", options={"xatol": 1e-4}
+        )
         return answer(float(best.x))
 
     def fastest_pole(self, K: Any) -> float:

@@ -97,9 +97,7 @@ def proves(polynomial: Polynomial, witness: Witness, *, orthant: bool) -> bool:
         return False
     left = _element(witness.multiplier, variables) * _element(polynomial, variables)
     right = sum((_element(expand(b), variables) for b in witness.blocks), start=_element({}, variables))
-    return left == right and all(
-        positive_definite(full_matrix(b.gram, len(b.basis))) for b in witness.blocks
-    )
+    return left == right and all(positive_definite(full_matrix(b.gram, len(b.basis))) for b in witness.blocks)
 
 
 def _well_formed(block: Block, variables: int) -> bool:

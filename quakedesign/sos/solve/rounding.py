@@ -31,7 +31,7 @@ def find_witness(polynomial: Polynomial, search: GramSearch, scale: Sequence[Fra
     if not polynomial:
         return Witness(multiplier={(0,) * cone.variables: Fraction(1)})
     if all(len(entries) == 1 for entries in cone.positions.values()):
-        grams = [[[0.0] * len(basis) for _ in basis] for _, basis in cone.blocks]
+        grams: list | None = [[[0.0] * len(basis) for _ in basis] for _, basis in cone.blocks]
     else:
         grams = search(scaled(polynomial, scale))
     if grams is None:

@@ -57,7 +57,7 @@ def propose(families: Sequence[Family], decisions: int) -> Proposal | None:
     problem = cp.Problem(cp.Maximize(margin), constraints)
     if not solve(problem) or margin.value is None or not margin.value > 1e-9:
         return None
-    return Proposal([float(a) for a in decision.value], float(margin.value))
+    return Proposal(np.asarray(decision.value, dtype=float).tolist(), float(margin.value))
 
 
 def largest_multiple(cone: Cone, polynomials: Sequence[Polynomial], direction: Polynomial) -> float:
@@ -67,9 +67,7 @@ def largest_multiple(cone: Cone, polynomials: Sequence[Polynomial], direction: P
 
     multiple = cp.Variable()
     towards = np.array(cone.vector(direction))
-    constraints = [
-        np.array(cone.vector(p)) - multiple * towards == _sum_of_blocks(cone) for p in polynomials
-    ]
+    constraints = [np.array(cone.vector(p)) - multiple * towards == _sum_of_blocks(cone) for p in polynomials]
     problem = cp.Problem(cp.Maximize(multiple), constraints)
     return max(0.0, float(multiple.value)) if solve(problem) and multiple.value is not None else 0.0
 
@@ -130,4 +128,5 @@ class GramSearch:
         self._target.value = vector / size
         if not solve(self._problem) or self._margin.value is None or not self._margin.value > 0:
             return None
-        return [size * (q.value + q.value.T) / 2 for q in self._grams]
+        values = [np.asarray(q.value, dtype=float) for q in self._grams]
+        return [size * (q + q.T) / 2 for q in values]

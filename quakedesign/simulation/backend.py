@@ -1,0 +1,120 @@
+"""The step function repeated, in machine code where a C compiler is at hand."""
+
+import os
+import shlex
+import shutil
+import subprocess
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from quakedesign.errors import SimulationError
+
+FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
+RADIX = 64
+LEVELS = 3
+_LONGEST_COMPILATION = 120
+
+
+@dataclass(frozen=True)
+class Backend:
+    """Functions that advance a vector by 1, 64 and 4096 steps.
+
+    Attributes
+    ----------
+    functions : tuple of casadi.Function
+        One a level, one input and one output each.
+    name : str
+        ``"compiled"`` or ``"virtual-machine"``.
+    reason : str
+        The compiler, or why there is none.
+    """
+
+    functions: tuple[Any, ...]
+    name: str
+    reason: str
+
+
+def prepare(step: Any, compiled: bool | None) -> Backend:
+    """Backend of a step function; both kinds give the same digits.
+
+    Parameters
+    ----------
+    step : casadi.Function
+        One vector in, one vector of the same length out.
+    compiled : bool or None
+        Whether to compile; None: if a compiler is found and works.
+
+    Raises
+    ------
+    SimulationError
+        When compilation was asked for and is not possible.
+    """
+    functions = ladder(step)
+    if compiled is False:
+        return Backend(functions, "virtual-machine", "asked for")
+    try:
+        command = _compiler()
+        return Backend(_compile(_source(functions), command), "compiled", " ".join((*command, *FLAGS)))
+    except (OSError, subprocess.SubprocessError, RuntimeError) as error:
+        reason = _reason(error)
+        if compiled:
+            raise SimulationError(
+                f"a compiled loop needs a C compiler. {reason}. Install one, set CC, or use compiled=None."
+            ) from None
+        return Backend(functions, "virtual-machine", reason)
+
+
+def ladder(step: Any) -> tuple[Any, ...]:
+    """Functions for 1, RADIX, RADIX² … steps; each calls the one below, so that the code stays small."""
+    import casadi as ca
+
+    rungs = [step]
+    for level in range(1, LEVELS):
+        start = ca.MX.sym("z", step.size1_in(0))
+        end = start
+        for _ in range(RADIX):
+            end = rungs[-1](end)
+        rungs.append(ca.Function(f"steps_{RADIX**level}", [start], [end]))
+    return tuple(rungs)
+
+
+def _source(functions: tuple[Any, ...]) -> tuple[str, tuple[str, ...]]:
+    import casadi as ca
+
+    generator = ca.CodeGenerator("steps.c")
+    for function in functions:
+        generator.add(function)
+    return generator.dump(), tuple(function.name() for function in functions)
+
+
+def _compiler() -> tuple[str, ...]:
+    wanted = shlex.split(os.environ.get("CC", ""))
+    for command in [wanted] if wanted else [["cc"], ["gcc"], ["clang"]]:
+        path = shutil.which(command[0])
+        if path:
+            return path, *command[1:]
+    raise FileNotFoundError("no C compiler: neither CC nor cc, gcc or clang was found")
+
+
+@lru_cache(maxsize=32)
+def _compile(source: tuple[str, tuple[str, ...]], command: tuple[str, ...]) -> tuple[Any, ...]:
+    """Load the functions of a C source; the library stays in memory when its file is gone."""
+    import casadi as ca
+
+    text, names = source
+    with TemporaryDirectory(prefix="quakedesign-", ignore_cleanup_errors=True) as folder:
+        written, library = Path(folder) / "steps.c", Path(folder) / "steps.so"
+        written.write_text(text, encoding="utf-8")
+        call = [*command, *FLAGS, str(written), "-o", str(library), "-lm"]
+        subprocess.run(call, check=True, capture_output=True, timeout=_LONGEST_COMPILATION)
+        return tuple(ca.external(name, str(library)) for name in names)
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, subprocess.CalledProcessError):
+        said = error.stderr.decode(errors="replace").strip().splitlines()
+        return f"the C compiler failed: {said[0] if said else f'exit code {error.returncode}'}"
+    return (str(error) or type(error).__name__).splitlines()[0]

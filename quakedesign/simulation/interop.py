@@ -1,0 +1,103 @@
+"""The same plant and laws as CasADi Functions and as python-control systems."""
+
+from typing import Any
+
+from quakedesign.controllers import Controller
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.simulation.closed_loop import ClosedLoop, integral_symbols, law_expressions, r, r_rate
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.casadi_printer import to_numpy
+
+
+def to_casadi(fault: Fault, controller: Controller | None = None) -> Any:
+    """Return a CasADi Function of a fault, or of its closed loop.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : Controller, optional
+
+    Returns
+    -------
+    casadi.Function
+        Without a controller: (t [s], x = [x1 m, x2 m/s], p [Pa]) → dx. With one:
+        (t, x = [x1, x2, ξ…]) → dx, p, h [unit of ν], reference = [r m, r' m/s, r'' m/s²].
+    """
+    import casadi as ca
+
+    loop = ClosedLoop(fault, controller)
+    if controller is None:
+        return loop.plant
+    time, state = ca.SX.sym("t"), ca.SX.sym("x", 2 + len(loop.integrals))
+    reference = loop.reference(time)
+    pressure, integral_rates = loop.law(state[:2], state[2:], reference)
+    rates = ca.vertcat(loop.plant(time, state[:2], pressure), integral_rates)
+    h, _ = loop.perturbation(time, state[:2], reference)
+    return ca.Function(
+        "closed_loop",
+        [time, state],
+        [rates, pressure, h, reference],
+        ["t", "x"],
+        ["dx", "p", "h", "reference"],
+    )
+
+
+def to_iosystem(subject: Fault | Controller) -> Any:
+    """Return a python-control system with named signals.
+
+    Parameters
+    ----------
+    subject : Fault or Controller
+        A fault has the input ``p`` [Pa] and the outputs ``slip`` [m] and ``slip_rate`` [m/s]. A controller has the
+        inputs ``slip``, ``slip_rate``, ``r`` [m] and ``r_rate`` [m/s], and the output ``p``.
+
+    Returns
+    -------
+    control.NonlinearIOSystem
+
+    Raises
+    ------
+    ParameterError
+        For anything else.
+    """
+    if isinstance(subject, Fault):
+        return _fault_system(subject)
+    if isinstance(subject, Controller):
+        return _controller_system(subject)
+    raise ParameterError(f"a Fault or a Controller is needed. Received {type(subject).__name__}.")
+
+
+def _fault_system(fault: Fault) -> Any:
+    import control
+
+    field = ClosedLoop(fault).plant
+    return control.NonlinearIOSystem(
+        lambda t, x, u, _: field(t, x, u[0]).full().ravel(),
+        lambda t, x, u, _: x,
+        name=fault.name,
+        inputs=["p"],
+        outputs=["slip", "slip_rate"],
+        states=["slip", "slip_rate"],
+    )
+
+
+def _controller_system(controller: Controller) -> Any:
+    import control
+    import numpy as np
+
+    symbols = integral_symbols(controller)
+    pressure, rates = law_expressions(controller)
+
+    def values(expressions: Any, x: Any, u: Any) -> Any:
+        inputs = dict(zip((plant.x1, plant.x2, r, r_rate, *symbols), (*u, *x), strict=True))
+        return np.array([float(value) for value in to_numpy(expressions, inputs)])
+
+    return control.NonlinearIOSystem(
+        lambda t, x, u, _: values(rates, x, u),
+        lambda t, x, u, _: values([pressure], x, u),
+        name=controller.name,
+        inputs=["slip", "slip_rate", "r", "r_rate"],
+        outputs=["p"],
+        states=[symbol.name for symbol in symbols],
+    )

@@ -1,0 +1,137 @@
+"""The figures by which controllers are compared, computed from every step of a run."""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+EVENTS = ("diverged", "opening", "reverse_slip")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metrics:
+    """Figures of one run; those that do not apply, and all of a diverged run, are None.
+
+    All but `peak_slip_rate`, `max_h_rate` and the two extreme pressures are taken over t > settled_from.
+
+    Attributes
+    ----------
+    max_slip_error, rms_slip_error : float or None
+        Of x1 − r [m].
+    max_slip_rate_error, rms_slip_rate_error : float or None
+        Of x2 − r' [m/s].
+    mise_slip, mise_slip_rate : float or None
+        Mean of the squared error [m², m²/s²].
+    rms_pressure : float or None
+        [Pa].
+    pressure_total_variation : float or None
+        Sum of |Δp| between successive steps [Pa].
+    reverse_slip_fraction : float or None
+        Share of the steps with x2 < 0 [-].
+    peak_slip_rate : float or None
+        Largest |x2| of the whole run [m/s].
+    max_h_rate : float or None
+        Largest |Δh/Δt| between successive steps of the whole run [unit of ν per s].
+    max_pressure, min_pressure : float or None
+        Over the whole run [Pa].
+    settled_from : float
+        [s].
+    steps : int
+        Steps taken before the end or before divergence.
+    seconds : float
+        Time that the computation took [s].
+    """
+
+    max_slip_error: float | None = None
+    max_slip_rate_error: float | None = None
+    rms_slip_error: float | None = None
+    rms_slip_rate_error: float | None = None
+    mise_slip: float | None = None
+    mise_slip_rate: float | None = None
+    rms_pressure: float | None = None
+    pressure_total_variation: float | None = None
+    reverse_slip_fraction: float | None = None
+    peak_slip_rate: float | None = None
+    max_h_rate: float | None = None
+    max_pressure: float | None = None
+    min_pressure: float | None = None
+    settled_from: float
+    steps: int
+    seconds: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures by name, as JSON can hold them."""
+        return asdict(self)
+
+    @staticmethod
+    def unit(name: str) -> str:
+        """SI unit of one figure; empty for a number."""
+        return _UNITS[name]
+
+
+_UNITS = {
+    "max_slip_error": "m",
+    "max_slip_rate_error": "m/s",
+    "rms_slip_error": "m",
+    "rms_slip_rate_error": "m/s",
+    "mise_slip": "m^2",
+    "mise_slip_rate": "m^2/s^2",
+    "rms_pressure": "Pa",
+    "pressure_total_variation": "Pa",
+    "reverse_slip_fraction": "",
+    "peak_slip_rate": "m/s",
+    "max_h_rate": "m^3 Pa/(kg s^3)",
+    "max_pressure": "Pa",
+    "min_pressure": "Pa",
+    "settled_from": "s",
+    "steps": "",
+    "seconds": "s",
+}
+
+
+def events(watched: dict[str, float]) -> dict[str, float]:
+    """Time of the first occurrence [s] of everything that happened."""
+    return {name: watched[name] for name in EVENTS if watched[name] >= 0}
+
+
+def metrics(
+    watched: dict[str, float],
+    *,
+    controlled: bool,
+    step: float,
+    steps: int,
+    settled_from: float,
+    seconds: float,
+) -> Metrics:
+    """Figures from what the loop accumulated; `step` [s] is the length of one step."""
+    if watched["diverged"] >= 0:
+        return Metrics(settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
+    figures = _whole_run(watched, step) | _settled(watched) if controlled else {}
+    figures["peak_slip_rate"] = watched["peak_slip_rate"]
+    finite = {name: value for name, value in figures.items() if math.isfinite(value)}
+    return Metrics(**finite, settled_from=settled_from, steps=steps, seconds=seconds)
+
+
+def _whole_run(watched: dict[str, float], step: float) -> dict[str, float]:
+    return {
+        "max_h_rate": watched["max_h_change"] / step,
+        "max_pressure": watched["max_pressure"],
+        "min_pressure": watched["min_pressure"],
+    }
+
+
+def _settled(watched: dict[str, float]) -> dict[str, float]:
+    count = watched["settled_count"]
+    if not count:
+        return {}
+    means = {name: watched[f"sum_square_{name}"] / count for name in ("slip_error", "slip_rate_error", "pressure")}
+    return {
+        "max_slip_error": watched["max_slip_error"],
+        "max_slip_rate_error": watched["max_slip_rate_error"],
+        "rms_slip_error": math.sqrt(means["slip_error"]),
+        "rms_slip_rate_error": math.sqrt(means["slip_rate_error"]),
+        "mise_slip": means["slip_error"],
+        "mise_slip_rate": means["slip_rate_error"],
+        "rms_pressure": math.sqrt(means["pressure"]),
+        "pressure_total_variation": watched["pressure_variation"],
+        "reverse_slip_fraction": watched["reverse_count"] / count,
+    }

@@ -1,0 +1,161 @@
+"""What is watched at every step, inside the compiled loop."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.simulation.schemes import Scheme
+
+NEVER = -1.0
+LARGEST_MOTION = 1e9
+LARGEST_STATE = 1e100
+
+START = {
+    "max_slip_error": 0.0,
+    "max_slip_rate_error": 0.0,
+    "sum_square_slip_error": 0.0,
+    "sum_square_slip_rate_error": 0.0,
+    "sum_square_pressure": 0.0,
+    "pressure_variation": 0.0,
+    "reverse_count": 0.0,
+    "settled_count": 0.0,
+    "peak_slip_rate": 0.0,
+    "max_h_change": 0.0,
+    "max_pressure": -math.inf,
+    "min_pressure": math.inf,
+    "previous_pressure": 0.0,
+    "previous_h": 0.0,
+    "diverged": NEVER,
+    "opening": NEVER,
+    "reverse_slip": NEVER,
+}
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """The vector [counter, settled_from, x1, x2, ξ, watched…] that one step maps onto itself.
+
+    Attributes
+    ----------
+    loop : ClosedLoop
+    scheme : type of Scheme
+    step : float
+        T_s [s].
+    """
+
+    loop: ClosedLoop
+    scheme: type[Scheme]
+    step: float
+
+    @property
+    def state_size(self) -> int:
+        """Number of states of plant and law."""
+        return 2 + len(self.loop.integrals)
+
+    @property
+    def size(self) -> int:
+        """Length of the vector."""
+        return 2 + self.state_size + len(START)
+
+    def start(self, settled_from: float) -> list[float]:
+        """Vector at rest at time zero; `settled_from` is a time [s]."""
+        return [0.0, settled_from, *[0.0] * self.state_size, *START.values()]
+
+    def watched(self, vector: Any) -> dict[str, float]:
+        """Accumulated values by name."""
+        return dict(zip(START, (float(v) for v in vector[2 + self.state_size :]), strict=True))
+
+    def observe(self, vector: Any) -> Any:
+        """Vector (SX) after its own instant has been watched."""
+        import casadi as ca
+
+        parts = [vector[2 + self.state_size + i] for i in range(len(START))]
+        before = dict(zip(START, parts, strict=True))
+        return ca.vertcat(vector[: 2 + self.state_size], *(self._after(before, vector)[name] for name in START))
+
+    def signals(self, vector: Any) -> dict[str, Any]:
+        """Every signal of the loop (SX) at the instant of the vector."""
+        time, state = vector[0] * self.step, vector[2 : 2 + self.state_size]
+        reference = self.loop.reference(time)
+        h, mu = self.loop.perturbation(time, state[:2], reference)
+        pressure = self.scheme.pressure(self.loop, vector[0], state, self.step)
+        return {
+            "time": time,
+            "slip": state[0],
+            "slip_rate": state[1],
+            "pressure": pressure,
+            "reference": reference[0],
+            "reference_rate": reference[1],
+            "matched_perturbation": h,
+            "friction": mu,
+        }
+
+    def _after(self, before: dict[str, Any], vector: Any) -> dict[str, Any]:
+        now = self.signals(vector)
+        settled = now["time"] > vector[1]
+        later = vector[0] > 0
+        return {
+            **_errors(before, now, settled),
+            **_pressures(before, now, settled, later),
+            **_extremes(before, now, later),
+            **self._events(before, now, vector),
+        }
+
+    def _events(self, before: dict[str, Any], now: dict[str, Any], vector: Any) -> dict[str, Any]:
+        import casadi as ca
+
+        fine = ca.logic_and(ca.fabs(now["slip"]) <= LARGEST_MOTION, ca.fabs(now["slip_rate"]) <= LARGEST_MOTION)
+        for index in range(4, 2 + self.state_size):
+            fine = ca.logic_and(fine, ca.fabs(vector[index]) <= LARGEST_STATE)
+        happening = {
+            "diverged": ca.logic_not(fine),
+            "opening": now["pressure"] >= self.loop.fault.effective_normal_stress,
+            "reverse_slip": now["slip_rate"] < 0,
+        }
+        return {
+            name: ca.if_else(ca.logic_and(before[name] < 0, what), now["time"], before[name])
+            for name, what in happening.items()
+        }
+
+
+def _errors(before: dict[str, Any], now: dict[str, Any], settled: Any) -> dict[str, Any]:
+    import casadi as ca
+
+    slip_error = ca.if_else(settled, now["slip"] - now["reference"], 0)
+    rate_error = ca.if_else(settled, now["slip_rate"] - now["reference_rate"], 0)
+    reverse = ca.logic_and(settled, now["slip_rate"] < 0)
+    return {
+        "max_slip_error": ca.fmax(before["max_slip_error"], ca.fabs(slip_error)),
+        "max_slip_rate_error": ca.fmax(before["max_slip_rate_error"], ca.fabs(rate_error)),
+        "sum_square_slip_error": before["sum_square_slip_error"] + slip_error * slip_error,
+        "sum_square_slip_rate_error": before["sum_square_slip_rate_error"] + rate_error * rate_error,
+        "reverse_count": before["reverse_count"] + reverse,
+        "settled_count": before["settled_count"] + settled,
+    }
+
+
+def _pressures(before: dict[str, Any], now: dict[str, Any], settled: Any, later: Any) -> dict[str, Any]:
+    import casadi as ca
+
+    pressure = now["pressure"]
+    change = ca.fabs(pressure - before["previous_pressure"])
+    return {
+        "sum_square_pressure": before["sum_square_pressure"] + ca.if_else(settled, pressure * pressure, 0),
+        "pressure_variation": before["pressure_variation"] + ca.if_else(ca.logic_and(settled, later), change, 0),
+        "previous_pressure": pressure,
+        "max_pressure": ca.fmax(before["max_pressure"], pressure),
+        "min_pressure": ca.fmin(before["min_pressure"], pressure),
+    }
+
+
+def _extremes(before: dict[str, Any], now: dict[str, Any], later: Any) -> dict[str, Any]:
+    import casadi as ca
+
+    h = now["matched_perturbation"]
+    change = ca.if_else(later, ca.fabs(h - before["previous_h"]), 0)
+    return {
+        "peak_slip_rate": ca.fmax(before["peak_slip_rate"], ca.fabs(now["slip_rate"])),
+        "max_h_change": ca.fmax(before["max_h_change"], change),
+        "previous_h": h,
+    }

@@ -1,0 +1,34 @@
+"""Ways to carry a law out over a step, one a file, found by looking into this folder."""
+
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from quakedesign.errors import ParameterError
+from quakedesign.simulation.schemes.base import Scheme
+
+__all__ = ["Scheme", "schemes", "simulation_scheme"]
+
+
+@cache
+def schemes() -> dict[str, type[Scheme]]:
+    """Every scheme of the package, by name."""
+    found: dict[str, type[Scheme]] = {}
+    for info in iter_modules(__path__):
+        for item in vars(import_module(f"{__name__}.{info.name}")).values():
+            if isinstance(item, type) and issubclass(item, Scheme) and hasattr(item, "name"):
+                found[item.name] = item
+    return found
+
+
+def simulation_scheme(name: str) -> type[Scheme]:
+    """Scheme of a given name.
+
+    Raises
+    ------
+    ParameterError
+        When there is none.
+    """
+    if name not in schemes():
+        raise ParameterError(f"scheme must be one of {', '.join(sorted(schemes()))}. Received {name!r}.")
+    return schemes()[name]

@@ -1,0 +1,87 @@
+"""Running a backend over many steps and keeping some instants."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.simulation.backend import RADIX, Backend
+
+if TYPE_CHECKING:
+    import numpy as np
+
+ProgressReport = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Advancer:
+    """Moves one vector forward in place, by any number of steps.
+
+    Attributes
+    ----------
+    vector : ndarray
+    calls : tuple of callable
+        Advance the vector by 1, 64 and 4096 steps.
+    owners : tuple
+        CasADi's buffers, which must live as long as the calls.
+    """
+
+    vector: "np.ndarray"
+    calls: tuple[Callable[[], None], ...]
+    owners: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, backend: Backend, start: list[float]) -> "Advancer":
+        """Advancer at a starting vector."""
+        import numpy as np
+
+        vector = np.array(start)
+        calls, owners = zip(*(_bound(function, vector) for function in backend.functions), strict=True)
+        return cls(vector, calls, owners)
+
+    def advance(self, steps: int) -> None:
+        """Take a number of steps; no call into compiled code lasts longer than 4096 of them."""
+        for level in reversed(range(len(self.calls))):
+            times, steps = divmod(steps, RADIX**level)
+            for _ in range(times):
+                self.calls[level]()
+
+
+def _bound(function: Any, vector: "np.ndarray") -> tuple[Callable[[], None], Any]:
+    import numpy as np
+
+    result = np.empty_like(vector)
+    buffer, evaluate = function.buffer()
+    buffer.set_arg(0, vector.data)
+    buffer.set_res(0, result.data)
+
+    def call() -> None:
+        evaluate()
+        vector[:] = result
+
+    return call, (function, buffer, result)
+
+
+def instants(steps: int, samples: int) -> list[int]:
+    """Step numbers to keep: evenly spaced from 0, at most `samples` intervals, and always the last one."""
+    stride = max(1, -(-steps // samples))
+    kept = list(range(0, steps, stride))
+    return [*kept, steps]
+
+
+def march(advancer: Advancer, kept: list[int], diverged_at: int, progress: ProgressReport | None) -> "np.ndarray":
+    """Vectors at the kept instants, one a column; ends early once the entry `diverged_at` is set.
+
+    Python runs between two calls, so that the user can interrupt and sees the progress.
+    """
+    import numpy as np
+
+    found = [advancer.vector.copy()]
+    for before, after in pairwise(kept):
+        advancer.advance(after - before)
+        found.append(advancer.vector.copy())
+        if progress:
+            progress(after / kept[-1])
+        if advancer.vector[diverged_at] >= 0:
+            break
+    return np.array(found).T

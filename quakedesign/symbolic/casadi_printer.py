@@ -1,0 +1,177 @@
+"""SymPy expressions in CasADi and NumPy: one walk over the tree, two tables of operations."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, reduce
+from operator import add, mul
+from typing import Any
+
+import sympy as sp
+from sympy.codegen.cfunctions import expm1
+
+from quakedesign.errors import ParameterError
+from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
+
+Operations = Mapping[Any, Any]
+
+
+def to_casadi(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -> list[Any]:
+    """Expressions as CasADi SX; subexpressions that SymPy shares are shared there too.
+
+    Parameters
+    ----------
+    expressions : sequence of Expr
+        In signed and absolute powers, sums, products, powers, comparisons and elementary functions.
+    values : mapping of Symbol to SX
+        What every free symbol stands for.
+
+    Returns
+    -------
+    list of SX
+        The sign at zero is 0.
+
+    Raises
+    ------
+    ParameterError
+        For a symbol without a value or an operation that is not known.
+    """
+    import casadi as ca
+
+    return [ca.SX(item) for item in _translate(expressions, values, _casadi_operations())]
+
+
+def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -> list[Any]:
+    """Values of expressions at floats or NumPy arrays of one shape, with the operations of `to_casadi`.
+
+    Parameters
+    ----------
+    expressions : sequence of Expr
+    values : mapping of Symbol to float or ndarray
+
+    Returns
+    -------
+    list of float or ndarray
+
+    Raises
+    ------
+    ParameterError
+        For a symbol without a value or an operation that is not known.
+    """
+    return _translate(expressions, values, _numpy_operations())
+
+
+def _translate(
+    expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], table: Operations
+) -> list[Any]:
+    known: dict[sp.Basic, Any] = dict(values)
+
+    def walk(node: sp.Basic) -> Any:
+        if node not in known:
+            known[node] = _number(node) if node.is_number else _operate(node, table, walk)
+        return known[node]
+
+    return [walk(sp.sympify(expression)) for expression in expressions]
+
+
+def _number(node: Any) -> float:
+    exact = node.p / node.q if node.is_Rational else None
+    return float(node.evalf(30)) if exact is None else exact
+
+
+def _operate(node: Any, table: Operations, walk: Callable[[Any], Any]) -> Any:
+    if node.is_Add or node.is_Mul:
+        return _fold(node, walk)
+    if isinstance(node, SignedPower | AbsolutePower | sp.Pow) and node.args[1].is_number:
+        return table[node.func](walk(node.args[0]), node.args[1])
+    if node in (sp.true, sp.false):
+        return float(bool(node))
+    if isinstance(node, sp.Piecewise):
+        return _branches(node, table, walk)
+    if node.func not in table:
+        what = "a value for the symbol" if node.is_Symbol else "a known operation instead of"
+        raise ParameterError(f"an expression to evaluate needs {what} {node}. Received none.")
+    return table[node.func](*(walk(arg) for arg in node.args))
+
+
+def _fold(node: Any, walk: Callable[[Any], Any]) -> Any:
+    """Sum or product, with its numbers joined exactly before they are rounded."""
+    numbers = [arg for arg in node.args if arg.is_number]
+    rest = [walk(arg) for arg in node.args if not arg.is_number]
+    first = [walk(node.func(*numbers))] if numbers else []
+    return reduce(add if node.is_Add else mul, first + rest)
+
+
+def _branches(node: Any, table: Operations, walk: Callable[[Any], Any]) -> Any:
+    if node.args[-1][1] != sp.true:
+        raise ParameterError(
+            f"the last branch of a piecewise expression must hold otherwise. Received {node}."
+        )
+    result = walk(node.args[-1][0])
+    for value, condition in reversed(node.args[:-1]):
+        result = table[sp.Piecewise](walk(condition), walk(value), result)
+    return result
+
+
+def _power(library: Any, base: Any, exponent: sp.Expr) -> Any:
+    """Power with square roots as such, since they are cheaper and correctly rounded."""
+    if exponent in (1, -1):
+        return base if exponent == 1 else 1 / base
+    if exponent in (2, 3):
+        return base * base if exponent == 2 else base * base * base
+    if exponent in (sp.Rational(1, 2), sp.Rational(3, 2)):
+        root = library.sqrt(base)
+        return root if exponent < 1 else base * root
+    if exponent in (sp.Rational(-1, 2), sp.Rational(-3, 2)):
+        return 1 / _power(library, base, -exponent)
+    return base ** _number(exponent)
+
+
+def _powers(library: Any) -> dict[Any, Any]:
+    def signed(x: Any, a: sp.Expr) -> Any:
+        return library.sign(x) if a == 0 else library.sign(x) * _power(library, library.fabs(x), a)
+
+    def absolute(x: Any, a: sp.Expr) -> Any:
+        return _power(library, library.fabs(x), a)
+
+    elementary = {
+        getattr(sp, name): getattr(library, name) for name in ("exp", "log", "sin", "cos", "tan", "tanh")
+    }
+    return {
+        SignedPower: signed,
+        AbsolutePower: absolute,
+        sp.Pow: lambda x, a: _power(library, x, a),
+        sp.Max: lambda *parts: reduce(library.fmax, parts),
+        sp.Min: lambda *parts: reduce(library.fmin, parts),
+        sp.Abs: library.fabs,
+        sp.sign: library.sign,
+        sp.StrictLessThan: lambda a, b: a < b,
+        sp.LessThan: lambda a, b: a <= b,
+        sp.StrictGreaterThan: lambda a, b: a > b,
+        sp.GreaterThan: lambda a, b: a >= b,
+        **elementary,
+    }
+
+
+@cache
+def _casadi_operations() -> Operations:
+    import casadi as ca
+
+    other = {expm1: ca.expm1, sp.asinh: ca.asinh, sp.sinh: ca.sinh, sp.cosh: ca.cosh, sp.atan: ca.atan}
+    logic = {
+        sp.Piecewise: ca.if_else,
+        sp.And: lambda *c: reduce(ca.logic_and, c),
+        sp.Or: lambda *c: reduce(ca.logic_or, c),
+    }
+    return _powers(ca) | other | logic
+
+
+@cache
+def _numpy_operations() -> Operations:
+    import numpy as np
+
+    other = {expm1: np.expm1, sp.asinh: np.arcsinh, sp.sinh: np.sinh, sp.cosh: np.cosh, sp.atan: np.arctan}
+    logic = {
+        sp.Piecewise: np.where,
+        sp.And: lambda *c: reduce(np.logical_and, c),
+        sp.Or: lambda *c: reduce(np.logical_or, c),
+    }
+    return _powers(np) | other | logic

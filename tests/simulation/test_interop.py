@@ -1,0 +1,70 @@
+import control
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from quakedesign.controllers import published
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.simulation import simulate, to_casadi, to_iosystem
+
+LAB = load_fault("lab-fault")
+
+
+def test_a_casadi_function_has_names():
+    function = to_casadi(LAB)
+    assert function.name_in() == ["t", "x", "p"]
+    assert function.name_out() == ["dx"]
+    assert np.allclose(
+        function(t=0, x=[0, 0.5], p=0)["dx"].full().ravel(), [0.5, -0.5 * LAB.specific_damping]
+    )
+
+
+def test_a_closed_loop_function_integrates_to_the_simulated_run():
+    loop = to_casadi(LAB, published("lab-fault")["elqr"])
+    run = simulate(LAB, published("lab-fault")["elqr"], step=1e-4, duration=0.2, samples=10)
+    oracle = solve_ivp(
+        lambda t, y: loop(t, y)[0].full().ravel(),
+        (0, run.time[-1]),
+        np.zeros(4),
+        method="DOP853",
+        t_eval=run.time,
+        rtol=1e-9,
+        atol=1e-18,
+    )
+    assert np.max(np.abs(oracle.y[0] - run.slip)) < 1e-6 * np.max(np.abs(run.slip))
+
+
+def test_python_control_joins_fault_and_law():
+    """Interconnected by signal names and fed with the reference, they must move as the simulated loop."""
+    fault, law = to_iosystem(LAB), to_iosystem(published("lab-fault")["elqr"])
+    assert (fault.input_labels, fault.output_labels) == (["p"], ["slip", "slip_rate"])
+    assert (law.input_labels, law.output_labels) == (["slip", "slip_rate", "r", "r_rate"], ["p"])
+    joined = control.interconnect(
+        [fault, law], inputs=["r", "r_rate"], outputs=["slip", "p"], check_unused=False
+    )
+    run = simulate(LAB, published("lab-fault")["elqr"], step=1e-4, duration=0.1, samples=200)
+    response = control.input_output_response(
+        joined,
+        run.time,
+        np.vstack([run.reference, run.reference_rate]),
+        solve_ivp_method="Radau",
+        solve_ivp_kwargs={"rtol": 1e-9, "atol": 1e-18},
+    )
+    assert np.max(np.abs(response.outputs[0] - run.slip)) < 1e-5 * np.max(np.abs(run.slip))
+    assert np.max(np.abs(response.outputs[1] - run.pressure)) < 1e-5 * np.max(np.abs(run.pressure))
+
+
+@pytest.mark.parametrize("name", ["cta", "dia", "elqr"])
+def test_a_law_alone_gives_the_pressure_of_the_run(name):
+    law = published("lab-fault")[name]
+    run, system = simulate(LAB, law, duration=0.5, samples=20), to_iosystem(law)
+    for i in range(run.time.size):
+        inputs = [run.slip[i], run.slip_rate[i], run.reference[i], run.reference_rate[i]]
+        pressure = system.output(run.time[i], run.integrals[:, i], inputs)[0]
+        assert pressure == pytest.approx(run.pressure[i], rel=1e-9, abs=1e-9)
+
+
+def test_anything_else_is_refused():
+    with pytest.raises(ParameterError, match="Fault or a Controller"):
+        to_iosystem(3)

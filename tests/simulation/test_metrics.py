@@ -1,0 +1,71 @@
+"""Metrics from inside the loop against NumPy on a run that keeps every step."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from quakedesign.controllers import published
+from quakedesign.fault import load_fault
+from quakedesign.simulation import Metrics, simulate
+
+REAL = load_fault("real-fault")
+
+
+@pytest.fixture(params=("cta", "dia", "elqr"))
+def law(request):
+    return published("real-fault")[request.param]
+
+
+@pytest.mark.parametrize("settled_from", [None, 0.0, 300.0])
+def test_they_agree_with_numpy(law, settled_from):
+    run = simulate(REAL, law, duration=800.0, samples=10**6, settled_from=settled_from)
+    start = 200.0 if settled_from is None else settled_from
+    kept = run.time > start
+    slip_error, rate_error = run.slip_error[kept], run.slip_rate_error[kept]
+    changes = np.abs(np.diff(run.pressure))
+    expected = {
+        "max_slip_error": np.max(np.abs(slip_error)),
+        "max_slip_rate_error": np.max(np.abs(rate_error)),
+        "rms_slip_error": np.sqrt(np.mean(slip_error**2)),
+        "rms_slip_rate_error": np.sqrt(np.mean(rate_error**2)),
+        "mise_slip": np.mean(slip_error**2),
+        "mise_slip_rate": np.mean(rate_error**2),
+        "rms_pressure": np.sqrt(np.mean(run.pressure[kept] ** 2)),
+        "pressure_total_variation": np.sum(changes[kept[1:]]),
+        "reverse_slip_fraction": np.mean(run.slip_rate[kept] < 0),
+        "peak_slip_rate": np.max(np.abs(run.slip_rate)),
+        "max_h_rate": np.max(np.abs(np.diff(run.matched_perturbation))) / 0.184,
+        "max_pressure": np.max(run.pressure),
+        "min_pressure": np.min(run.pressure),
+    }
+    found = run.metrics.to_dict()
+    assert set(found) - set(expected) == {"settled_from", "steps", "seconds"}
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=1e-11), name
+    assert found["steps"] == len(run.time) - 1
+
+
+def test_they_do_not_depend_on_what_is_kept(law):
+    few, many = (simulate(REAL, law, duration=500.0, samples=n).metrics.to_dict() for n in (3, 1000))
+    assert few | {"seconds": 0} == many | {"seconds": 0}
+
+
+def test_without_control_only_the_peak_is_given():
+    found = simulate(REAL, duration=30.0).metrics.to_dict()
+    assert {name for name, value in found.items() if value is not None} == {
+        "peak_slip_rate",
+        "settled_from",
+        "steps",
+        "seconds",
+    }
+
+
+def test_nothing_settled_means_no_settled_figures(law):
+    found = simulate(REAL, law, duration=30.0, settled_from=31.0).metrics
+    assert found.rms_pressure is None
+    assert found.peak_slip_rate > 0
+
+
+def test_every_figure_has_a_unit():
+    assert all(isinstance(Metrics.unit(field.name), str) for field in fields(Metrics))
