@@ -91,7 +91,9 @@ def proves(polynomial: Polynomial, witness: Witness, *, orthant: bool) -> bool:
     one = (0,) * variables
     if not witness.multiplier or any(c <= 0 for c in witness.multiplier.values()):
         return False
-    if not orthant and (set(witness.multiplier) != {one} or any(any(b.times) for b in witness.blocks)):
+    if (not polynomial or not orthant) and witness.multiplier != {one: Fraction(1)}:
+        return False
+    if not orthant and any(any(b.times) for b in witness.blocks):
         return False
     if not all(_well_formed(b, variables) for b in witness.blocks):
         return False

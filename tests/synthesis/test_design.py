@@ -1,0 +1,135 @@
+"""Designs: proved, reproducible, for stable and unusual faults too."""
+
+from dataclasses import replace
+from fractions import Fraction as F
+
+import numpy as np
+import pytest
+
+import quakedesign as qd
+from quakedesign.certificates import Verdict
+from quakedesign.certificates.linear_premises import sectors
+from quakedesign.controllers import published
+from quakedesign.errors import UnknownNameError
+from quakedesign.fault import Disturbance
+from quakedesign.simulation.step_stability import amplification
+from quakedesign.synthesis.design import assess, smallest_root
+from quakedesign.synthesis.riccati import riccati_design, vertex_poles
+
+
+@pytest.fixture(scope="module")
+def real():
+    return qd.load_fault("real-fault")
+
+
+@pytest.fixture(scope="module")
+def variants(real):
+    law = type(real.friction)
+    return {
+        "real": real,
+        "lab": qd.load_fault("lab-fault"),
+        "ten percent": real.with_box("ten-percent"),
+        "stable": replace(real, friction=law(residual=0.2353, drop=0.01, critical_slip=0.27635)),
+        "no stress drop": replace(real, friction=law(residual=0.2353, drop=0.0, critical_slip=0.27635)),
+        "strong weakening": replace(real, friction=law(residual=0.05, drop=0.8, critical_slip=0.05)),
+        "undamped": replace(real, damping=0.0),
+        "overdamped": replace(real, damping=5e16),
+        "slow sampling": replace(real, sampling_time=60.0),
+        "quiet": real.with_disturbance(Disturbance()),
+        "small": replace(real, length=1.0, damping=1e3),
+    }
+
+
+VARIANTS = (
+    "real", "lab", "ten percent", "stable", "no stress drop", "strong weakening", "undamped", "overdamped",
+    "slow sampling", "quiet", "small",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_cta_is_proved_with_its_premise_along_the_reference(variants, variant):
+    design = qd.design(variants[variant], "cta")
+    assert design.verdict is Verdict.PROVED
+    assert design.certificate.check() is Verdict.PROVED
+    premises = {p.name: p for p in design.premises}
+    assert premises["along_reference"].holds
+    assert premises["control_coefficient"].holds
+    assert design.controller.scale == F(design.details["rho"]) ** 6
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_elqr_is_proved_about_constant_references(variants, variant):
+    design = qd.design(variants[variant], "elqr")
+    assert design.verdict is Verdict.PROVED
+    assert {p.name: p for p in design.premises}["friction_slope"].holds
+
+
+@pytest.mark.parametrize("name", ["real-fault", "lab-fault"])
+def test_riccati_residual_and_gain_by_independent_algebra(name):
+    # A'S + SA − SBR⁻¹B'S + Q = 0 and K = R⁻¹B'S, in the nondimensional variables of the design
+    fault = qd.load_fault(name)
+    found = riccati_design(fault)
+    zeta = fault.damping_ratio
+    A = np.array([[0, 1, 0, 0], [-1, -2 * zeta, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0]])
+    B = np.array([[0.0], [1.0], [0.0], [0.0]])
+    residual = A.T @ found.S + found.S @ A - found.S @ B @ B.T @ found.S / found.R + found.Q
+    assert np.abs(residual).max() < 1e-9 * np.abs(found.S).max() / found.R
+    assert np.linalg.eigvalsh(found.S).min() > 0
+
+
+def test_the_bound_on_the_uncertainty_is_met_by_every_state(real):
+    # ERRATA 7: h² ≤ xᵀWx must hold for |h| ≤ g1|x1| + g2|x2|, also where g1x1 + g2x2 = 0
+    from quakedesign.synthesis.riccati import _Scaled
+
+    fault = replace(real, disturbance=Disturbance(rate_growth=0.3))
+    problem = _Scaled(fault, sectors(fault))
+    g1, g2 = problem.g
+    assert min(g1, g2) > 0
+    W = problem.bound(0.37)
+    rng = np.random.default_rng(1)
+    for x1, x2 in [*rng.normal(size=(500, 2)), (1.0, -g1 / g2)]:
+        x = np.array([x1, x2, 0, 0])
+        assert (g1 * abs(x1) + g2 * abs(x2)) ** 2 <= x @ W @ x * (1 + 1e-12)
+
+
+def test_every_vertex_is_stable_and_the_step_is_short_enough(real):
+    design = qd.design(real, "elqr")
+    poles = vertex_poles(sectors(real), list(design.controller.gains.values()))
+    assert max(z.real for z in poles) < 0
+    assert max(abs(z) for z in poles) * real.sampling_time == pytest.approx(1.5, rel=1e-3)
+    assert amplification(poles, real.sampling_time) < 1
+
+
+def test_the_stability_limit_of_dormand_prince_on_the_real_axis():
+    # |R(z)| = 1 at z ≈ −3.3066 for the six-stage fifth-order method (Hairer and Wanner, Solving ODEs II, IV.2)
+    assert amplification([-3.30], 1.0) < 1 < amplification([-3.31], 1.0)
+
+
+def test_published_gains_are_judged_without_error(real):
+    verdicts = {name: assess(real, law).verdict for name, law in published("real-fault").items()}
+    assert verdicts == {"cta": Verdict.PROVED, "dia": Verdict.UNDECIDED, "elqr": Verdict.PROVED}
+
+
+def test_a_destabilising_gain_has_no_certificate(real):
+    good = published("real-fault")["elqr"]
+    bad = replace(good, gains={n: -k for n, k in good.gains.items()})
+    assert assess(real, bad).verdict is not Verdict.PROVED
+
+
+@pytest.mark.parametrize("scale", ["1/3", "250/1000000", "12345", "1"])
+def test_the_root_is_rational_and_just_large_enough(scale):
+    root = smallest_root(F(scale))
+    assert root**6 >= F(scale)
+    assert float(root**6 / F(scale)) < 1.07
+
+
+def test_the_same_input_gives_the_same_digits(real):
+    first, second = (qd.design(real, "elqr") for _ in range(2))
+    assert first.gains == second.gains
+    assert first.certificate == second.certificate
+    assert qd.design(real, "cta").certificate == qd.design(real, "cta").certificate
+
+
+def test_an_unknown_controller_is_one_clear_message(real):
+    with pytest.raises(UnknownNameError, match=r"must be one of cta, elqr\. Received 'pid'"):
+        qd.design(real, "pid")

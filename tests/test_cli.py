@@ -1,0 +1,257 @@
+"""The command line: answers, exit codes, one-line refusals, whole folders."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from quakedesign.cli import main
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main(list(arguments))
+    out, err = capsys.readouterr()
+    return stop.value.code, out, err
+
+
+@pytest.fixture(scope="module", params=["real-fault", "lab-fault"])
+def main_job(request, tmp_path_factory):
+    """The main job as a user runs it."""
+    folder = tmp_path_factory.mktemp("job")
+    command = [sys.executable, "-m", "quakedesign", "design", request.param, "--json"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=500)
+    assert done.returncode == 0, done.stderr
+    return request.param, folder / f"quakedesign-{request.param}", json.loads(done.stdout)
+
+
+def test_the_folder_is_complete(main_job):
+    _, folder, results = main_job
+    found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+    names = ("uncontrolled", "states", "pressure", "errors", "metrics")
+    assert {f"figures/{n}.png" for n in names} | {"results.json", "report.html", "certificates/cta.json"} <= found
+    assert json.loads((folder / "results.json").read_text()) == results
+    assert [p.name for p in folder.parent.iterdir()] == [folder.name]
+
+
+def test_the_keys_promised_are_there(main_job):
+    _, _, results = main_job
+    assert set(results["controllers"]) == {"cta", "elqr"}
+    assert set(results["published"]) == {"cta", "dia", "elqr"}
+    for entry in results["controllers"].values():
+        assert {"gains", "verdict", "certificate", "premises", "metrics"} <= set(entry)
+        assert all(isinstance(gain, str) for gain in entry["gains"].values())
+        assert all({"name", "required", "certified", "ratio", "holds"} <= set(p) for p in entry["premises"])
+    assert "metrics" in results["uncontrolled"]
+
+
+def test_both_checkers_accept_the_certificates(main_job):
+    from pathlib import Path
+
+    name, folder, _ = main_job
+    files = sorted(str(p) for p in (folder / "certificates").glob("*.json"))
+    checker = Path(__file__).parents[1] / "proofs" / "check.py"
+    for command in ([sys.executable, str(checker)], [sys.executable, "-m", "quakedesign", "check"]):
+        done = subprocess.run([*command, *files], capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert done.stdout.count(": proved") == len(files) == 4
+    own = [str(folder / "certificates" / n) for n in ("cta.json", "elqr.json")]
+    command = [sys.executable, "-m", "quakedesign", "check", *own, "--fault", name]
+    assert subprocess.run(command, capture_output=True, timeout=120).returncode == 0
+
+
+def test_the_designs_beat_the_published_gains_as_promised(main_job):
+    name, _, results = main_job
+    old, new = results["published"], results["controllers"]
+    cta, elqr = (new[k]["metrics"] for k in ("cta", "elqr"))
+    # at most 1/20 of both errors at no more than 2 % more RMS pressure
+    for metric in ("max_slip_error", "max_slip_rate_error"):
+        assert cta[metric] <= old["cta"]["metrics"][metric] / 20
+    assert cta["rms_pressure"] <= 1.02 * old["cta"]["metrics"]["rms_pressure"]
+    # no worse in slip rate, 50 times better in slip, at the same RMS pressure (within 2 %), stable at the step
+    assert elqr["max_slip_rate_error"] <= old["elqr"]["metrics"]["max_slip_rate_error"]
+    assert elqr["max_slip_error"] <= old["elqr"]["metrics"]["max_slip_error"] / 50
+    assert elqr["rms_pressure"] == pytest.approx(old["elqr"]["metrics"]["rms_pressure"], rel=0.02)
+    assert new["elqr"]["growth_per_step"] < 1
+    assert {new[k]["verdict"] for k in new} == {"proved"}
+    assert name in ("real-fault", "lab-fault")
+
+
+def test_the_premises_are_reported_as_they_are(main_job):
+    _, _, results = main_job
+    new = {p["name"]: p for p in results["controllers"]["cta"]["premises"]}
+    assert new["along_reference"]["holds"]
+    # METHODS.md: the chatter leaves the premise about 5.7-fold at T_s
+    assert 2 < new["on_trajectory"]["ratio"] < 12
+    assert "this run leaves the premise" in results["controllers"]["cta"]["headline"]
+    assert 0 < results["controllers"]["cta"]["largest_sampling_time"]
+    old = {p["name"]: p for p in results["published"]["cta"]["premises"]}
+    assert 200 < old["along_reference"]["ratio"] < 300
+
+
+def test_published_gains_reproduce_the_paper(main_job):
+    name, _, results = main_job
+    metrics = {k: v["metrics"] for k, v in results["published"].items()}
+    pressures = [m["rms_pressure"] for m in metrics.values()]
+    assert max(pressures) <= 1.1 * min(pressures)
+    if name == "real-fault":
+        # sections IV-A: e-LQR about 1 mm; natural event about twenty times 3.5e-3 m/s
+        assert metrics["elqr"]["max_slip_error"] == pytest.approx(1e-3, rel=0.1)
+        assert results["uncontrolled"]["metrics"]["peak_slip_rate"] == pytest.approx(20 * 3.5e-3, rel=0.1)
+
+
+def test_existing_results_need_force(main_job, capsys, monkeypatch):
+    name, folder, _ = main_job
+    monkeypatch.chdir(folder.parent)
+    code, _, err = run(capsys, "design", name)
+    assert code == 2
+    assert "--force" in err
+
+
+def test_a_stable_fault_is_designed_for(tmp_path, capsys):
+    import importlib.resources
+
+    text = (importlib.resources.files("quakedesign.fault") / "presets" / "lab-fault.toml").read_text()
+    text = text.replace("drop = 0.17", "drop = 0.01").replace('"lab-fault"', '"stable"').replace("1 hour", "10 s")
+    path = tmp_path / "stable.toml"
+    path.write_text(text)
+    code, out, _ = run(capsys, "design", str(path), "--out", str(tmp_path / "out"), "--json")
+    results = json.loads(out)
+    assert code == 0
+    assert not results["fault"]["unstable"]
+    assert results["published"] == {}
+    assert {v["verdict"] for v in results["controllers"].values()} == {"proved"}
+
+
+def test_fault_in_json_and_in_words(capsys):
+    code, out, _ = run(capsys, "fault", "real-fault", "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert found["natural_frequency"] == pytest.approx(0.6928, abs=1e-4)
+    assert found["magnitude"] == pytest.approx(5.79, abs=5e-3)
+    assert found["eigenvalues"][0] == pytest.approx([0.468, 0], abs=1e-3)
+    assert found["unstable"] is True
+    code, out, _ = run(capsys, "fault", "lab-fault")
+    assert code == 0
+    assert "127.6 rad/s" in out
+
+
+def test_derive_prints_equations(capsys):
+    code, out, _ = run(capsys, "derive", "real-fault", "--json")
+    assert code == 0
+    assert {"error_dynamics", "jacobian", "instability"} <= set(json.loads(out))
+    assert "\\hat{k}" in run(capsys, "derive", "real-fault", "--latex")[1]
+
+
+@pytest.mark.parametrize(("lipschitz", "verdict", "code"), [("1", "proved", 0), ("1.25", "refuted", 1)])
+def test_certify_answers_and_writes(capsys, tmp_path, lipschitz, verdict, code):
+    out = tmp_path / "c.json"
+    arguments = (
+        "certify",
+        "cta",
+        "--gains",
+        "7",
+        "5",
+        "2.3",
+        "1.1",
+        "--lipschitz",
+        lipschitz,
+        "--json",
+        "--out",
+        str(out),
+    )
+    found = run(capsys, *arguments)
+    assert found[0] == code
+    answer = json.loads(found[1])
+    assert (answer["verdict"], answer["lipschitz"]) == (verdict, {"1": "1", "1.25": "5/4"}[lipschitz])
+    assert run(capsys, "check", str(out))[0] == code
+    assert run(capsys, *arguments)[0] == 2
+
+
+def test_negative_gains_are_read_as_numbers(capsys):
+    code, out, _ = run(capsys, "certify", "cta", "--gains", "-7", "5", "-2.3", "1.1", "--lipschitz", "1")
+    assert code == 1
+    assert "undecided" in out or "refuted" in out
+
+
+def test_simulate_without_control_is_the_natural_earthquake(capsys, tmp_path):
+    import xarray
+
+    out = tmp_path / "run.nc"
+    code, text, _ = run(capsys, "simulate", "real-fault", "--json", "--out", str(out))
+    answer = json.loads(text)
+    assert code == 0
+    assert answer["metrics"]["peak_slip_rate"] == pytest.approx(0.07, rel=0.1)
+    with xarray.open_dataset(out, engine="h5netcdf") as stored:
+        assert stored.slip.attrs["units"] == "m"
+
+
+def test_an_invalid_certificate_is_an_answer(capsys, tmp_path):
+    path = tmp_path / "x.json"
+    path.write_text("{}")
+    code, out, _ = run(capsys, "check", str(path))
+    assert code == 1
+    assert "invalid" in out
+
+
+BAD = {
+    "no such preset": ("fault", "nowhere"),
+    "no such file": ("fault", "missing.toml"),
+    "no such controller": ("design", "real-fault", "--controller", "pid"),
+    "no such box": ("fault", "real-fault", "--box", "huge"),
+    "folder that cannot be written": ("design", "real-fault", "--out", "/proc/nothing/here"),
+    "missing parent": ("design", "real-fault", "--out", "no/such/parent"),
+    "not a number": ("certify", "cta", "--gains", "nan", "5", "2.3", "1.1", "--lipschitz", "1"),
+    "infinite bound": ("certify", "cta", "--gains", "7", "5", "2.3", "1.1", "--lipschitz", "inf"),
+    "too few gains": ("certify", "cta", "--gains", "7", "5", "--lipschitz", "1"),
+    "unknown law": ("certify", "pid", "--gains", "7", "5", "2", "1", "--lipschitz", "1"),
+    "unknown option": ("fault", "real-fault", "--colour", "red"),
+    "unknown command": ("earthquake",),
+    "missing certificate": ("check", "nothing.json"),
+    "nothing to check": ("check",),
+    "nothing to design": ("design",),
+    "bad step": ("simulate", "real-fault", "--controller", "cta", "--step", "-1"),
+    "bad scheme": ("simulate", "real-fault", "--controller", "cta", "--scheme", "magic"),
+    "gains of the wrong number": ("simulate", "real-fault", "--controller", "cta", "--gains", "1", "2"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line_and_code_two(case, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, *BAD[case])
+    lines = [line for line in err.splitlines() if line.strip()]
+    assert (code, out) == (2, "")
+    assert len(lines) == 1
+    assert lines[0].startswith("quakedesign: ")
+    assert "Traceback" not in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"2500 kg/m^3"', '"-2500 kg/m^3"', "density must be positive"),
+        ('"30 GPa"', '"30 GPaa"', "unit is unknown"),
+        ('"30 GPa"', '"30 m"', "another dimension"),
+        ('"30 GPa"', "30", "shear_modulus"),
+        ('"5 km"', '"nan km"', "length must be positive"),
+        ("residual = 0.2353", "residual = -1", "residual must be positive"),
+        ('law = "exponential-slip-weakening"', 'law = "magic"', "friction law must be one of"),
+        ("[task]", "[tasks]", "task"),
+        ('name = "real-fault"', "", "name"),
+        ("[friction]", "[friction", "TOML"),
+    ],
+)
+def test_bad_fault_files_are_one_line(old, new, said, capsys, tmp_path):
+    import importlib.resources
+
+    text = (importlib.resources.files("quakedesign.fault") / "presets" / "real-fault.toml").read_text()
+    assert old in text
+    path = tmp_path / "bad.toml"
+    path.write_text(text.replace(old, new, 1))
+    code, _, err = run(capsys, "fault", str(path))
+    assert code == 2
+    assert said in err
+    assert len(err.strip().splitlines()) == 1
