@@ -6,6 +6,7 @@ from fractions import Fraction
 
 from quakedesign.errors import ParameterError
 
+_DIGITS = 320
 _NUMBER = re.compile(r"[+-]?(\d+(/\d+)?|(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)")
 
 
@@ -36,7 +37,10 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
             f"{name} must be a finite number: a decimal, an exponent form or p/q. Received {text[:60]!r}. "
             "Write for example 2.3, 4.51e-4 or 23/10."
         )
-    return Fraction(text)
+    exact = Fraction(text)
+    if max(abs(exact.numerator), exact.denominator) >= 10**_DIGITS:
+        raise ParameterError(f"{name} must have at most {_DIGITS} digits. Received {text[:60]!r}.")
+    return exact
 
 
 def nearest(value: float, denominator: int) -> Fraction:

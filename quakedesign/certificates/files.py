@@ -293,10 +293,15 @@ def _plain(certificate: Certificate) -> dict[str, Any]:
 
 
 def save_certificate(certificate: Certificate, path: str | Path) -> None:
-    """Write a certificate file whole or not at all.
+    """Write a certificate file whole or not at all, and only if it can be read again.
 
     Raises
     ------
     OutputError
+        When the folder cannot be written.
+    CertificateError
+        When the certificate is beyond the limits of the format, such as numbers of more than 400 digits.
     """
-    write_whole(Path(path), certificate_text(certificate))
+    text = certificate_text(certificate)
+    parse_certificate(text)
+    write_whole(Path(path), text)

@@ -7,6 +7,7 @@ from functools import cached_property
 from itertools import product
 
 from quakedesign.certificates.claim import Loop, require, sympy_field
+from quakedesign.errors import CertificateError, KinkError
 from quakedesign.sos import Polynomial
 from quakedesign.symbolic.terms import Term, cell_polynomial, from_terms, lie_derivative, real_polynomial, to_terms
 
@@ -28,7 +29,10 @@ class Obligations:
     def derivative(self) -> tuple[Term, ...]:
         """Terms of V̇; refused unless V is C¹ and V̇ affine in every uncertain parameter."""
         symbols = self.loop.symbols
-        rate = lie_derivative(from_terms(self.lyapunov, symbols), sympy_field(self.loop))
+        try:
+            rate = lie_derivative(from_terms(self.lyapunov, symbols), sympy_field(self.loop))
+        except KinkError as error:
+            raise CertificateError(f"V is not continuously differentiable: {error}") from None
         terms = to_terms(rate, [symbols[s] for s in self.loop.states])
         twice = {p for t in terms for p in t.parameters if p in self.loop.uncertain and t.parameters.count(p) > 1}
         require(not twice, f"V̇ is not affine in {', '.join(sorted(twice))}; the ends of its range do not decide.")

@@ -7,7 +7,14 @@ from fractions import Fraction
 from functools import cache
 from itertools import pairwise
 
-from quakedesign.certificates import Certificate, Equilibrium, Loop
+from quakedesign.certificates import (
+    Certificate,
+    Equilibrium,
+    Loop,
+    Verdict,
+    certificate_text,
+    parse_certificate,
+)
 from quakedesign.certificates.obligations import Obligations, claimed
 from quakedesign.controllers import Controller
 from quakedesign.errors import CertificateError
@@ -138,8 +145,6 @@ def finish(
     loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fraction], scale: Sequence[Fraction]
 ) -> Certificate | None:
     """Find exact witnesses for every obligation of a given V; None when one is missing."""
-    from quakedesign.certificates import Verdict
-
     witnesses: dict[str, Witness] = {}
     known = set()
     try:
@@ -154,7 +159,8 @@ def finish(
                 return None
             witnesses[name] = witness
         certificate = Certificate(loop=loop, lyapunov=lyapunov, claims=dict(claims), witnesses=witnesses)
-        return certificate if certificate.check() is Verdict.PROVED else None
+        readable = parse_certificate(certificate_text(certificate)) == certificate
+        return certificate if readable and certificate.check() is Verdict.PROVED else None
     except CertificateError:
         return None
 

@@ -31,9 +31,8 @@ def test_a_monomial_multiplier_counts_only_on_the_orthant():
     assert not proves({(3, 0): F(1)}, witness, orthant=False)
 
 
-def test_motzkin_times_its_denominator_is_proved():
-    # (x² + y²)·M is a sum of squares, M = x⁴y² + x²y⁴ + z⁶ − 3x²y²z² (Motzkin 1967); here the simpler AM-GM form
-    # on the orthant: a³ + b³ + c³ − 3abc = ½(a + b + c)((a−b)² + (b−c)² + (c−a)²), strictly positive after + ε(a³+b³+c³).
+def test_the_am_gm_inequality_is_proved_on_the_orthant():
+    # a³ + b³ + c³ − 3abc = ½(a + b + c)((a−b)² + (b−c)² + (c−a)²), made strict by + ε(a³ + b³ + c³)
     epsilon = F(1, 10)
     p = {(3, 0, 0): 1 + epsilon, (0, 3, 0): 1 + epsilon, (0, 0, 3): 1 + epsilon, (1, 1, 1): F(-3)}
     half = F(1, 2)
@@ -45,7 +44,7 @@ def test_motzkin_times_its_denominator_is_proved():
         gram[[0, 3, 5][i]] += epsilon
         blocks.append(Block(times=times, basis=((1, 0, 0), (0, 1, 0), (0, 0, 1)), gram=tuple(gram)))
     witness = Witness(multiplier={(0, 0, 0): F(1)}, blocks=tuple(blocks))
-    assert not any(positive_definite(full_matrix(spread, 3)) for _ in "x")
+    assert not positive_definite(full_matrix(spread, 3))
     assert proves(p, witness, orthant=True)
 
 

@@ -1,0 +1,103 @@
+"""Comparisons: headlines say what holds and what does not; figures and pages have units."""
+
+from dataclasses import replace
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.certificates import Verdict
+from quakedesign.certificates.premises import Premise
+from quakedesign.errors import OutputError
+from quakedesign.fault import Reference
+from quakedesign.report import Entry, headline
+from quakedesign.report.folder import write_folder
+from quakedesign.report.tables import COLUMNS, rows
+from quakedesign.synthesis import Design
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    """The laboratory fault with a task of 20 s, so that all runs are short."""
+    fault = qd.load_fault("lab-fault")
+    fault = replace(fault, reference=Reference(target_slip=fault.reference.target_slip, operation_time=20.0))
+    return qd.compare(fault, [qd.design(fault, "cta"), qd.design(fault, "elqr")])
+
+
+def test_all_controllers_of_the_paper_and_all_designs_are_compared(comparison):
+    labels = [e.label for e in comparison.entries]
+    assert labels == [
+        "2-CTA (published)",
+        "2-DIA (published)",
+        "e-LQR (published)",
+        "2-CTA (designed)",
+        "e-LQR (designed)",
+    ]
+
+
+def test_every_row_of_the_table_fits_its_columns(comparison):
+    found = rows(comparison)
+    assert len(found) == 6
+    assert {len(row) for row in found} == {len(COLUMNS)}
+    assert found[0][0] == "uncontrolled"
+
+
+def test_every_axis_of_every_figure_has_a_label_with_a_unit(comparison):
+    figures = comparison.figures()
+    assert set(figures) == {"uncontrolled", "states", "pressure", "errors", "metrics"}
+    for name, figure in figures.items():
+        for axis in figure.axes:
+            labelled = axis.get_ylabel() if name != "metrics" else axis.get_xlabel()
+            assert "[" in labelled, name
+        assert any("[" in axis.get_xlabel() for axis in figure.axes)
+
+
+def test_the_folder_appears_whole_and_is_not_overwritten(comparison, tmp_path):
+    out = tmp_path / "results"
+    write_folder(comparison, out, force=False)
+    assert (out / "results.json").is_file()
+    with pytest.raises(OutputError, match="--force"):
+        write_folder(comparison, out, force=False)
+    write_folder(comparison, out, force=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["results"]
+
+
+def test_a_failure_while_writing_leaves_nothing_behind(comparison, tmp_path, monkeypatch):
+    monkeypatch.setattr("quakedesign.report.page.page_html", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_folder(comparison, tmp_path / "results", force=False)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_without_results_is_never_replaced(comparison, tmp_path):
+    (tmp_path / "precious").mkdir()
+    with pytest.raises(OutputError, match="only a folder with results"):
+        write_folder(comparison, tmp_path / "precious", force=True)
+
+
+def entry(verdict, *premises, controller="a controller", **more):
+    design = Design(
+        fault=None, name="cta", verdict=verdict, controller=controller, certificate=None, premises=tuple(premises)
+    )
+    return Entry(label="x", origin="designed", design=design, run=None, **more)
+
+
+def test_a_broken_premise_is_said_with_its_factor():
+    chatter = Premise(name="on_trajectory", required=5.7, certified=1.0, unit="m/s^3", measured=True)
+    said = headline(entry(Verdict.PROVED, chatter, largest_step=0.012))
+    assert said == (
+        "proved in continuous time; this run leaves the premise on |h'| 5.7-fold; "
+        "the largest T_s for which the run does not is about 0.012 s"
+    )
+
+
+def test_when_all_premises_hold_it_says_so():
+    fine = Premise(name="along_reference", required=0.5, certified=1.0, unit="m/s^3")
+    assert headline(entry(Verdict.PROVED, fine)) == "proved in continuous time; every premise holds"
+
+
+def test_no_gains_with_a_proof_is_undecided():
+    assert headline(entry(Verdict.UNDECIDED, controller=None)).startswith("undecided")
+
+
+def test_an_unstable_step_is_shouted():
+    assert "UNSTABLE at the step used" in headline(entry(Verdict.PROVED, growth_per_step=1.2))
