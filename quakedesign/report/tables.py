@@ -9,12 +9,12 @@ if TYPE_CHECKING:
 COLUMNS = (
     "controller",
     "verdict",
-    "max slip error [m]",
-    "max rate error [m/s]",
-    "RMS pressure [Pa]",
-    "pressure variation [Pa]",
-    "peak slip rate [m/s]",
-    "reverse slip [-]",
+    "slip error [m]",
+    "rate error [m/s]",
+    "RMS of p [Pa]",
+    "path of p [Pa]",
+    "peak rate [m/s]",
+    "back slip",
 )
 _METRICS = (
     "max_slip_error",
@@ -27,11 +27,24 @@ _METRICS = (
 
 
 def rows(comparison: "Comparison") -> list[tuple[str, ...]]:
-    """One row a controller under `COLUMNS`; errors count after a quarter of the task, a dash means not applicable."""
+    """One row a controller under `COLUMNS`, narrow enough for 80 columns; a dash means not applicable.
+
+    Largest errors, RMS and total variation (path) of the pressure and the share of reverse slip count after a quarter
+    of the task, the peak slip rate over all of it.
+    """
     runs: list[tuple[str, str, Trajectory | None]] = [("uncontrolled", "", comparison.uncontrolled)]
     runs += [(e.label, str(e.design.verdict), e.run) for e in comparison.entries]
     found = []
     for label, verdict, run in runs:
-        values = [getattr(run.metrics, name) if run else None for name in _METRICS]
-        found.append((label, verdict, *("–" if v is None else f"{v:.3g}" for v in values)))
+        values = {name: getattr(run.metrics, name) if run else None for name in _METRICS}
+        found.append(
+            (
+                label,
+                verdict,
+                *(
+                    "–" if v is None else f"{v:.2f}" if name == "reverse_slip_fraction" else f"{v:.2e}"
+                    for name, v in values.items()
+                ),
+            )
+        )
     return found

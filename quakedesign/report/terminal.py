@@ -26,12 +26,13 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
         console.print(f"  gains: {gains or 'none'}", markup=False)
         for premise in entry.design.premises:
             console.print(f"  {_line(premise)}", markup=False)
-    table = Table(
-        *map(escape, COLUMNS), title="\nclosed loop; errors after a quarter of the task", title_justify="left"
-    )
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    for i, (column, width) in enumerate(zip(COLUMNS, (17, 9, 8, 8, 8, 8, 8, 4), strict=True)):
+        table.add_column(escape(column), justify="left" if i < 2 else "right", width=width)
     for row in rows(comparison):
         table.add_row(*row)
-    console.print(table, soft_wrap=False, width=max(console.width, 150))
+    console.print("\n[bold]closed loop[/bold], errors after a quarter of the task")
+    console.print(table, soft_wrap=False)
 
 
 def _line(premise: "Premise") -> str:
