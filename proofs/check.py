@@ -127,8 +127,13 @@ def parse(text: str) -> Any:
     depth = max(accumulate((1 if bracket in "[{" else -1 for bracket in brackets), initial=0))
     need(depth <= MAX_NESTING, "nesting", f"at most {MAX_NESTING} deep", depth)
     try:
-        return json.loads(text, parse_float=refuse_number, parse_constant=refuse_number,
-                          parse_int=read_integer, object_pairs_hook=read_pairs)
+        return json.loads(
+            text,
+            parse_float=refuse_number,
+            parse_constant=refuse_number,
+            parse_int=read_integer,
+            object_pairs_hook=read_pairs,
+        )
     except (ValueError, RecursionError) as error:
         raise Refused(f"the file must be JSON: {ascii(str(error))[:80]}") from None
 
@@ -338,9 +343,7 @@ def time_derivative(function: list[Term], loop: Loop, budget: Budget) -> SignedS
     return total
 
 
-def restrict(
-    function: SignedSum, signs: Exponents, values: dict[str, Fraction], budget: Budget
-) -> Polynomial:
+def restrict(function: SignedSum, signs: Exponents, values: dict[str, Fraction], budget: Budget) -> Polynomial:
     """Write a function as a polynomial in u on one cell at one vertex (in x on reals, with all signs +)."""
     total: Polynomial = {}
     for (uncertain, exponents, odd), number in function.items():

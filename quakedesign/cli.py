@@ -45,7 +45,8 @@ def _progress() -> Iterator[Callable[[str, float], None]]:
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     columns = TextColumn("{task.description:44}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("starting", total=1.0)
 
         def tell(what: str, done: float) -> None:
@@ -81,6 +82,13 @@ def fault(fault: str, /, *, box: str | None = None, json: Json = False) -> int:
     return 0
 
 
+def _plain(expression: Any) -> str:
+    """Text of a SymPy expression with its LaTeX names made plain, such as k_hat."""
+    import re
+
+    return re.sub(r"\\hat\{\\?(\w+)\}", r"\1_hat", str(expression)).replace("\\", "")
+
+
 @app.command
 def derive(fault: str, /, *, latex: Annotated[bool, Parameter(negative="")] = False, json: Json = False) -> int:
     """Derive the equations of a fault from its force balance.
@@ -100,8 +108,8 @@ def derive(fault: str, /, *, latex: Annotated[bool, Parameter(negative="")] = Fa
     from quakedesign.symbolic import derive as derive_model
 
     model = derive_model(load_fault(fault))
-    write = sp.latex if latex else str
-    found = {
+    write = sp.latex if latex else _plain
+    found: dict[str, Any] = {
         "error_dynamics": {"beta": write(model.error_dynamics.beta), "h": write(model.error_dynamics.h)},
         "jacobian": write(model.jacobian),
         "instability": write(model.instability),
@@ -111,9 +119,11 @@ def derive(fault: str, /, *, latex: Annotated[bool, Parameter(negative="")] = Fa
         _print(found)
         return 0
     console = _console()
-    lines = {"e1' = e2, e2' = beta (nu + h)": "", **found["error_dynamics"]}  # type: ignore[dict-item]
-    for name, text in (lines | {k: found[k] for k in ("jacobian", "instability", "unstable")}).items():
-        console.print(f"[bold]{name}[/bold] {text}", markup=True)
+    console.print("e1' = e2, e2' = beta (nu + h)", markup=False)
+    for name in ("beta", "h"):
+        console.print(f"{name} = {found['error_dynamics'][name]}", markup=False)
+    for name in ("jacobian", "instability", "unstable"):
+        console.print(f"{name}: {found[name]}", markup=False)
     return 0
 
 
@@ -244,9 +254,9 @@ def certify(
     if json:
         _print(found)
     else:
-        _console().print(
-            f"{found['verdict']}: {law} {' '.join(gains)}, |h'| <= {lipschitz}, beta in {list(gain_range)}"
-        )
+        low, high = gain_range
+        line = f"{found['verdict']}: {law} {' '.join(gains)}, |h'| <= {lipschitz}, beta from {low} to {high}"
+        _console().print(line, markup=False)
     return 0 if found["verdict"] == "proved" else 1
 
 

@@ -1,12 +1,19 @@
 """Re-checking files for people: a verdict and what exactly was verified."""
 
 from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 
 from quakedesign.certificates.claim import Certificate, Verdict
 from quakedesign.certificates.files import load_certificate
 from quakedesign.certificates.linear_premises import sectors
-from quakedesign.certificates.premises import coefficient_range, least_authority
+from quakedesign.certificates.premises import (
+    Errors,
+    certified_lipschitz,
+    coefficient_range,
+    largest_matched_rate,
+    least_authority,
+)
 from quakedesign.errors import CertificateError
 from quakedesign.fault import Fault, load_fault
 from quakedesign.symbolic.terms import from_terms
@@ -32,26 +39,34 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
     try:
         certificate = load_certificate(path)
         verdict = certificate.check()
-        if fault is not None and verdict is Verdict.PROVED:
-            _covers(certificate, fault)
+        more = _covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []
     except CertificateError as error:
         return f"invalid: {' '.join(str(error).split())}", []
-    return str(verdict), statement(certificate)
+    return str(verdict), [*statement(certificate), *more]
 
 
-def _covers(certificate: Certificate, fault: Fault) -> None:
-    """Refuse a certificate whose constants or ranges do not cover a fault (designed gains, divisor μ_res·N̂_min)."""
-    loop = certificate.loop
+def _covers(certificate: Certificate, fault: Fault) -> list[str]:
+    """Refuse a certificate whose constants or ranges do not cover a fault (designed gains, divisor μ_res·N̂_min).
+
+    A sliding mode's certificate is about the base gains; the scale λ that the fault needs is said.
+    """
+    loop, said = certificate.loop, [f"covers {certificate.loop.law} on {fault.name}, box {fault.box.name}"]
     if loop.domain == "reals":
         needed = sectors(fault)
         if loop.constants != {"b": needed.authority}:
             raise CertificateError(f"the control authority is not that of {fault.name}")
         ranges = needed.ranges()
     else:
-        ranges = {"beta": coefficient_range(fault, least_authority(fault))}
+        divisor = least_authority(fault)
+        ranges = {"beta": coefficient_range(fault, divisor)}
+        zero = Errors(slip=Fraction(0), rate=Fraction(0), acceleration=Fraction(0))
+        rate = largest_matched_rate(fault, divisor, zero)
+        least = float(rate / certified_lipschitz(certificate))
+        said.append(f"|h'| <= {float(rate):.4g} m/s^3 along the reference needs a scale of at least {least:.4g}")
     for name, (low, high) in ranges.items():
         if not loop.uncertain[name][0] <= low <= high <= loop.uncertain[name][1]:
             raise CertificateError(f"the certified range of {name} does not cover {fault.name}")
+    return said
 
 
 def statement(certificate: Certificate) -> list[str]:

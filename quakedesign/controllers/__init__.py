@@ -41,7 +41,18 @@ def control_law(name: str) -> type[Controller]:
 
 
 def published(fault_name: str) -> dict[str, Controller]:
-    """Controllers with the gains that the paper prints for a preset fault; empty for any other fault."""
+    """Controllers with the gains that the paper prints for a preset fault.
+
+    Parameters
+    ----------
+    fault_name : str
+        ``"real-fault"`` or ``"lab-fault"``; there are none for any other fault.
+
+    Returns
+    -------
+    dict of str to Controller
+        By name of the law; gains in the units of the law, divisor that of the laboratory fault.
+    """
     data = tomllib.loads((files(__name__) / "published.toml").read_text(encoding="utf-8"))
     found: dict[str, Controller] = {}
     for name, entry in data.get(fault_name, {}).items() if fault_name in ("real-fault", "lab-fault") else ():

@@ -160,7 +160,7 @@ def _build(scenario: Any, name: str) -> Fault:
 
 def _friction(entries: dict[str, Any]):
     if not isinstance(entries.get("law"), str):
-        raise ScenarioError("friction.law must name a friction law. Received none. Add law = \"…\".")
+        raise ScenarioError('friction.law must name a friction law. Received none. Add law = "…".')
     law = friction_law(entries.pop("law"))
     expected = {f.name: f.metadata["unit"] for f in fields(law)}  # type: ignore[arg-type]
     if set(entries) != set(expected):
@@ -172,7 +172,13 @@ def _friction(entries: dict[str, Any]):
 
 
 def _disturbance(entries: Any) -> Disturbance:
-    units = {"constant": "m/s^2", "amplitude": "m/s^2", "frequency": "rad/s", "slip_growth": "1/s^2", "rate_growth": "1/s"}
+    units = {
+        "constant": "m/s^2",
+        "amplitude": "m/s^2",
+        "frequency": "rad/s",
+        "slip_growth": "1/s^2",
+        "rate_growth": "1/s",
+    }
     return Disturbance(**{k: si_value(getattr(entries, k), u, f"disturbance.{k}") for k, u in units.items()})
 
 

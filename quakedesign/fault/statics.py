@@ -30,4 +30,6 @@ def rest_slip(fault: "Fault") -> float:
         return 0.0
     after = next(i for i, slip in enumerate(grid) if i and drive(slip) <= 0)
     before = grid[after - 1] if after > 1 else grid[1] / _SCAN
-    return float(mpmath.findroot(drive, (before, grid[after]), solver="anderson", tol=1e-36, maxsteps=100, verify=False))
+    return float(
+        mpmath.findroot(drive, (before, grid[after]), solver="anderson", tol=1e-36, maxsteps=100, verify=False)
+    )

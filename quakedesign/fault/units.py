@@ -50,7 +50,9 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
         parsed = _registry().Quantity(quantity)
         return float(parsed.to(unit or "dimensionless").magnitude)
     except pint.UndefinedUnitError:
-        raise UnitError(f"{name} must be {wanted}. Received {quantity!r}, whose unit is unknown. Check its spelling.") from None
+        raise UnitError(
+            f"{name} must be {wanted}. Received {quantity!r}, whose unit is unknown. Check its spelling."
+        ) from None
     except pint.DimensionalityError:
         raise UnitError(f"{name} must be {wanted}. Received {quantity!r}, which has another dimension.") from None
     except Exception:

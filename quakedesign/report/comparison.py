@@ -7,7 +7,7 @@ from typing import Any
 
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
-from quakedesign.certificates.premises import certified_lipschitz
+from quakedesign.certificates.premises import Domain, certified_lipschitz
 from quakedesign.controllers import SlidingMode, published
 from quakedesign.fault import Fault
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
@@ -182,13 +182,31 @@ def headline(entry: Entry) -> str:
     if design.verdict is Verdict.PROVED and all(p.holds for p in design.premises):
         parts.append("every premise holds")
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
-        parts.append(f"the largest T_s for which the run does not is about {entry.largest_step:g} s")
+        parts.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
     if entry.growth_per_step is not None:
         stable = "stable" if entry.growth_per_step < 1 else "UNSTABLE"
         parts.append(f"{stable} at the step used")
-    if entry.run is not None and "diverged" in entry.run.events:
-        parts.append(f"the run diverges at {entry.run.events['diverged']:.4g} s")
-    return "; ".join(parts)
+    return "; ".join([*parts, *_happened(entry.run)])
+
+
+def domain_sentence(domain: Domain) -> str:
+    """Where the premise on |h'| is certified together with the control's own part."""
+    if domain.level == 0:
+        return "certified domain: empty, the control's own part of h' exceeds the bound (ERRATA 16)"
+    return f"certified domain: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s"
+
+
+def _happened(run: Trajectory | None) -> list[str]:
+    """Events of a run that leave the model."""
+    found = []
+    if run is not None and "diverged" in run.events:
+        found.append(f"the run diverges at {run.events['diverged']:.4g} s")
+    if run is not None and "opening" in run.events:
+        found.append(f"the fault opens (p >= σ') at {run.events['opening']:.4g} s")
+    if run is not None and run.metrics.reverse_slip_fraction:
+        share = run.metrics.reverse_slip_fraction
+        found.append(f"the slip rate is negative, outside the model, in {100 * share:.3g} % of the steps")
+    return found
 
 
 def _holds(premises: Iterable[Any], name: str) -> bool:

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.report.comparison import headline
-from quakedesign.report.tables import COLUMNS, rows
+from quakedesign.report.comparison import domain_sentence, headline
+from quakedesign.report.tables import COLUMNS, FOOTNOTE, rows
 
 if TYPE_CHECKING:
     from quakedesign.report.comparison import Comparison
@@ -24,15 +24,17 @@ img{max-width:100%}code{background:#f3f3f3;padding:0 .2rem}</style></head><body>
 <h2>The fault</h2><ul>{% for line in facts %}<li>{{ line }}</li>{% endfor %}</ul>
 <h2>Comparison</h2>"""
     + _TABLE
-    + """<p>Errors count after a quarter of the task. Scheme <code>continuous</code>: the law is evaluated in every
-Runge–Kutta stage.</p><h2>What is proved, and under which premises</h2>
+    + """<p>{{ footnote }}. Errors count after a quarter of the task. Scheme <code>continuous</code>: the law is evaluated
+in every Runge–Kutta stage.</p><h2>What is proved, and under which premises</h2>
 {% for e in entries %}<h3>{{ e.label }}</h3><p>{{ headline(e) }}.</p>
 <p>Gains: {% for n, v in e.design.gains.items() %}<code>{{ n }} = {{ number(v) }}</code> {% endfor %}</p>
-<table><thead><tr><th>premise</th><th>note</th><th>required</th><th>certified</th><th>ratio</th><th>holds</th></tr></thead>
+<table><thead><tr><th>premise</th><th>note</th><th>required</th><th>certified</th><th>ratio</th>
+<th>holds</th></tr></thead>
 <tbody>{% for p in e.design.premises %}<tr><td>{{ p.name }}</td><td>{{ p.note }}</td>
 <td>{{ "%.4g"|format(p.required) }} {{ p.unit }}</td><td>{{ "%.4g"|format(p.certified) }} {{ p.unit }}</td>
 <td>{{ "–" if p.ratio is none else "%.3g"|format(p.ratio) }}</td><td>{{ "yes" if p.holds else "no" }}</td></tr>
-{% endfor %}</tbody></table>{% endfor %}
+{% endfor %}</tbody></table>
+{% if e.design.domain %}<p>{{ domain(e.design.domain) }}.</p>{% endif %}{% endfor %}
 <h2>Figures</h2>{% for name in figures %}<p><img src="figures/{{ name }}.png" alt="{{ name }}"></p>{% endfor %}
 <p>Certificates: <code>certificates/*.json</code>; re-check with <code>quakedesign check</code>.</p></body></html>
 """
@@ -62,6 +64,8 @@ def page_html(comparison: "Comparison", facts: Iterable[str], figures: Iterable[
             rows=rows(comparison),
             entries=comparison.entries,
             headline=headline,
+            domain=domain_sentence,
+            footnote=FOOTNOTE,
             number=lambda v: f"{float(v):.6g}",
             figures=list(figures),
         )

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Comparison
+    from quakedesign.report.comparison import Comparison, Entry
     from quakedesign.simulation import Trajectory
 
 COLUMNS = (
@@ -26,6 +26,14 @@ _METRICS = (
 )
 
 
+FOOTNOTE = "* a premise of the proof does not hold for this task or run; see the headline"
+
+
+def _verdict(entry: "Entry") -> str:
+    broken = str(entry.design.verdict) == "proved" and not all(p.holds for p in entry.design.premises)
+    return f"{entry.design.verdict}{'*' if broken else ''}"
+
+
 def rows(comparison: "Comparison") -> list[tuple[str, ...]]:
     """One row a controller under `COLUMNS`, narrow enough for 80 columns; a dash means not applicable.
 
@@ -33,7 +41,7 @@ def rows(comparison: "Comparison") -> list[tuple[str, ...]]:
     of the task, the peak slip rate over all of it.
     """
     runs: list[tuple[str, str, Trajectory | None]] = [("uncontrolled", "", comparison.uncontrolled)]
-    runs += [(e.label, str(e.design.verdict), e.run) for e in comparison.entries]
+    runs += [(e.label, _verdict(e), e.run) for e in comparison.entries]
     found = []
     for label, verdict, run in runs:
         values = {name: getattr(run.metrics, name) if run else None for name in _METRICS}

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 from rich.table import Table
 
-from quakedesign.report.comparison import Comparison, headline
+from quakedesign.report.comparison import Comparison, domain_sentence, headline
 from quakedesign.report.facts import fault_sentences
-from quakedesign.report.tables import COLUMNS, rows
+from quakedesign.report.tables import COLUMNS, FOOTNOTE, rows
 
 if TYPE_CHECKING:
     from quakedesign.certificates.premises import Premise
@@ -26,6 +26,8 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
         console.print(f"  gains: {gains or 'none'}", markup=False)
         for premise in entry.design.premises:
             console.print(f"  {_line(premise)}", markup=False)
+        if entry.design.domain is not None:
+            console.print(f"  {domain_sentence(entry.design.domain)}", markup=False)
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     for i, (column, width) in enumerate(zip(COLUMNS, (17, 9, 8, 8, 8, 8, 8, 4), strict=True)):
         table.add_column(escape(column), justify="left" if i < 2 else "right", width=width)
@@ -33,6 +35,7 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
         table.add_row(*row)
     console.print("\n[bold]closed loop[/bold], errors after a quarter of the task")
     console.print(table, soft_wrap=False)
+    console.print(FOOTNOTE, markup=False)
 
 
 def _line(premise: "Premise") -> str:

@@ -59,9 +59,7 @@ def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) ->
     return _translate(expressions, values, _numpy_operations())
 
 
-def _translate(
-    expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], table: Operations
-) -> list[Any]:
+def _translate(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], table: Operations) -> list[Any]:
     known: dict[sp.Basic, Any] = dict(values)
 
     def walk(node: sp.Basic) -> Any:
@@ -102,9 +100,7 @@ def _fold(node: Any, walk: Callable[[Any], Any]) -> Any:
 
 def _branches(node: Any, table: Operations, walk: Callable[[Any], Any]) -> Any:
     if node.args[-1][1] != sp.true:
-        raise ParameterError(
-            f"the last branch of a piecewise expression must hold otherwise. Received {node}."
-        )
+        raise ParameterError(f"the last branch of a piecewise expression must hold otherwise. Received {node}.")
     result = walk(node.args[-1][0])
     for value, condition in reversed(node.args[:-1]):
         result = table[sp.Piecewise](walk(condition), walk(value), result)
@@ -132,9 +128,7 @@ def _powers(library: Any) -> dict[Any, Any]:
     def absolute(x: Any, a: sp.Expr) -> Any:
         return _power(library, library.fabs(x), a)
 
-    elementary = {
-        getattr(sp, name): getattr(library, name) for name in ("exp", "log", "sin", "cos", "tan", "tanh")
-    }
+    elementary = {getattr(sp, name): getattr(library, name) for name in ("exp", "log", "sin", "cos", "tan", "tanh")}
     return {
         SignedPower: signed,
         AbsolutePower: absolute,

@@ -14,7 +14,7 @@ from quakedesign.rationals import rational
 t = sp.Symbol("t", nonnegative=True)
 x1, x2 = sp.symbols("x_1 x_2", real=True)
 p = sp.Symbol("p", real=True)
-m, k, A, eta, sigma = sp.symbols(r"m k A eta \sigma_n'", positive=True)
+m, k, A, eta, sigma = sp.symbols(r"m k A eta \sigma'_n", positive=True)
 k_hat, eta_hat, N_hat = sp.symbols(r"\hat{k} \hat{\eta} \hat{N}", positive=True)
 mu_star = sp.Symbol(r"\mu^*", positive=True)
 divisor = sp.Symbol(r"\mu_0\hat{N}_0", positive=True)
@@ -69,9 +69,7 @@ def shifted_acceleration() -> sp.Expr:
     )
     hats = {A: N_hat * m, k: k_hat * m, eta: eta_hat * m}
     f = sp.expand(sp.simplify(origin.subs(hats)))
-    return sum(
-        (sp.factor(sp.collect(part, N_hat)) for part in _by_kind(f)), start=sp.Integer(0)
-    )
+    return sum((sp.factor(sp.collect(part, N_hat)) for part in _by_kind(f)), start=sp.Integer(0))
 
 
 def _by_kind(f: sp.Expr) -> list[sp.Expr]:

@@ -44,7 +44,8 @@ def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ..
     for part in sp.Add.make_args(sp.expand(expression)):
         coefficient, parameters, powers = _split(part, order)
         factors = tuple(
-            (state.name, exponent, kind) for state, (exponent, kind) in sorted(powers.items(), key=lambda i: order[i[0]])
+            (state.name, exponent, kind)
+            for state, (exponent, kind) in sorted(powers.items(), key=lambda i: order[i[0]])
         )
         key = (tuple(sorted(parameters)), factors)
         collected[key] = collected.get(key, Fraction(0)) + coefficient

@@ -86,7 +86,7 @@ def test_a_broken_premise_is_said_with_its_factor():
     said = headline(entry(Verdict.PROVED, chatter, largest_step=0.012))
     assert said == (
         "proved in continuous time; this run leaves the premise on |h'| 5.7-fold; "
-        "the largest T_s for which the run does not is about 0.012 s"
+        "it would stay inside for T_s up to about 0.012 s"
     )
 
 

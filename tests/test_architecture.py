@@ -1,0 +1,209 @@
+"""The structure that DESIGN.md and CONTRIBUTING.md promise: imports, start-up, docstrings."""
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import pkgutil
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import quakedesign
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "quakedesign"
+EVERYWHERE = {"quakedesign.errors", "quakedesign.rationals", "quakedesign.output"}
+BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "certificates", "simulation")
+MAY_IMPORT = {
+    "fault": (),
+    "symbolic": ("fault",),
+    "sos.exact": (),
+    "sos.solve": ("sos.exact",),
+    "sos": ("sos.exact",),  # the package itself hands on the deciding part only
+    "controllers": ("fault", "symbolic"),
+    "certificates": ("fault", "symbolic", "controllers", "sos", "sos.exact"),
+    "simulation": ("fault", "symbolic", "controllers"),
+    "synthesis": BELOW,
+    "report": (*BELOW, "synthesis"),
+    "cli": (*BELOW, "synthesis", "report"),
+    "__main__": ("cli",),
+    "__init__": (),
+    "errors": (),
+    "rationals": (),
+    "output": (),
+}
+SOLVERS = {"cvxpy", "clarabel", "scs", "osqp", "ecos", "mosek", "scipy", "control", "casadi"}
+HEAVY = {
+    *("sympy", "numpy", "scipy", "cvxpy", "clarabel", "casadi", "control", "matplotlib", "pint", "pydantic"),
+    *("pandas", "xarray", "h5netcdf", "flint", "jinja2", "mpmath", "dask"),
+}
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+
+def module_name(path):
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" and len(parts) > 2 else parts)
+
+
+def room(module):
+    """Room of a module or of an imported name: the longest name in the table of rooms."""
+    parts = module.split(".")[1:]
+    for length in (2, 1):
+        if ".".join(parts[:length]) in MAY_IMPORT:
+            return ".".join(parts[:length])
+    raise AssertionError(f"{module} is in no room of DESIGN.md")
+
+
+def imports(path):
+    """Every absolute name that a file imports anywhere, functions and ``import_module`` with a text included."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path.name}:{node.lineno} imports relatively"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) in (
+            "import_module",
+            "__import__",
+        ):
+            yield from (a.value for a in node.args[:1] if isinstance(a, ast.Constant))
+
+
+def third_party(path):
+    roots = {name.split(".")[0] for name in imports(path)}
+    return roots - sys.stdlib_module_names - {"quakedesign"}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=module_name)
+def test_rooms_import_only_what_the_design_allows(path):
+    home = room(module_name(path))
+    own = [name for name in imports(path) if name.split(".")[0] == "quakedesign"]
+    names = [name for name in own if ".".join(name.split(".")[:2]) not in EVERYWHERE]
+    assert {room(name) for name in names} <= {home, *MAY_IMPORT[home]}
+
+
+@pytest.mark.parametrize(
+    ("source", "ok"),
+    [
+        ("fault/x.py: from quakedesign.symbolic import plant", False),
+        ("certificates/x.py: from quakedesign.sos.solve.cone import Cone", False),
+        ("certificates/x.py: from quakedesign.sos import solve", False),
+        ("certificates/x.py: from quakedesign.sos import Witness", True),
+        ("sos/exact/x.py: from quakedesign.sos.solve import search", False),
+        ("sos/solve/x.py: from quakedesign.sos.exact.witness import Witness", True),
+        ("synthesis/x.py: from quakedesign.sos.solve import search", True),
+        ("synthesis/x.py: from quakedesign.report import compare", False),
+        ("simulation/x.py: import quakedesign.certificates.claim", False),
+    ],
+)
+def test_the_rule_itself_tells_good_from_bad(source, ok, tmp_path, monkeypatch):
+    where, line = source.split(": ")
+    monkeypatch.setitem(globals(), "PACKAGE", tmp_path / "quakedesign")
+    path = tmp_path / "quakedesign" / where
+    path.parent.mkdir(parents=True)
+    path.write_text(f"def late():\n    {line}\n", encoding="utf-8")
+    if ok:
+        test_rooms_import_only_what_the_design_allows(path)
+    else:
+        with pytest.raises(AssertionError):
+            test_rooms_import_only_what_the_design_allows(path)
+
+
+@pytest.mark.parametrize(
+    "path", [*sorted((PACKAGE / "certificates").glob("*.py")), *sorted((PACKAGE / "sos/exact").glob("*.py"))],
+    ids=module_name,
+)  # fmt: skip
+def test_what_decides_knows_no_solver_and_no_floating_point_library(path):
+    assert third_party(path) <= {"sympy", "flint"}
+
+
+def test_only_the_search_knows_the_solvers():
+    users = {room(module_name(p)) for p in SOURCES if third_party(p) & {"cvxpy", "clarabel"}}
+    assert users <= {"sos.solve", "synthesis"}
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "proofs").glob("*.py")), ids=lambda p: p.name)
+def test_proofs_never_import_a_solver(path):
+    assert not third_party(path) & SOLVERS
+
+
+def test_the_independent_checker_needs_the_standard_library_only():
+    assert {name.split(".")[0] for name in imports(ROOT / "proofs" / "check.py")} <= sys.stdlib_module_names
+
+
+def loaded_by(*arguments):
+    """Packages that a fresh interpreter loads, and what it prints."""
+    call = [sys.executable, "-X", "importtime", *arguments]
+    done = subprocess.run(call, capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL)
+    found = re.findall(r"^import time:.*\|\s*([\w.]+)$", done.stderr, flags=re.MULTILINE)
+    assert "re" in found
+    return {name.split(".")[0] for name in found}, done.stdout
+
+
+def test_help_and_import_load_no_heavy_library():
+    loaded, printed = loaded_by("-m", "quakedesign", "--help")
+    assert "design" in printed
+    assert not loaded & HEAVY
+    assert not loaded_by("-c", "import re, quakedesign")[0] & (HEAVY | {"cyclopts", "rich"})
+
+
+def test_loading_all_that_decides_loads_no_solver():
+    modules = [module_name(p) for p in (PACKAGE / "certificates").glob("*.py")]
+    loaded, _ = loaded_by("-c", "import re, " + ", ".join(m.removesuffix(".__init__") for m in modules))
+    assert not loaded & SOLVERS
+
+
+def exported():
+    """Every function and class in an ``__all__``, once, by where it lives."""
+    found = {}
+    for info in pkgutil.walk_packages(quakedesign.__path__, "quakedesign."):
+        if info.name.endswith("__main__"):
+            continue
+        module = importlib.import_module(info.name)
+        for name in getattr(module, "__all__", ()):
+            item = getattr(module, name)
+            if inspect.isfunction(item) or inspect.isclass(item):
+                found[f"{item.__module__}.{item.__qualname__}"] = item
+    return found
+
+
+def section(item, title):
+    """Names in one numpydoc section, in order; ``a, b : type`` counts as two."""
+    text = inspect.cleandoc(item.__doc__)
+    match = re.search(rf"^{title}\n-+\n(.*?)(?=^\S[^\n]*\n---|\Z)", text, flags=re.MULTILINE | re.DOTALL)
+    heads = re.findall(r"^([^\s:][^:\n]*?)(?: ?:.*)?$", match[1], flags=re.MULTILINE) if match else []
+    return [name.strip().lstrip("*") for head in heads for name in head.split(",")]
+
+
+TOP = {name: getattr(quakedesign, name) for name in quakedesign.__all__}
+
+
+def test_every_exported_function_and_class_has_a_docstring_of_its_own():
+    silent = [name for name, item in exported().items() if not (item.__dict__.get("__doc__") or item.__doc__)]
+    generated = [
+        name
+        for name, item in exported().items()
+        if dataclasses.is_dataclass(item) and (item.__doc__ or "").startswith(f"{item.__name__}(")
+    ]
+    assert not silent + generated
+
+
+@pytest.mark.parametrize("name", [n for n, item in TOP.items() if inspect.isfunction(item)])
+def test_public_functions_document_exactly_their_parameters(name):
+    assert section(TOP[name], "Parameters") == list(inspect.signature(TOP[name]).parameters)
+
+
+@pytest.mark.parametrize("name", [n for n, item in TOP.items() if dataclasses.is_dataclass(item)])
+def test_public_values_document_exactly_their_fields(name):
+    assert section(TOP[name], "Attributes") == [f.name for f in dataclasses.fields(TOP[name])]
+
+
+def test_the_public_names_are_all_there():
+    assert set(quakedesign.__all__) <= set(dir(quakedesign))
+    assert re.fullmatch(r"\d+\.\d+\.\d+", quakedesign.__version__)
+    with pytest.raises(AttributeError, match="no attribute"):
+        quakedesign.nothing  # noqa: B018

@@ -1,0 +1,57 @@
+"""README.md says what is there: commands, JSON keys, links, and Python that compiles."""
+
+import dataclasses
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from quakedesign.cli import app
+from quakedesign.simulation import Metrics
+
+ROOT = Path(__file__).parent.parent
+DOCUMENTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "proofs/FORMAT.md")
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def table(heading):
+    """Code words in the first column of the table under a heading's first cell."""
+    body = re.search(rf"^\| {heading} \|.*\n\|[-|]+\|\n((?:\|.*\n)+)", README, flags=re.MULTILINE)[1]
+    return [word for row in body.splitlines() for word in re.findall(r"`([^`]+)`", row.split(" | ")[0])]
+
+
+def test_every_command_is_in_the_table():
+    assert {entry.split()[0] for entry in table("command")} == {name for name in app if not name.startswith("-")}
+
+
+def test_every_metric_has_its_row():
+    assert set(table("metric")) == {f.name for f in dataclasses.fields(Metrics)}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_links_lead_somewhere(document):
+    links = re.findall(r"\]\((?!https?:)([^)#]+)\)", (ROOT / document).read_text(encoding="utf-8"))
+    assert all(((ROOT / document).parent / link).exists() for link in links)
+
+
+def test_python_in_it_compiles_and_uses_public_names():
+    import quakedesign
+
+    (block,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    compile(block, "README.md", "exec")
+    assert set(re.findall(r"qd\.(\w+)", README)) <= set(quakedesign.__all__)
+
+
+def test_the_checks_run_exactly_the_command_for_tests():
+    pattern = re.search(r"grep -E '([^']+)'", (ROOT / ".ci" / "run").read_text(encoding="utf-8"))[1]
+    (command,) = re.findall(pattern, README, flags=re.MULTILINE)
+    assert command == "python3 -m venv .venv && .venv/bin/pip install -e '.[test]' && .venv/bin/python -m pytest"
+
+
+def test_every_command_explains_itself():
+    for name in (name for name in app if not name.startswith("-")):
+        call = [sys.executable, "-m", "quakedesign", name, "--help"]
+        done = subprocess.run(call, capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL)
+        assert "--json" in done.stdout
