@@ -1,0 +1,270 @@
+"""Gains carried from one fault to a similar one, with exponents inferred from the terms of the law.
+
+A law keeps its effect if every one of its terms scales as what it adds to: the pressure with λ_p, an integral state's
+rate with that state over time. Slip errors scale with λ_δ, slip-rate errors with λ_δ/λ_t. These conditions are linear
+in the exponents of the gains; they are read off the SymPy expression of the law and solved exactly, so a user's own
+law is carried like the ones of the paper (appendix, with ERRATA 19 and 20).
+"""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from copy import copy
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from fractions import Fraction
+from functools import cache
+from importlib.resources import files
+from types import MappingProxyType
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.controllers.base import Controller, Signals
+from quakedesign.controllers.sliding_mode import SlidingMode
+from quakedesign.errors import ParameterError
+from quakedesign.fault.radical import Radical, radical
+from quakedesign.fault.scales import Scales, fraction_of, power_product
+from quakedesign.rationals import rational
+from quakedesign.symbolic import AbsolutePower, SignedPower
+
+Form = dict[str, Fraction]
+"""Exponents of named quantities: the dimension of an expression while those of gains and states are unknown."""
+
+BASES = ("slip", "time", "output")
+"""What the dimension of a gain is made of; `output` is p [Pa], or ν = p·(divisor) for a law with a divisor."""
+
+UNROUNDED = {("lab-fault", "elqr"): ("1250000000/3", "6250000/9", "125000000/3", "1250000/9")}
+"""Laboratory gains before they were rounded for print; only these give the printed real-fault gains (ERRATA 25)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawDimensions:
+    """Exponents of slip, time and output in every gain and integral state of a law.
+
+    Attributes
+    ----------
+    gains, integrals : mapping of str to Form
+        By name; integral states are ``xi1``, ``xi2`` and so on.
+    """
+
+    gains: Mapping[str, Form]
+    integrals: Mapping[str, Form]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CarriedGains:
+    """Exact gains of a law on a fault, rational or roots of rationals.
+
+    Attributes
+    ----------
+    law : Controller
+        The law with its options; its own gains are those that were carried first.
+    gains : mapping of str to Radical
+        In the units of `gain_units`.
+    integrals : mapping of str to Radical
+        Factors by which the integral states grew from the first fault to this one.
+    """
+
+    law: Controller
+    gains: Mapping[str, Radical]
+    integrals: Mapping[str, Radical]
+
+    def controller(self, digits: int = 12) -> Controller:
+        """Controller with these gains; irrational ones rounded to so many significant digits."""
+        return replace(self.law, gains={name: gain.nearest(digits) for name, gain in self.gains.items()})
+
+
+def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction | None = None) -> CarriedGains:
+    """Gains that do on the target what the given ones do on the source.
+
+    Parameters
+    ----------
+    gains : Controller or CarriedGains
+        The latter to carry on, or back with `scales.inverse()`, without any rounding.
+    scales : Scales
+        From source to target.
+    divisor : Fraction, optional
+        μ0N̂0 of the carried law [m²/kg], for laws that have one; it stays what it is unless given, as in the
+        appendix of the paper, where ν then scales as the pressure.
+
+    Raises
+    ------
+    ParameterError
+        For a divisor where the law has none, or a law whose terms do not fit together.
+    """
+    start = gains if isinstance(gains, CarriedGains) else exact(gains)
+    law, output = start.law, scales.of("Pa")
+    if divisor is not None:
+        if not isinstance(law, SlidingMode):
+            raise ParameterError(f"{law.name} has no divisor. Received the divisor {divisor}. Leave it out.")
+        output *= Fraction(divisor) / law.divisor
+        law = replace(law, divisor=divisor, gains=dict(law.gains))
+    factors = {"slip": scales.of("slip_m"), "time": scales.of("s"), "output": output}
+    dimensions = law_dimensions(law)
+    return CarriedGains(
+        law=law,
+        gains=_grown(start.gains, dimensions.gains, factors),
+        integrals=_grown(start.integrals, dimensions.integrals, factors),
+    )
+
+
+def exact(controller: Controller) -> CarriedGains:
+    """Gains of a controller before they are carried anywhere."""
+    return CarriedGains(
+        law=controller,
+        gains=MappingProxyType({name: radical(gain) for name, gain in controller.gains.items()}),
+        integrals=MappingProxyType({name: radical(1) for name in _integral_names(controller)}),
+    )
+
+
+def _grown(values: Mapping[str, Radical], forms: Mapping[str, Form], factors: Mapping[str, Radical]):
+    return MappingProxyType({name: value * _factor(forms[name], factors) for name, value in values.items()})
+
+
+def _factor(form: Form, factors: Mapping[str, Radical]) -> Radical:
+    return power_product(factors, form)
+
+
+def _integral_names(controller: Controller) -> list[str]:
+    return [f"xi{i}" for i, _ in enumerate(controller.integral_units, start=1)]
+
+
+def law_dimensions(controller: Controller) -> LawDimensions:
+    """Dimensions of all gains and integral states of a law, inferred from its expressions.
+
+    Raises
+    ------
+    ParameterError
+        When the terms of the law do not fit together, or leave the dimension of a gain open.
+    """
+    symbols = {name: sp.Symbol(name, positive=True) for name in controller.gain_units}
+    integrals = {name: sp.Symbol(name, real=True) for name in _integral_names(controller)}
+    slip = {name: sp.Symbol(name, real=True) for name in ("x1", "e1")}
+    rate = {name: sp.Symbol(name, real=True) for name in ("x2", "e2")}
+    signals = Signals(
+        slip=slip["x1"],
+        slip_error=slip["e1"],
+        slip_rate=rate["x2"],
+        slip_rate_error=rate["e2"],
+        integrals=tuple(integrals.values()),
+    )
+    known: dict[str, Form] = {name: {"slip": Fraction(1)} for name in slip}
+    known |= {name: {"slip": Fraction(1), "time": Fraction(-1)} for name in rate}
+    twin = _with_gains(controller, symbols)
+    conditions: list[Form] = []
+    for expression, name, per_time in _equations(twin, signals, integrals):
+        left = {name: Fraction(1), "time": Fraction(-per_time)}
+        conditions.append(_minus(_form(sp.sympify(expression), known, conditions), left))
+    unknown = (*symbols, *integrals)
+    found = _solved(conditions, unknown, controller.name)
+    return LawDimensions(gains={n: found[n] for n in symbols}, integrals={n: found[n] for n in integrals})
+
+
+def _equations(law: Controller, signals: Signals, integrals: Mapping[str, Any]) -> Iterator[tuple[Any, str, int]]:
+    """Right-hand sides, what they equal, and over which power of time."""
+    yield law.pressure(signals), "output", 0
+    for name, rate in zip(integrals, law.integral_rates(signals), strict=True):
+        yield rate, name, 1
+
+
+def _with_gains(controller: Controller, symbols: Mapping[str, sp.Symbol]) -> Controller:
+    """The law with symbols for gains; only for building expressions."""
+    twin = copy(controller)
+    kind = type("Symbolic", (type(controller),), {"_exact_gains": lambda _: list(symbols.values())})
+    object.__setattr__(twin, "__class__", kind)
+    object.__setattr__(twin, "gains", symbols)
+    return twin
+
+
+def _form(expression: sp.Expr, known: Mapping[str, Form], conditions: list[Form]) -> Form:
+    """Dimension of an expression; what sums ask for is added to `conditions`."""
+
+    def inside(part: Any) -> Form:
+        return _form(part, known, conditions)
+
+    if expression.is_number:
+        return {}
+    if expression.is_Symbol:
+        return known.get(expression.name, {expression.name: Fraction(1)})
+    if expression.is_Mul:
+        return _sum([inside(part) for part in expression.args])
+    if expression.is_Pow or isinstance(expression, SignedPower | AbsolutePower):
+        base, power = expression.args
+        return _power(inside(base), power)
+    first, *others = (inside(part) for part in expression.args)
+    if isinstance(expression, sp.sign):
+        return {}
+    if isinstance(expression, sp.Add | sp.Max | sp.Min | sp.Abs):
+        conditions.extend(_minus(other, first) for other in others)
+        return first
+    conditions.extend((first, *others))
+    return {}
+
+
+def _power(base: Form, power: sp.Expr) -> Form:
+    if not base:
+        return {}
+    if not power.is_Rational:
+        raise ParameterError(f"an exponent in a control law must be rational. Received {power}.")
+    return {name: value * fraction_of(power) for name, value in base.items()}
+
+
+def _sum(forms: list[Form]) -> Form:
+    names = dict.fromkeys(name for form in forms for name in form)
+    return {name: sum((form.get(name, Fraction(0)) for form in forms), Fraction(0)) for name in names}
+
+
+def _minus(left: Form, right: Form) -> Form:
+    return _sum([left, {name: -value for name, value in right.items()}])
+
+
+def _solved(conditions: list[Form], unknown: tuple[str, ...], law: str) -> dict[str, Form]:
+    """Every unknown dimension in terms of `BASES`, from linear forms that vanish."""
+    columns = (*unknown, *BASES)
+    strange = {name for form in conditions for name in form} - set(columns)
+    if strange:
+        raise ParameterError(f"{law} must depend on gains and signals only. Received {', '.join(sorted(strange))}.")
+    rows = [[sp.Rational(*form.get(c, Fraction(0)).as_integer_ratio()) for c in columns] for form in conditions]
+    reduced, pivots = sp.Matrix(rows).rref()
+    if any(pivot >= len(unknown) for pivot in pivots):
+        raise ParameterError(
+            f"the terms of {law} do not fit together: no units of its gains make each term fit what it adds to. "
+            "Check exponents, and make every constant with a unit a gain."
+        )
+    free = [name for i, name in enumerate(unknown) if i not in pivots]
+    if free:
+        raise ParameterError(
+            f"the terms of {law} leave the unit of {', '.join(free)} open. Every gain must appear alone."
+        )
+    found = {}
+    for row, pivot in enumerate(pivots):
+        values = {base: reduced[row, len(unknown) + i] for i, base in enumerate(BASES)}
+        found[unknown[pivot]] = {base: -fraction_of(v) for base, v in values.items() if v}
+    return found
+
+
+@cache
+def printed_gains(fault_name: str, law: str) -> Mapping[str, str]:
+    """Gains as the paper prints them, with their digits; empty where it prints none."""
+    from quakedesign.controllers import control_law
+
+    data = tomllib.loads((files("quakedesign.controllers") / "published.toml").read_text(encoding="utf-8"))
+    table = data.get(fault_name)
+    entry = table.get(law) if isinstance(table, dict) else None
+    names = control_law(law).gain_units if entry else ()
+    return MappingProxyType(dict(zip(names, entry["gains"], strict=True)) if entry else {})
+
+
+def agrees(value: Radical, printed: str) -> bool:
+    """True where a number rounds to a printed one, decided in exact arithmetic."""
+    half = Fraction(Decimal(1).scaleb(int(Decimal(printed).as_tuple().exponent))) / 2
+    low, high = rational(printed) - half, rational(printed) + half
+    return _below(low, value) and _below(value, high)
+
+
+def _below(left: Radical | Fraction, right: Radical | Fraction) -> bool:
+    a, b = radical(left), radical(right)
+    if a.sign != b.sign:
+        return a.sign < b.sign
+    quotient = a / b if a.sign else radical(1)
+    return quotient.radicand <= 1 if a.sign >= 0 else quotient.radicand >= 1

@@ -1,0 +1,237 @@
+"""Gains carried between faults, as the command ``scale`` tells it."""
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from quakedesign.certificates.premises import least_authority
+from quakedesign.controllers import Controller, SlidingMode, control_law
+from quakedesign.controllers import published as published_controllers
+from quakedesign.controllers.scaling import (
+    UNROUNDED,
+    CarriedGains,
+    Form,
+    agrees,
+    carry,
+    law_dimensions,
+    printed_gains,
+)
+from quakedesign.fault import Fault, load_fault
+from quakedesign.fault.radical import Radical, radical
+from quakedesign.fault.scaling import TOLERANCE, GroupComparison, Scales, Similarity, similarity
+from quakedesign.rationals import rational
+from quakedesign.report.single import chosen_controller
+
+SCALED = {
+    "slip": ("λ_δ", "slip_m"),
+    "time": ("λ_t", "s"),
+    "pressure": ("λ_p", "Pa"),
+    "slip_rate": ("λ_v", "slip_m/s"),
+    "friction": ("λ_μ", "slip_m/normal_m"),
+    "length": ("λ_L", "fault_m"),
+    "density": ("λ_ρ", "kg/fault_m^3"),
+    "shear_modulus": ("λ_G", "shear_Pa*fault_m/slip_m"),
+    "damping": ("λ_η", "shear_N/(slip_m/s)"),
+    "seismic_moment": ("λ_M0", "shear_N*fault_m"),
+}
+"""Symbol and unit of the quantities whose scale factors are told."""
+
+_THREE_DIGITS = 0.005
+
+
+def scale_answer(
+    source: Fault | str | Path,
+    target: Fault | str | Path,
+    controller_name: str,
+    gains: str | Sequence[str] = "published",
+    *,
+    clock: str | None = None,
+) -> dict[str, Any]:
+    """Gains of a controller of one fault carried to another, with scale factors and what keeps the faults apart.
+
+    Published gains keep their divisor μ0N̂0, as in the paper; given ones are meant with the source's own μ_res·N̂_min
+    and come out for the target's own.
+
+    Parameters
+    ----------
+    source, target : Fault, str or Path
+        Faults, names of presets or paths.
+    controller_name : str
+    gains : str or sequence of str
+        ``"published"``, or the gains in order (λ = 1).
+    clock : str, optional
+        What fixes the scale of time, as in `similarity`.
+
+    Returns
+    -------
+    dict
+        JSON. Rational numbers are exact texts, irrational ones decimals with 12 significant digits.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        For an unknown controller or fault, published gains that do not exist, or wrong gains.
+    """
+    start, end = (f if isinstance(f, Fault) else load_fault(f) for f in (source, target))
+    given = (gains,) if isinstance(gains, str) else tuple(gains)
+    law = chosen_controller(start, controller_name, given)
+    own = given != ("published",) and isinstance(law, SlidingMode)
+    relation = similarity(start, end, clock=clock)
+    carried = carry(law, relation.scales, divisor=least_authority(end) if own else None)
+    return {
+        "from": start.name,
+        "to": end.name,
+        "controller": law.name,
+        "title": law.title,
+        "gains": _texts(carried.gains),
+        "gains_decimal": {name: float(gain) for name, gain in carried.gains.items()},
+        "source_gains": _texts({name: radical(gain) for name, gain in law.gains.items()}),
+        "exponents": _exponents(law, own),
+        **_options(law, carried),
+        "integrals": _texts(carried.integrals),
+        "scale_factors": _scale_factors(relation.scales),
+        **_relation(relation),
+        "published": _published(end, carried),
+        "unrounded": _unrounded(start, end, law, relation.scales) if given == ("published",) else None,
+    }
+
+
+def _texts(values: Mapping[str, Radical]) -> dict[str, str]:
+    return {name: value.text() for name, value in values.items()}
+
+
+def _exponents(law: Controller, own: bool) -> dict[str, str]:
+    output = ("pressure·divisor" if own else "pressure") if isinstance(law, SlidingMode) else "pressure"
+    return {name: _product_text(form, output) for name, form in law_dimensions(law).gains.items()}
+
+
+def _product_text(form: Form, output: str) -> str:
+    words = {"output": f"({output})" if "·" in output else output}
+    powers = [(words.get(base, base), form[base]) for base in ("output", "slip", "time") if base in form]
+    return "·".join(word if power == 1 else f"{word}^({power})" for word, power in powers) or "1"
+
+
+def _options(law: Controller, carried: CarriedGains) -> dict[str, Any]:
+    """λ and the divisors of a sliding mode, the feedback of a linear law."""
+    if isinstance(law, SlidingMode) and isinstance(carried.law, SlidingMode):
+        return {"scale": str(law.scale), "source_divisor": str(law.divisor), "divisor": str(carried.law.divisor)}
+    return {"feedback": law.feedback} if hasattr(law, "feedback") else {}
+
+
+def _scale_factors(scales: Scales) -> dict[str, str]:
+    return {name: scales.of(unit).text() for name, (_, unit) in SCALED.items()}
+
+
+def _relation(relation: Similarity) -> dict[str, Any]:
+    return {
+        "fixed_by": list(relation.repeating),
+        "similar": relation.similar(),
+        "tolerance": str(TOLERANCE),
+        "differing": [_group(c) for c in relation.differing],
+        "violations": [c.group.name for c in relation.violations()],
+        "unmatched": list(relation.unmatched),
+    }
+
+
+def _group(comparison: GroupComparison) -> dict[str, Any]:
+    return {
+        "group": comparison.group.name,
+        "formula": comparison.group.formula,
+        "source": comparison.source.text(),
+        "target": comparison.target.text(),
+        "ratio": None if comparison.ratio is None else float(comparison.ratio),
+    }
+
+
+def _published(target: Fault, carried: CarriedGains) -> dict[str, Any] | None:
+    """Printed gains of the target, where they exist for the same λ and divisor."""
+    printed = published_controllers(target.name).get(carried.law.name)
+    if printed is None or any(
+        getattr(printed, option, None) != getattr(carried.law, option, None) for option in ("scale", "divisor")
+    ):
+        return None
+    texts = printed_gains(target.name, carried.law.name)
+    return {n: _against(carried.gains[n], text) for n, text in texts.items()}
+
+
+def _against(value: Radical, printed: str) -> dict[str, Any]:
+    number = rational(printed)
+    deviation = float(value / number) - 1 if number else None
+    return {"printed": printed, "agrees": agrees(value, printed), "deviation": deviation}
+
+
+def _unrounded(source: Fault, target: Fault, law: Controller, scales: Scales) -> dict[str, Any] | None:
+    """The same from the gains that the paper rounded for print (ERRATA 25), where they are known."""
+    values = UNROUNDED.get((source.name, law.name))
+    if values is None:
+        return None
+    first = control_law(law.name).from_values(values)
+    carried = carry(first, scales)
+    return {
+        "source_gains": _texts({name: radical(gain) for name, gain in first.gains.items()}),
+        "gains": _texts(carried.gains),
+        "published": _published(target, carried),
+    }
+
+
+def scale_lines(answer: Mapping[str, Any]) -> list[str]:
+    """The answer of `scale_answer` for people."""
+    factors = ", ".join(f"{SCALED[n][0]} = {_short(v)}" for n, v in answer["scale_factors"].items())
+    lines = [f"{answer['title']}: {answer['from']} → {answer['to']}"]
+    lines += _gain_lines(answer["source_gains"], answer["gains"], answer["published"], answer["exponents"])
+    if "divisor" in answer:
+        same = answer["divisor"] == answer["source_divisor"]
+        before = "" if same else f" (source: {_short(answer['source_divisor'])})"
+        lines.append(f"with λ = {_short(answer['scale'])} and divisor μ0N̂0 = {_short(answer['divisor'])} m²/kg{before}")
+    if _rounded(answer["published"]):
+        lines.append("where a printed gain is off, gains were rounded in print (ERRATA 25)")
+    if answer["unrounded"]:
+        more = answer["unrounded"]
+        lines.append("from the laboratory gains before they were rounded for print (ERRATA 25):")
+        lines += _gain_lines(more["source_gains"], more["gains"], more["published"], answer["exponents"])
+    lines.append(f"scale factors: {factors}")
+    return [*lines, *_similarity_lines(answer)]
+
+
+def _rounded(printed: Mapping[str, Any] | None) -> bool:
+    """True where printed gains differ, but by no more than rounding to three digits explains."""
+    off = [abs(e["deviation"]) for e in (printed or {}).values() if not e["agrees"] and e["deviation"] is not None]
+    return bool(off) and max(off) < _THREE_DIGITS
+
+
+def _gain_lines(
+    before: Mapping[str, str], after: Mapping[str, str], printed: Mapping[str, Any] | None, exponents: Mapping[str, str]
+) -> list[str]:
+    def comment(name: str) -> str:
+        if not printed:
+            return ""
+        entry = printed[name]
+        off = "" if entry["agrees"] or entry["deviation"] is None else f", off by {100 * abs(entry['deviation']):.2g} %"
+        return f"; printed {entry['printed']}{off}"
+
+    return [f"  {n} = {_short(after[n])} from {_short(before[n])} ({exponents[n]}{comment(n)})" for n in after]
+
+
+def _similarity_lines(answer: Mapping[str, Any]) -> list[str]:
+    percent = float(Fraction(answer["tolerance"])) * 100
+    far = [g for g in answer["differing"] if g["group"] in answer["violations"]]
+    if answer["similar"]:
+        if not answer["differing"]:
+            return ["similar exactly: every π-group has the same value"]
+        worst = max(abs(group["ratio"] - 1) for group in answer["differing"])
+        count = len(answer["differing"])
+        return [f"similar within {percent:g} %: {count} π-groups differ, by at most {100 * worst:.2g} %"]
+    lines = [
+        f"NOT similar within {percent:g} %: the two loops are no copies of each other, because these groups differ:"
+    ]
+    lines += [f"  {g['formula']}: {_short(g['source'])} and {_short(g['target'])}{_ratio(g)}" for g in far]
+    return lines + [f"  {name} is not the same quantity in both faults" for name in answer["unmatched"]]
+
+
+def _ratio(group: Mapping[str, Any]) -> str:
+    return "" if group["ratio"] is None else f", ratio {group['ratio']:.6g}"
+
+
+def _short(text: str) -> str:
+    return f"{float(Fraction(text)):.6g}"
