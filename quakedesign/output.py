@@ -13,13 +13,18 @@ def write_whole(path: Path, content: str | bytes) -> None:
     Raises
     ------
     OutputError
-        When the folder cannot be written.
+        When the file cannot be written; nothing is left behind then.
     """
     data = content.encode() if isinstance(content, str) else content
     try:
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as handle:
-            handle.write(data)
-        os.chmod(handle.name, 0o644)
-        os.replace(handle.name, path)
+            try:
+                handle.write(data)
+                handle.close()
+                os.chmod(handle.name, 0o644)
+                os.replace(handle.name, path)
+            except BaseException:
+                os.unlink(handle.name)
+                raise
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror}. Choose a folder that you may write.") from None

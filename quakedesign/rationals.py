@@ -3,11 +3,12 @@
 import math
 import re
 from fractions import Fraction
+from numbers import Rational, Real
 
 from quakedesign.errors import ParameterError
 
-_DIGITS = 320
-_NUMBER = re.compile(r"[+-]?(\d+(/\d+)?|(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)")
+_DIGITS = 308  # so that float() of the number neither overflows nor vanishes
+_NUMBER = re.compile(r"[+-]?(\d+(/\d+)?|(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)", re.ASCII)
 
 
 def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
@@ -16,7 +17,7 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
     Parameters
     ----------
     value : float, int, str or Fraction
-        Number; a float means the decimal that Python prints for it, so 0.1 is 1/10.
+        Number, also one of NumPy or SymPy; a float means the decimal that Python prints for it, so 0.1 is 1/10.
     name : str
         What the number is, for the message.
 
@@ -27,20 +28,27 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
     Raises
     ------
     ParameterError
-        When the value is not a finite number of at most 300 characters.
+        When the value is not a finite number of at most 300 characters and 308 digits.
     """
     if isinstance(value, Fraction):
         return value
-    text = value.strip() if isinstance(value, str) else repr(value + 0)
-    if len(text) > 300 or not _NUMBER.fullmatch(text) or re.search(r"/0+$", text):
-        raise ParameterError(
-            f"{name} must be a finite number: a decimal, an exponent form or p/q. Received {text[:60]!r}. "
-            "Write for example 2.3, 4.51e-4 or 23/10."
-        )
-    exact = Fraction(text)
+    exact = _read(value, name)
     if max(abs(exact.numerator), exact.denominator) >= 10**_DIGITS:
-        raise ParameterError(f"{name} must have at most {_DIGITS} digits. Received {text[:60]!r}.")
+        raise ParameterError(f"{name} must have at most {_DIGITS} digits. Received more. Round it, or check its unit.")
     return exact
+
+
+def _read(value: object, name: str) -> Fraction:
+    if isinstance(value, Rational) and not isinstance(value, bool):
+        return Fraction(int(value.numerator), int(value.denominator))
+    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else value
+    written = number.strip() if isinstance(number, str) else repr(number)
+    if len(written) > 300 or not _NUMBER.fullmatch(written) or re.search(r"/0+$", written):
+        raise ParameterError(
+            f"{name} must be a finite number: a decimal, an exponent form or p/q, in at most 300 characters. "
+            f"Received {written[:60]!r}. Write for example 2.3, 4.51e-4 or 23/10."
+        )
+    return Fraction(written)
 
 
 def nearest(value: float, denominator: int) -> Fraction:

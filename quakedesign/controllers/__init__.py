@@ -54,8 +54,9 @@ def published(fault_name: str) -> dict[str, Controller]:
         By name of the law; gains in the units of the law, divisor that of the laboratory fault.
     """
     data = tomllib.loads((files(__name__) / "published.toml").read_text(encoding="utf-8"))
+    sets = {name: entry for name, entry in data.items() if isinstance(entry, dict)}
     found: dict[str, Controller] = {}
-    for name, entry in data.get(fault_name, {}).items() if fault_name in ("real-fault", "lab-fault") else ():
+    for name, entry in sets.get(fault_name, {}).items():
         more = {k: v for k, v in entry.items() if k != "gains"}
         law = control_law(name)
         if issubclass(law, SlidingMode):

@@ -2,8 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
+from functools import partial
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
@@ -90,6 +91,11 @@ class Controller(ABC):
             )
         exact = {name: rational(self.gains[name], f"gain {name}") for name in self.gain_units}
         object.__setattr__(self, "gains", MappingProxyType(exact))
+
+    def __reduce__(self) -> tuple[Any, tuple[()]]:
+        # A read-only view cannot be pickled, and campaigns send controllers to other processes.
+        entries = {f.name: getattr(self, f.name) for f in fields(self)} | {"gains": dict(self.gains)}
+        return partial(type(self), **entries), ()
 
     @abstractmethod
     def pressure(self, signals: Signals) -> sp.Expr:

@@ -53,10 +53,10 @@ class ContinuousTwisting(SlidingMode):
         """On e2 = 0, e3 = k1⌈e1⌋^⅓ a constant h' ≥ k3 − |k4| holds the loop in place (ERRATA, end)."""
         k1, _, k3, k4 = gains.values()
         pull = max(Fraction(0), k3 - abs(k4))
-        if not k1 or pull > uncertain["d"][1] or pull < uncertain["d"][0]:
+        if not k1 or not uncertain["d"][0] <= pull <= uncertain["d"][1] or (not k4 and pull != k3):
             return None
         share = ((k3 - pull) / abs(k4) + 1) / 2 if k4 else Fraction(1)
-        if share > 1 or share < 0:
+        if not 0 <= share <= 1:
             return None
         towards, away = ("-", "+") if k4 >= 0 else ("+", "-")
         last = "+" if k1 > 0 else "-"

@@ -8,6 +8,7 @@ from typing import ClassVar
 import sympy as sp
 
 from quakedesign.controllers.sliding_mode import SlidingMode
+from quakedesign.errors import ParameterError
 from quakedesign.symbolic import SignedPower
 
 
@@ -24,6 +25,13 @@ class DiscontinuousIntegral(SlidingMode):
         "kI3": "m/s^3",
         "kI4": "s^(3/2)/m^(1/2)",
     }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.gains["kI1"] < 0:
+            raise ParameterError(
+                f"gain kI1 must not be negative, since the law takes its root. Received {self.gains['kI1']}."
+            )
 
     @staticmethod
     def virtual_control(error: sp.Expr, rate_error: sp.Expr, integral: sp.Expr, gains, scale) -> sp.Expr:

@@ -27,7 +27,7 @@ class SlidingMode(Controller):
         μ0N̂0 of eq. ps [m²/kg].
     """
 
-    integral_units: ClassVar[tuple[str, ...]] = ("m^3/(kg Pa^-1 s^2)",)
+    integral_units: ClassVar[tuple[str, ...]] = ("m/s^2",)
     weights: ClassVar[tuple[int, int, int]] = (3, 2, 1)
 
     scale: Fraction = Fraction(1)
@@ -44,12 +44,12 @@ class SlidingMode(Controller):
     @staticmethod
     @abstractmethod
     def virtual_control(error: sp.Expr, rate_error: sp.Expr, integral: sp.Expr, gains, scale) -> sp.Expr:
-        """ν, in the unit of an acceleration when the divisor is the true μN̂."""
+        """ν [m/s²]."""
 
     @staticmethod
     @abstractmethod
     def integral_rate(error: sp.Expr, rate_error: sp.Expr, gains, scale) -> sp.Expr:
-        """ξ1'."""
+        """ξ1' [m/s³]."""
 
     @property
     @abstractmethod

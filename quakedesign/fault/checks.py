@@ -6,7 +6,7 @@ from quakedesign.errors import ParameterError
 
 
 def require_positive(remedy: str = "", **values: float) -> None:
-    """Refuse a value that is not a positive finite number; the keyword is its name and SI unit, joined by ``__``.
+    """Refuse a value that is not a positive finite number; the keyword is its name.
 
     Raises
     ------

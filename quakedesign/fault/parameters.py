@@ -74,13 +74,24 @@ class Fault:
                 f"sampling_time must be at most a thousandth of the operation time "
                 f"({self.reference.operation_time!r} s). Received {self.sampling_time!r} s."
             )
-        require_positive(
-            "The numbers are so extreme that derived quantities overflow.",
-            mass=self.mass,
-            stiffness=self.stiffness,
-            authority=self.authority,
-            natural_frequency=self.natural_frequency,
-        )
+        self._require_ordinary_size()
+
+    def _require_ordinary_size(self) -> None:
+        remedy = "The numbers are so extreme that derived quantities overflow."
+        try:
+            require_positive(
+                remedy,
+                mass=self.mass,
+                stiffness=self.stiffness,
+                authority=self.authority,
+                natural_frequency=self.natural_frequency,
+            )
+            require_nonnegative(remedy, seismic_moment=self.seismic_moment, damping_ratio=self.damping_ratio)
+        except ArithmeticError:
+            raise ParameterError(
+                f"density and length must give a finite mass. Received {self.density!r} kg/m³ and {self.length!r} m. "
+                f"{remedy}"
+            ) from None
 
     def with_box(self, name: str) -> "Fault":
         """Return the same fault with a named uncertainty box."""

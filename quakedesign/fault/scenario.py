@@ -1,7 +1,7 @@
 """Fault descriptions: TOML files with unit strings, checked at the boundary and turned into `Fault`."""
 
 import tomllib
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -17,6 +17,7 @@ from quakedesign.fault.units import si_value
 from quakedesign.rationals import rational
 
 _LARGEST_FILE = 1 << 20
+_BRANCHES = {"str", "float", "int", "Spread"}  # names that pydantic adds for the members of a union
 
 
 def presets() -> list[str]:
@@ -62,12 +63,16 @@ def _read(source: str | Path) -> str:
             f"fault must be a preset ({', '.join(presets())}) or the path of a .toml file. Received {str(source)!r}."
         )
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise ScenarioError(f"a fault file must be smaller than 1 MiB. Received {path}, which is larger.")
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        large = path.stat().st_size > _LARGEST_FILE
+        text = "" if large else path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "its name or its text is not UTF-8"
         raise ScenarioError(f"fault file cannot be read: {path}: {reason}. Give a readable TOML file.") from None
+    if large:
+        raise ScenarioError(
+            f"a fault file must be at most 1 MiB. Received {path}, which is larger. Give a smaller one."
+        )
+    return text
 
 
 def parse_fault(text: str, name: str) -> Fault:
@@ -125,11 +130,12 @@ def _validated(raw: dict[str, Any], name: str) -> Any:
     try:
         return _model().model_validate(raw)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
+        deepest = max(error.errors(), key=lambda item: len(item["loc"]))
+        where = ".".join(str(part) for part in deepest["loc"] if part not in _BRANCHES)
+        said = {"missing": f"{where} must be given. Received nothing", "extra_forbidden": f"{where} is not a known key"}
+        wrong = f"{where} has the wrong type. Received {str(deepest['input'])[:60]!r}"
         raise ScenarioError(
-            f"{name}: {where}: {first['msg'].lower()}. Received {str(first['input'])[:60]!r}. "
-            "Every quantity is a text with a unit; compare with a preset."
+            f"{name}: {said.get(deepest['type'], wrong)}. Every quantity is a text with a unit; compare with a preset."
         ) from None
 
 
@@ -152,8 +158,6 @@ def _build(scenario: Any, name: str) -> Fault:
             disturbance=_disturbance(scenario.disturbance),
             box=_box(scenario.uncertainty),
         )
-    except UnknownNameError:
-        raise
     except QuakedesignError as error:
         raise type(error)(f"{name}: {error}") from None
 
@@ -162,13 +166,16 @@ def _friction(entries: dict[str, Any]):
     if not isinstance(entries.get("law"), str):
         raise ScenarioError('friction.law must name a friction law. Received none. Add law = "…".')
     law = friction_law(entries.pop("law"))
-    expected = {f.name: f.metadata["unit"] for f in fields(law)}  # type: ignore[arg-type]
-    if set(entries) != set(expected):
+    units = {name: f.metadata["unit"] for name, f in law.quantities().items()}
+    expected = [f.name for f in fields(law)]  # type: ignore[arg-type]
+    needed = {f.name for f in fields(law) if f.default is MISSING}  # type: ignore[arg-type]
+    if not needed <= set(entries) <= set(expected):
         raise ScenarioError(
             f"friction must have exactly the parameters {', '.join(expected)} of {law.name}. "
             f"Received {', '.join(entries) or 'none'}."
         )
-    return law(**{key: si_value(entries[key], unit, f"friction.{key}") for key, unit in expected.items()})
+    read = {key: si_value(entries[key], unit, f"friction.{key}") for key, unit in units.items() if key in entries}
+    return law(**entries | read)
 
 
 def _disturbance(entries: Any) -> Disturbance:

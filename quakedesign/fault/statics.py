@@ -6,10 +6,11 @@ if TYPE_CHECKING:
     from quakedesign.fault.parameters import Fault
 
 _SCAN = 4096
+_DIGITS = 40  # the slip of a fault that is only just unstable is a small difference
 
 
 def rest_slip(fault: "Fault") -> float:
-    """Smallest positive slip [m] where the excess of strength over load turns from driving to resisting.
+    """Smallest positive slip [m] where the excess of load over strength turns from driving to resisting.
 
     The excess is (μ(0) − μ(x))σ'_n A − kx at zero pressure (statics of eq. shift). All roots lie below
     (μ_max − μ_min)σ'_n A/k. A fault whose origin is stable stays where it is.
@@ -18,7 +19,7 @@ def rest_slip(fault: "Fault") -> float:
     import sympy as sp
 
     x = sp.Symbol("x", nonnegative=True)
-    law = fault.friction.coefficient
+    law = fault.friction.exact().coefficient
     load = fault.effective_normal_stress * fault.area
     drive = sp.lambdify(x, law(sp.Integer(0), 0) - law(x, 0) - fault.stiffness / load * x, "mpmath")
     low, high = fault.friction.bounds
@@ -30,6 +31,6 @@ def rest_slip(fault: "Fault") -> float:
         return 0.0
     after = next(i for i, slip in enumerate(grid) if i and drive(slip) <= 0)
     before = grid[after - 1] if after > 1 else grid[1] / _SCAN
-    return float(
-        mpmath.findroot(drive, (before, grid[after]), solver="anderson", tol=1e-36, maxsteps=100, verify=False)
-    )
+    with mpmath.workdps(_DIGITS):
+        ends = (before, grid[after])
+        return float(mpmath.findroot(drive, ends, solver="anderson", tol=1e-60, maxsteps=100, verify=False))

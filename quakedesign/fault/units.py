@@ -33,7 +33,8 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
     Raises
     ------
     UnitError
-        For an unknown unit, a wrong dimension, a missing unit or no number at all.
+        For an unknown unit, a wrong dimension, a missing unit or no number at all; and for hertz where an
+        angular frequency is wanted, because pint takes 1 Hz for 1 rad/s.
     """
     import pint
 
@@ -48,7 +49,7 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
         raise UnitError(f"{name} must be {wanted}. Received a text of {len(quantity)} characters.")
     try:
         parsed = _registry().Quantity(quantity)
-        return float(parsed.to(unit or "dimensionless").magnitude)
+        converted = parsed.to(unit or "dimensionless") if not (unit and parsed.unitless) else None
     except pint.UndefinedUnitError:
         raise UnitError(
             f"{name} must be {wanted}. Received {quantity!r}, whose unit is unknown. Check its spelling."
@@ -57,9 +58,23 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
         raise UnitError(f"{name} must be {wanted}. Received {quantity!r}, which has another dimension.") from None
     except Exception:
         raise UnitError(f"{name} must be {wanted}. Received {quantity!r}, which cannot be read.") from None
+    if not isinstance(parsed.magnitude, Decimal):
+        raise UnitError(f"{name} must be {wanted}. Received {quantity!r} without a number. Add the number.")
+    if converted is None:
+        raise UnitError(f"{name} must be {wanted}. Received {quantity!r} without a unit. Add the unit.")
+    if unit == "rad/s" and "hertz" in str(parsed.units):
+        raise UnitError(
+            f"{name} must be an angular frequency in rad/s. Received {quantity!r}. Give 2π times it in rad/s."
+        )
+    return float(converted.magnitude)
 
 
 def _example(unit: str) -> str:
-    return {"Pa": "30 GPa", "m": "276.35 mm", "s": "184 ms", "kg/m^3": "2500 kg/m^3", "kg/s": "5e14 kg/s"}.get(
-        unit, f"1 {unit}"
-    )
+    return {
+        "Pa": "30 GPa",
+        "m": "276.35 mm",
+        "s": "184 ms",
+        "kg/m^3": "2500 kg/m^3",
+        "kg/s": "5e14 kg/s",
+        "": "0.4",
+    }.get(unit, f"1 {unit}")

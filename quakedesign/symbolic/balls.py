@@ -95,6 +95,8 @@ def _number(e: sp.Expr) -> Any:
         return arb(fmpq(exact.numerator, exact.denominator))
     if e is sp.pi:
         return arb.pi()
+    if e is sp.E:
+        return arb(1).exp()
     return _operation(e)([_number(a) for a in _arguments(e)])
 
 
@@ -151,19 +153,23 @@ def _function(e: sp.Expr, values: list[Any]) -> Any:
 def _monotone(x: Any, exponent: sp.Expr, *, signed: bool) -> Any:
     from flint import arb, fmpq
 
+    if not exponent.is_Rational:
+        raise NotImplementedError(f"no enclosure for the exponent {exponent}")
     power = arb(fmpq(int(exponent.p), int(exponent.q)))
+    low, high = x.lower(), x.upper()
+    straddles = not (low > 0 or high < 0)
+    if not x.is_finite() or (straddles and exponent < 0):
+        return arb("nan")
 
     def at(end: Any) -> Any:
         size = abs(end)
         value = arb(0) if size.is_zero() else size**power
         return -value if signed and end < 0 else value
 
-    low, high = x.lower(), x.upper()
     if signed:
         if exponent == 0:
             return arb(1) if low > 0 else (arb(-1) if high < 0 else arb(-1).union(arb(1)))
         return at(low).union(at(high))
-    straddles = not (low > 0 or high < 0)
     hull = at(low).union(at(high))
     return hull.union(arb(0)) if straddles else hull
 

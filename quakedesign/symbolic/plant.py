@@ -34,7 +34,7 @@ class ErrorDynamics:
     beta : Expr
         Control coefficient β [-].
     h : Expr
-        Matched perturbation [m/s²·μ0N̂0·kg/m², the unit of ν].
+        Matched perturbation [m/s²], the unit of ν.
     """
 
     beta: sp.Expr

@@ -56,7 +56,7 @@ class SignedPower(_Power):
     ----------
     x : Expr
     a : Expr
-        Exponent, not negative.
+        Exponent; a negative one arises only from derivatives off the kinks, and has no value at zero.
     """
 
     @classmethod
@@ -64,7 +64,7 @@ class SignedPower(_Power):
         """Evaluate a = 1, numbers, and pull out signs."""
         if a == 1:
             return x
-        if x.is_number and a.is_number and x.is_real:
+        if x.is_number and a.is_number and x.is_real and (x != 0 or a >= 0):
             return sp.sign(x) * sp.Abs(x) ** a if x != 0 else sp.Integer(0)
         if x.is_positive:
             return x**a

@@ -2,6 +2,7 @@
 
 from functools import cache
 from importlib import import_module
+from inspect import isabstract
 from pkgutil import iter_modules
 
 from quakedesign.errors import UnknownNameError
@@ -12,7 +13,10 @@ __all__ = ["FrictionLaw", "friction_law", "friction_laws"]
 
 @cache
 def friction_laws() -> dict[str, type[FrictionLaw]]:
-    """Every friction law of the package, by name; a module of this folder that defines none is an error."""
+    """Every friction law of the package, by name; a module of this folder that defines none is an error.
+
+    A law that cannot be built (an abstract class, for others to derive from) counts for its module but is not listed.
+    """
     laws: dict[str, type[FrictionLaw]] = {}
     for info in iter_modules(__path__):
         if info.name == "base":
@@ -25,7 +29,7 @@ def friction_laws() -> dict[str, type[FrictionLaw]]:
         ]
         if not found:
             raise ImportError(f"{module.__name__} defines no FrictionLaw")
-        laws |= {law.name: law for law in found}
+        laws |= {law.name: law for law in found if not isabstract(law)}
     return laws
 
 

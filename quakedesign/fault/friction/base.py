@@ -1,8 +1,9 @@
 """What every friction law offers."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import Field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from quakedesign.rationals import rational
@@ -12,24 +13,52 @@ if TYPE_CHECKING:
 
 
 class FrictionLaw(ABC):
-    """One friction coefficient μ(slip, slip rate), written once with the parameters as attributes.
+    """One friction coefficient μ(slip, slip rate, state …), written once with the parameters as attributes.
 
-    A subclass is a frozen dataclass. Each field carries ``metadata`` with ``unit`` (as pint reads it) and
-    ``symbol`` (LaTeX). The same method serves numbers, exact rationals and symbols, because `symbolic` and
-    `exact` return copies of the law that hold those instead of floats.
+    A subclass is a frozen dataclass. Each quantity carries ``metadata`` with ``unit`` (as pint reads it) and
+    ``symbol`` (LaTeX); a field without a symbol is an option, not a quantity. The same method serves numbers, exact
+    rationals and symbols, because `symbolic` and `exact` return copies of the law that hold those instead of floats.
+
+    A law without state defines `coefficient`, `extended` and the bounds. A law with state also names its variables
+    in `state_names` (with `state_units`), and defines `state_rates`, `steady_state`, `operating_rate` and
+    `working_rates`.
     """
 
     name: ClassVar[str]
     source: ClassVar[str]
     domain: ClassVar[str]
+    state_names: ClassVar[tuple[str, ...]] = ()
+    state_units: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
-    def coefficient(self, slip: "sp.Expr", rate: "sp.Expr") -> "sp.Expr":
-        """Friction coefficient [-] at a slip [m] and a slip rate [m/s] inside the domain of the law."""
+    def coefficient(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] at a slip [m], a slip rate [m/s] and a state inside the domain of the law."""
 
     @abstractmethod
-    def extended(self, slip: "sp.Expr", rate: "sp.Expr") -> "sp.Expr":
-        """Friction coefficient [-] continued to all slips and rates, so that the bounds hold everywhere."""
+    def extended(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] continued to all slips, rates and states, so that the bounds hold everywhere."""
+
+    def state_rates(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "tuple[sp.Expr, ...]":
+        """Time derivative of every state variable, each in its unit per second; none for a law without state."""
+        return ()
+
+    def steady_state(self, rate: "sp.Expr") -> "tuple[sp.Expr, ...]":
+        """State at which sliding at a constant rate [m/s] leaves it; none for a law without state."""
+        return ()
+
+    def steady_coefficient(self, rate: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] of steady sliding at a rate [m/s], at slip 0."""
+        return self.coefficient(0, rate, *self.steady_state(rate))
+
+    @property
+    def operating_rate(self) -> float:
+        """Slip rate [m/s] of the equilibrium that is studied unless another is asked for: rest."""
+        return 0
+
+    @property
+    def working_rates(self) -> tuple[float, float]:
+        """Slip rates [m/s] between which the bounds hold for `coefficient` itself; all of them unless told."""
+        return -math.inf, math.inf
 
     @property
     @abstractmethod
@@ -39,12 +68,12 @@ class FrictionLaw(ABC):
     @property
     @abstractmethod
     def slip_slope(self) -> float:
-        """Largest chord slope |Δμ/Δslip| [1/m]."""
+        """Largest chord slope |Δμ/Δslip| [1/m]; with state, along a motion that carries the state with it."""
 
     @property
     @abstractmethod
     def rate_slope(self) -> float:
-        """Largest chord slope |Δμ/Δrate| [s/m]."""
+        """Largest chord slope |Δμ/Δrate| [s/m] at a fixed state."""
 
     def _holding(self, values: Mapping[str, Any]) -> Self:
         law = object.__new__(type(self))
@@ -52,24 +81,33 @@ class FrictionLaw(ABC):
             object.__setattr__(law, name, value)
         return law
 
+    @classmethod
+    def quantities(cls) -> "dict[str, Field[Any]]":
+        """Every field that is a quantity with unit and symbol, by name."""
+        return {f.name: f for f in fields(cls) if "symbol" in f.metadata}  # type: ignore[arg-type]
+
+    def _options(self) -> dict[str, Any]:
+        """Every other field."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if "symbol" not in f.metadata}  # type: ignore[arg-type]
+
     def symbols(self) -> "dict[str, sp.Symbol]":
-        """Positive symbol of every parameter, by field name."""
+        """Positive symbol of every quantity, by field name."""
         import sympy as sp
 
-        return {f.name: sp.Symbol(f.metadata["symbol"], positive=True) for f in fields(self)}  # type: ignore[arg-type]
+        return {name: sp.Symbol(f.metadata["symbol"], positive=True) for name, f in self.quantities().items()}
 
     def symbolic(self) -> Self:
-        """Return the law with symbols for parameters; only for building expressions."""
-        return self._holding(self.symbols())
+        """Return the law with symbols for quantities; only for building expressions."""
+        return self._holding(self._options() | self.symbols())
 
     def exact(self) -> Self:
-        """Return the law with SymPy rationals for parameters; only for building expressions."""
+        """Return the law with SymPy rationals for quantities; only for building expressions."""
         import sympy as sp
 
-        names = [f.name for f in fields(self)]  # type: ignore[arg-type]
-        return self._holding({n: sp.Rational(str(rational(getattr(self, n), n))) for n in names})
+        held = {name: sp.Rational(str(rational(getattr(self, name), name))) for name in self.quantities()}
+        return self._holding(self._options() | held)
 
     def values(self) -> "dict[sp.Symbol, sp.Rational]":
-        """Exact value of every parameter symbol."""
+        """Exact value of every quantity's symbol."""
         exact = self.exact()
         return {symbol: getattr(exact, name) for name, symbol in self.symbols().items()}

@@ -46,13 +46,13 @@ class ExponentialSlipWeakening(FrictionLaw):
             "It is the static minus the kinetic coefficient; the paper's Δμ has the opposite sign.", drop=self.drop
         )
 
-    def coefficient(self, slip: "sp.Expr", rate: "sp.Expr") -> "sp.Expr":
+    def coefficient(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
         """Friction coefficient [-] for slip ≥ 0 (eq. mu)."""
         import sympy as sp
 
         return self.residual + self.drop * sp.exp(-slip / self.critical_slip)
 
-    def extended(self, slip: "sp.Expr", rate: "sp.Expr") -> "sp.Expr":
+    def extended(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
         """Friction coefficient [-], held at its static value for slip < 0 (ERRATA 12)."""
         import sympy as sp
 

@@ -1,0 +1,191 @@
+"""What the rate-and-state laws share: parameters, working range, and bounds on it."""
+
+from abc import abstractmethod
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault.checks import require_positive
+from quakedesign.fault.friction.base import FrictionLaw
+from quakedesign.rationals import rational
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+_DIGITS = 40
+_ROUNDING = Fraction(1, 10**30)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateAndState(FrictionLaw):
+    """μ depends on the slip rate v and on one state θ [s], the age of the contacts.
+
+    Friction rises with v and with θ, so on the working range v_s ≤ v ≤ v_f, d_c/v_f ≤ θ ≤ d_c/v_s its extremes are
+    at two corners. As long as v stays between v_s and v_f, θ cannot leave its interval: both evolution laws point
+    inward at its ends. Outside of the range the bounds say nothing about `coefficient` (ERRATA 13).
+
+    Attributes
+    ----------
+    reference_coefficient : float
+        μ_0 [-], friction of steady sliding at the reference rate, positive.
+    direct_effect, evolution_effect : float
+        a and b [-], positive; a < b weakens with rate.
+    critical_slip : float
+        d_c [m], slip over which the state evolves, positive.
+    reference_rate : float
+        v_0 [m/s], positive.
+    slowest_rate, fastest_rate : float
+        v_s and v_f [m/s], ends of the working range, 0 < v_s ≤ v_0 ≤ v_f.
+
+    Raises
+    ------
+    ParameterError
+        When a parameter is outside its range, or a state is missing where the law is evaluated.
+    """
+
+    domain: ClassVar[str] = "slowest_rate <= rate <= fastest_rate, theta between the steady states of the two"
+    state_names: ClassVar[tuple[str, ...]] = ("theta",)
+    state_units: ClassVar[tuple[str, ...]] = ("s",)
+
+    reference_coefficient: float = field(metadata={"unit": "", "symbol": r"\mu_0"})
+    direct_effect: float = field(metadata={"unit": "", "symbol": "a"})
+    evolution_effect: float = field(metadata={"unit": "", "symbol": "b"})
+    critical_slip: float = field(metadata={"unit": "m", "symbol": "d_c"})
+    reference_rate: float = field(metadata={"unit": "m/s", "symbol": "v_0"})
+    slowest_rate: float = field(metadata={"unit": "m/s", "symbol": "v_s"})
+    fastest_rate: float = field(metadata={"unit": "m/s", "symbol": "v_f"})
+
+    def __post_init__(self) -> None:
+        require_positive(**{name: getattr(self, name) for name in self.quantities()})
+        if not self.slowest_rate <= self.reference_rate <= self.fastest_rate:
+            raise ParameterError(
+                "reference_rate must lie between slowest_rate and fastest_rate. Received "
+                f"{self.slowest_rate!r}, {self.reference_rate!r}, {self.fastest_rate!r} m/s. Widen the working range."
+            )
+
+    @abstractmethod
+    def friction(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] at a rate [m/s] and a state [s]; rises with both."""
+
+    @abstractmethod
+    def ageing(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
+        """θ' [-]; zero where rate · θ = d_c."""
+
+    @property
+    @abstractmethod
+    def _state_slope(self) -> "sp.Expr":
+        """Largest |θ'/(θ · rate)| · d_c [-] on the working range, in exact numbers."""
+
+    def coefficient(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] at a rate [m/s] > 0 and a state [s] > 0, at any slip."""
+        return self.friction(rate, self._theta(state))
+
+    def extended(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] with rate and state held at the ends of the working range beyond it."""
+        import sympy as sp
+
+        def held(value: Any, low: Any, high: Any) -> "sp.Expr":
+            return sp.Min(sp.Max(value, low), high)
+
+        theta = held(self._theta(state), self.critical_slip / self.fastest_rate, self.critical_slip / self.slowest_rate)
+        return self.friction(held(rate, self.slowest_rate, self.fastest_rate), theta)
+
+    def state_rates(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "tuple[sp.Expr, ...]":
+        """θ' [-]."""
+        return (self.ageing(rate, self._theta(state)),)
+
+    def steady_state(self, rate: "sp.Expr") -> "tuple[sp.Expr, ...]":
+        """θ = d_c/rate [s]."""
+        return (self.critical_slip / rate,)
+
+    def _theta(self, state: "tuple[sp.Expr, ...]") -> "sp.Expr":
+        if len(state) != 1:
+            raise ParameterError(
+                f"{self.name} needs one state, theta [s]. Received {len(state)}. "
+                "Pass it after the slip rate, or ask for steady_coefficient(rate)."
+            )
+        return state[0]
+
+    @property
+    def operating_rate(self) -> float:
+        """Steady sliding at the reference rate [m/s]; there is no equilibrium at rest."""
+        return self.reference_rate
+
+    @property
+    def working_rates(self) -> tuple[float, float]:
+        """Slip rates [m/s] between which the bounds hold."""
+        return self.slowest_rate, self.fastest_rate
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """μ(v_s, d_c/v_f) and μ(v_f, d_c/v_s) [-], rounded outward."""
+        law = self.exact()
+        lowest = law.friction(law.slowest_rate, law.critical_slip / law.fastest_rate)
+        highest = law.friction(law.fastest_rate, law.critical_slip / law.slowest_rate)
+        return outward(lowest, up=False), outward(highest, up=True)
+
+    @property
+    def slip_slope(self) -> float:
+        """Bound [1/m] of |∂μ/∂θ · θ'|/v ≤ (b/θ)|θ'|/v, the change of friction by ageing per slip, rounded up."""
+        law = self.exact()
+        return outward(law.evolution_effect / law.critical_slip * law._state_slope, up=True)
+
+    @property
+    def rate_slope(self) -> float:
+        """Bound a/v_s [s/m] of ∂μ/∂v, reached by the logarithmic law at the slowest rate, rounded up."""
+        law = self.exact()
+        return outward(law.direct_effect / law.slowest_rate, up=True)
+
+
+def outward(value: Any, *, up: bool) -> float:
+    """Float that is not below (`up`) or not above an exact SymPy number."""
+    import math
+
+    import sympy as sp
+
+    if value.is_Rational:
+        exact = Fraction(int(value.p), int(value.q))
+    else:
+        near = rational(str(sp.N(value, _DIGITS)))
+        exact = near + abs(near) * (_ROUNDING if up else -_ROUNDING)
+    nearest = float(exact)
+    if (Fraction(nearest) < exact) if up else (Fraction(nearest) > exact):
+        return math.nextafter(nearest, math.inf if up else -math.inf)
+    return nearest
+
+
+def aging_rate(rate: Any, theta: Any, critical_slip: Any) -> Any:
+    """θ' = 1 − vθ/d_c [-] (Dieterich 1979; Ruina 1983): contacts age at rest too."""
+    return 1 - rate * theta / critical_slip
+
+
+def slip_rate(rate: Any, theta: Any, critical_slip: Any) -> Any:
+    """θ' = −(vθ/d_c) log(vθ/d_c) [-] (Ruina 1983): the state changes only with slip."""
+    import sympy as sp
+
+    share = rate * theta / critical_slip
+    return -share * sp.log(share)
+
+
+def aging_slope(slowest: Any, fastest: Any) -> Any:
+    """Largest |1/u − 1| [-] for u = vθ/d_c between v_s/v_f and v_f/v_s: v_f/v_s − 1."""
+    return fastest / slowest - 1
+
+
+def slip_law_slope(slowest: Any, fastest: Any) -> Any:
+    """Largest |log u| [-] for u = vθ/d_c between v_s/v_f and v_f/v_s: log(v_f/v_s)."""
+    import sympy as sp
+
+    return sp.log(fastest / slowest)
+
+
+def logarithmic(law: Any, rate: Any, theta: Any) -> Any:
+    """μ_0 + a log(v/v_0) + b log(v_0 θ/d_c) [-] (Dieterich 1979; Ruina 1983)."""
+    import sympy as sp
+
+    return (
+        law.reference_coefficient
+        + law.direct_effect * sp.log(rate / law.reference_rate)
+        + law.evolution_effect * sp.log(law.reference_rate * theta / law.critical_slip)
+    )

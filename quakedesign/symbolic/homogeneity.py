@@ -1,0 +1,318 @@
+"""Weighted homogeneity of functions, vector fields and Filippov fields, with a proof or an exact counterexample."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations, islice, product
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError
+from quakedesign.symbolic.balls import enclose
+from quakedesign.symbolic.filippov import FilippovField
+from quakedesign.symbolic.normal_form import normal_form, signs, symbols_of
+from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
+
+Weights = Mapping[sp.Symbol, int | sp.Rational]
+epsilon = sp.Symbol("epsilon", positive=True)
+_TRIES = 50
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """left = right for every state and every ε > 0: the expression at the dilated point, and what it must be.
+
+    Attributes
+    ----------
+    left, right : Expr
+        In the states and ε.
+    """
+
+    left: sp.Expr
+    right: sp.Expr
+
+    @property
+    def holds(self) -> bool:
+        """Whether both sides have one normal form; computed anew."""
+        return normal_form(self.left - self.right) == 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counterexample:
+    """A point and an ε at which a necessary identity fails.
+
+    Attributes
+    ----------
+    identity : Identity
+        What homogeneity would require.
+    meaning : str
+        The identity in words.
+    point : mapping of Symbol to Rational
+        Exact values of all states and parameters.
+    epsilon : Rational
+    """
+
+    identity: Identity
+    meaning: str
+    point: Mapping[sp.Symbol, sp.Rational]
+    epsilon: sp.Rational
+
+    @property
+    def values(self) -> tuple[sp.Expr, sp.Expr]:
+        """Both sides at the point, exact."""
+        at = {**self.point, epsilon: self.epsilon}
+        left, right = (side.subs(at, simultaneous=True) for side in (self.identity.left, self.identity.right))
+        return left, right
+
+    @property
+    def holds(self) -> bool:
+        """Whether the two sides differ there for certain, by ball arithmetic."""
+        left, right = self.values
+        return _differ(left, right)
+
+    def __str__(self) -> str:
+        where = ", ".join(f"{s} = {v}" for s, v in self.point.items())
+        left, right = self.values
+        return f"{self.meaning} fails at {where}, ε = {self.epsilon}: {left} ≠ {right}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Homogeneity:
+    """Answer to: is it r-homogeneous, and of which degree? (Bacciotti and Rosier 2005; Levant 2005 for inclusions.)
+
+    Attributes
+    ----------
+    weights : mapping of Symbol to Rational
+        r_i of every state.
+    degree : Rational or None
+        Degree, where one is proved; None also for what is identically zero.
+    proof : tuple of Identity
+        One for a function, one for every component of a field; empty without a proof.
+    counterexample : Counterexample or None
+    switching : tuple of (Expr, Rational)
+        Arguments of signs with their degrees: the switching surfaces are invariant under dilation, so that the identity
+        for every choice of the signs is the one for the sets.
+    """
+
+    weights: Mapping[sp.Symbol, sp.Rational]
+    degree: sp.Rational | None
+    proof: tuple[Identity, ...] = ()
+    counterexample: Counterexample | None = None
+    switching: tuple[tuple[sp.Expr, sp.Rational], ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """``proved``, ``refuted`` or ``undecided``, from the identities and the point, computed anew."""
+        if self.proof and all(identity.holds for identity in self.proof):
+            return "proved"
+        return "refuted" if self.counterexample is not None and self.counterexample.holds else "undecided"
+
+    def __bool__(self) -> bool:
+        return self.verdict == "proved"
+
+    def _repr_latex_(self) -> str:
+        if self.proof:
+            rows = [rf"{sp.latex(i.left)} &= {sp.latex(i.right)}" for i in self.proof]
+            return r"$\displaystyle\begin{aligned}" + r"\\".join(rows) + r"\end{aligned}$"
+        return rf"$\text{{{self.counterexample or self.verdict}}}$"
+
+
+def dilation(weights: Weights, factor: sp.Expr = epsilon) -> dict[sp.Symbol, sp.Expr]:
+    """x_i → ε^{r_i}x_i, for `subs`.
+
+    Raises
+    ------
+    ParameterError
+        When a weight is not positive, or the factor may not be.
+    """
+    exact = {state: sp.sympify(weight) for state, weight in weights.items()}
+    wrong = {state: weight for state, weight in exact.items() if not (weight.is_Rational and weight > 0)}
+    if wrong or not factor.is_positive:
+        raise ParameterError(
+            f"weights must be positive rationals and the factor positive. Received {wrong or factor}. Use for example 3, 2, 1."
+        )
+    return {state: factor**weight * state for state, weight in exact.items()}
+
+
+def dilate(expression: sp.Expr, weights: Weights, factor: sp.Expr = epsilon) -> sp.Expr:
+    """Expression at the dilated point, in normal form: ε stands outside wherever an argument is homogeneous."""
+    return normal_form(normal_form(expression).subs(dilation(weights, factor), simultaneous=True))
+
+
+def homogeneity(
+    subject: sp.Expr | FilippovField | Mapping[sp.Symbol, sp.Expr],
+    weights: Weights,
+    degree: int | sp.Rational | None = None,
+) -> Homogeneity:
+    """Degree of homogeneity with a proof, or an exact counterexample.
+
+    Parameters
+    ----------
+    subject : Expr, FilippovField or mapping of Symbol to Expr
+        A function V(Δx) = ε^m V(x), or a field f(Δx) = ε^m Δf(x), single- or set-valued; parameters in intervals and
+        all other symbols stay as they are.
+    weights : mapping of Symbol to int or Rational
+        r_i > 0 of every state.
+    degree : int or Rational, optional
+        Claim to decide; found without.
+
+    Returns
+    -------
+    Homogeneity
+        Its truth value is whether homogeneity is proved.
+
+    Raises
+    ------
+    ParameterError
+        When a weight is missing or not positive.
+    """
+    rates = subject.rates if isinstance(subject, FilippovField) else subject
+    components = (
+        {s: normal_form(r) for s, r in rates.items()} if isinstance(rates, Mapping) else {None: normal_form(rates)}
+    )
+    missing = [s for s in components if s is not None and s not in weights]
+    if missing:
+        raise ParameterError(f"every state needs a weight. None was given for {', '.join(map(str, missing))}.")
+    exact = {s: sp.sympify(r) for s, r in weights.items()}
+    return _decided(components, exact, None if degree is None else sp.sympify(degree))
+
+
+def _decided(components: Mapping, weights: Mapping, degree: sp.Rational | None) -> Homogeneity:
+    moved = {s: dilate(e, weights) for s, e in components.items()}
+    degrees = {s: _degrees(e) for s, e in moved.items()}
+    found = {m - weights.get(s, 0) for s, several in degrees.items() if several is not None for m in several}
+    homogeneous = all(several is not None for several in degrees.values())
+    if homogeneous and len(found | ({degree} if degree is not None else set())) <= 1:
+        m = next(iter(found), degree)
+        proof = tuple(
+            Identity(left=e.subs(dilation(weights), simultaneous=True), right=epsilon ** (m + weights.get(s, 0)) * e)
+            if e != 0
+            else Identity(left=e, right=e)
+            for s, e in components.items()
+        )
+        return Homogeneity(weights=weights, degree=m, proof=proof, switching=_switching(components, weights))
+    claims = _claims(components, weights, degree)
+    failure = next((c for claim in claims if (c := _search(*claim, weights)) is not None), None)
+    return Homogeneity(weights=weights, degree=None, counterexample=failure)
+
+
+def _degrees(dilated: sp.Expr) -> set[sp.Rational] | None:
+    """Exponents of ε in the terms of a sum; None where ε is not a factor."""
+    found = set()
+    for term in sp.Add.make_args(dilated) if dilated != 0 else ():
+        rest, power = term.as_independent(epsilon, as_Add=False)
+        base, exponent = power.as_base_exp()
+        if power != 1 and (base != epsilon or not exponent.is_Rational):
+            return None
+        found.add(sp.Integer(0) if power == 1 else exponent)
+    return found
+
+
+def _switching(components: Mapping, weights: Mapping) -> tuple[tuple[sp.Expr, sp.Rational], ...]:
+    found = dict[sp.Expr, sp.Rational]()
+    for e in components.values():
+        for argument in FilippovField(rates={epsilon: e}).switching:
+            degrees = _degrees(dilate(argument, weights)) or {sp.Integer(0)}
+            found[argument] = max(degrees)
+    return tuple(found.items())
+
+
+def _claims(components: Mapping, weights: Mapping, degree: sp.Rational | None) -> Iterator[tuple[Identity, str]]:
+    """What homogeneity requires, of the claimed degree or of any."""
+    at = {e: e.subs(dilation(weights), simultaneous=True) for e in components.values()}
+    if degree is not None:
+        for s, e in components.items():
+            m = degree + weights.get(s, 0)
+            yield Identity(left=at[e], right=epsilon**m * e), f"f(Δx) = ε^{{{m}}} f(x) for f = {e}"
+        return
+    for e in components.values():
+        twice = e.subs(dilation(weights, epsilon**2), simultaneous=True)
+        yield Identity(left=twice * e, right=at[e] ** 2), f"f(Δ²x)·f(x) = f(Δx)², for any degree of f = {e}"
+    for (s, e), (other, f) in combinations(components.items(), 2):
+        left, right = epsilon ** weights[other] * at[e] * f, epsilon ** weights[s] * at[f] * e
+        yield Identity(left=left, right=right), f"one degree for the components of {s} and {other}"
+
+
+def _search(identity: Identity, meaning: str, weights: Mapping) -> Counterexample | None:
+    symbols = [s for s in symbols_of((identity.left, identity.right)) if s != epsilon]
+    states = [s for s in symbols if s in weights]
+    primes = dict(zip((s for s in symbols if s not in weights), map(sp.Integer, sp.sieve), strict=False))
+    values = [sp.Integer(n) for n in (1, -1, 2, 0, -3)]
+    for chosen in islice(product(values, repeat=len(states)), _TRIES):
+        point = dict(zip(states, chosen, strict=True)) | primes
+        found = Counterexample(identity=identity, meaning=meaning, point=point, epsilon=sp.Integer(2))
+        if not _on_a_switch(found) and found.holds:
+            return found
+    return None
+
+
+def _on_a_switch(found: Counterexample) -> bool:
+    """Whether a sign has no single value there; the values then say nothing about the sets."""
+    at = {**found.point, epsilon: found.epsilon}
+    both = sp.Tuple(found.identity.left, found.identity.right)
+    return not all(_differ(argument.subs(at, simultaneous=True), sp.Integer(0)) for argument in signs(both))
+
+
+def _differ(left: sp.Expr, right: sp.Expr) -> bool:
+    try:
+        enclosure = enclose(left - right, {})
+    except (NotImplementedError, AttributeError):
+        return False
+    return bool(enclosure.is_finite() and not enclosure.contains(0))
+
+
+def weights_for(
+    field: FilippovField | Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational
+) -> dict[sp.Symbol, sp.Rational]:
+    """Weights that make a field homogeneous of a degree, from the linear equations that its terms impose, then proved.
+
+    Parameters
+    ----------
+    field : FilippovField or mapping of Symbol to Expr
+    degree : int or Rational
+        Such as −1 for sliding modes with a discontinuous integral.
+
+    Returns
+    -------
+    dict of Symbol to Rational
+
+    Raises
+    ------
+    ParameterError
+        When no weights exist, or they are not unique.
+    """
+    rates = field.rates if isinstance(field, FilippovField) else field
+    unknown = {state: sp.Dummy(f"r_{state}", positive=True) for state in rates}
+    equations: list[sp.Expr] = []
+    for state, rate in rates.items():
+        for term in sp.Add.make_args(normal_form(rate)):
+            if term != 0:
+                equations.append(_weight(term, unknown, equations) - unknown[state] - degree)
+    solution = sp.linsolve([e for e in equations if e != 0], *unknown.values())
+    values = next(iter(solution), ())
+    if not values or not all(v.is_Rational and v > 0 for v in values):
+        raise ParameterError(
+            f"the terms impose no unique positive weights for degree {degree}. Solving gives {solution}. Try another degree."
+        )
+    weights = dict(zip(rates, values, strict=True))
+    if not homogeneity(field, weights, degree):
+        raise ParameterError(
+            f"with the weights {weights} that the terms impose, homogeneity of degree {degree} is not proved."
+        )
+    return weights
+
+
+def _weight(e: sp.Expr, unknown: Mapping[sp.Symbol, sp.Symbol], equations: list[sp.Expr]) -> sp.Expr:
+    """Degree of a product in the unknown weights; sums inside powers add equations for their terms."""
+    if not e.has(*unknown):
+        return sp.Integer(0)
+    if e in unknown:
+        return unknown[e]
+    if e.is_Mul:
+        return sum((_weight(factor, unknown, equations) for factor in e.args), start=sp.Integer(0))
+    if e.is_Add:
+        first, *others = (_weight(term, unknown, equations) for term in e.args)
+        equations += [first - other for other in others]
+        return first
+    if e.is_Pow or isinstance(e, SignedPower | AbsolutePower):
+        return _weight(e.args[0], unknown, equations) * e.args[1]
+    raise ParameterError(f"{e} is not built from signed powers; it has no weight.")

@@ -1,0 +1,288 @@
+"""Whether a fault slides stably, decided with exact rationals where they suffice and in ball arithmetic otherwise."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from fractions import Fraction
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.symbolic import plant, state_plant
+from quakedesign.symbolic.balls import Box, enclose
+from quakedesign.symbolic.equilibrium import operating_rate
+from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, p, sigma
+from quakedesign.symbolic.state_plant import effective_stress
+
+Interval = tuple[Fraction, Fraction]
+Pressure = float | str | Fraction | tuple[float | str | Fraction, float | str | Fraction]
+_PRECISIONS = (64, 256, 1024, 4096)
+_PIECES = 200
+
+
+class Stability(Enum):
+    """Three outcomes; the third is no failure but the truth about a boundary."""
+
+    STABLE = "every condition is positive"
+    UNSTABLE = "a condition is negative"
+    UNDECIDED = "a condition is zero, or changes sign in the range"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Condition:
+    """One expression that stability needs positive, and its value.
+
+    Attributes
+    ----------
+    expression : Expr
+        In the symbols of the plant and the slopes of friction (`state_plant.stability_conditions`).
+    margin : (Fraction, Fraction)
+        Enclosure of the expression relative to the sum of the sizes of its parts [-], in [−1, 1]. The parts are those
+        with and without the stiffness k, so that a condition k > k_c has the margin (k − k_c)/(k + |k_c|); a condition
+        without stiffness has its terms for parts.
+    exact : bool
+        Whether the two ends are one exact rational.
+    """
+
+    expression: sp.Expr
+    margin: Interval
+    exact: bool
+
+    @property
+    def holds(self) -> bool | None:
+        """True if positive, False if negative, None if the enclosure contains zero."""
+        low, high = self.margin
+        return True if low > 0 else (False if high < 0 else None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StabilityVerdict:
+    """Whether sliding at a loading rate is stable, with the margin of every condition.
+
+    Attributes
+    ----------
+    outcome : Stability
+    conditions : tuple of Condition
+    pressure : (Fraction, Fraction)
+        Range of the pressure [Pa].
+    loading_rate : Fraction
+        Slip rate of the equilibrium [m/s].
+    inertia : bool
+    """
+
+    outcome: Stability
+    conditions: tuple[Condition, ...]
+    pressure: Interval
+    loading_rate: Fraction
+    inertia: bool
+
+    @property
+    def margin(self) -> Interval:
+        """Enclosure of the smallest condition's margin [-]; its sign is rigorous where the outcome is decided."""
+        return min(c.margin[0] for c in self.conditions), min(c.margin[1] for c in self.conditions)
+
+    def _repr_latex_(self) -> str:
+        signs = {True: ">0", False: "<0", None: r"\gtrless 0"}
+        rows = [f"{sp.latex(c.expression)} &{signs[c.holds]} && ({float(c.margin[0]):+.3g})" for c in self.conditions]
+        return r"$\displaystyle\begin{aligned}" + r"\\".join(rows) + r"\end{aligned}$"
+
+
+def stability(
+    fault: Fault,
+    *,
+    pressure: Pressure = 0,
+    loading_rate: float | str | Fraction | None = None,
+    inertia: bool = True,
+    uncertain: bool = False,
+) -> StabilityVerdict:
+    """Decide whether the equilibrium of a fault is stable.
+
+    Parameters
+    ----------
+    fault : Fault
+    pressure : number, text, or pair of them
+        Injected pressure p [Pa], below σ'; withdrawal is negative and raises the softening (ERRATA 1). A pair is a
+        range, over all of which the verdict holds.
+    loading_rate : number or text, optional
+        Slip rate v_∞ [m/s] of steady sliding; without it the law's ``operating_rate`` (rest for a law without state).
+    inertia : bool
+        Whether the mass counts; without it the plant is quasi-dynamic.
+    uncertain : bool
+        Whether stiffness, damping and authority range over the fault's uncertainty box.
+
+    Returns
+    -------
+    StabilityVerdict
+
+    Raises
+    ------
+    ParameterError
+        When the pressure opens the fault, or the rate is outside of the law's domain.
+    """
+    at = operating_rate(fault, loading_rate)
+    pressures = _interval(pressure, fault)
+    ranges = _ranges(fault, pressures, uncertain)
+    slopes = state_plant.slopes(fault.friction.symbolic(), state_plant.loading_rate if at else sp.Integer(0))
+    parameters = {**fault.friction.values(), state_plant.loading_rate: sp.Rational(str(at))}
+    conditions = tuple(
+        _condition(expression, slopes, parameters, ranges)
+        for expression in state_plant.stability_conditions(fault.friction.state_names, inertia=inertia)
+    )
+    return StabilityVerdict(
+        outcome=_outcome(conditions), conditions=conditions, pressure=pressures, loading_rate=at, inertia=inertia
+    )
+
+
+def _outcome(conditions: tuple[Condition, ...]) -> Stability:
+    signs = [c.holds for c in conditions]
+    if False in signs:
+        return Stability.UNSTABLE
+    return Stability.STABLE if all(signs) else Stability.UNDECIDED
+
+
+def _interval(pressure: Pressure, fault: Fault) -> Interval:
+    low, high = pressure if isinstance(pressure, tuple) else (pressure, pressure)
+    ends = rational(low, "pressure"), rational(high, "pressure")
+    if not ends[0] <= ends[1] < rational(fault.effective_normal_stress):
+        raise ParameterError(
+            f"pressure must be below the effective normal stress {fault.effective_normal_stress!r} Pa, and a range "
+            f"must ascend. Received {float(ends[0])!r} to {float(ends[1])!r} Pa. Above it the fault opens."
+        )
+    return ends
+
+
+def _ranges(fault: Fault, pressure: Interval, uncertain: bool) -> dict[sp.Symbol, Interval]:
+    """Range of effective stress, stiffness, damping and authority."""
+    values = {s: Fraction(str(v)) for s, v in plant.plant_values(fault).items()}
+    stress = values.pop(sigma)
+    box = fault.box
+    widths = {k_hat: box.stiffness, eta_hat: box.damping, N_hat: box.authority}
+    spread = {s: (v * (1 - widths[s] * uncertain), v * (1 + widths[s] * uncertain)) for s, v in values.items()}
+    return {effective_stress: (stress - pressure[1], stress - pressure[0]), **spread}
+
+
+def _condition(
+    expression: sp.Expr,
+    slopes: Mapping[sp.Symbol, sp.Expr],
+    parameters: Mapping[sp.Symbol, sp.Rational],
+    ranges: Mapping[sp.Symbol, Interval],
+) -> Condition:
+    fixed = {s: sp.Rational(str(low)) for s, (low, high) in ranges.items() if low == high}
+    names = {s: sp.sympify(v).subs(parameters) for s, v in slopes.items() if s in expression.free_symbols}
+    parts = _parts(expression.subs({s: v for s, v in slopes.items() if v == 0}))
+    terms = [t.subs(names).subs(fixed) for t in parts]
+    if all(t.is_Rational for t in terms):
+        values = [Fraction(str(t)) for t in terms]
+        size = sum(abs(v) for v in values)
+        exact = sum(values, start=Fraction(0)) / size if size else Fraction(0)
+        return Condition(expression=expression, margin=(exact, exact), exact=True)
+    inserted = [t.subs(slopes) for t in parts]
+    points = {s: (Fraction(str(v)), Fraction(str(v))) for s, v in parameters.items()}
+    try:
+        margin = _enclosed(inserted, {**points, **ranges})
+    except NotImplementedError:  # a parameter as exponent, say: with its number there may be an enclosure
+        margin = _enclosed([t.subs(parameters) for t in inserted], {**points, **ranges})
+    return Condition(expression=expression, margin=margin, exact=False)
+
+
+def _parts(expression: sp.Expr) -> list[sp.Expr]:
+    """Summands of a condition by powers of the stiffness, factored: each symbol fewer times, so tighter enclosures."""
+    if k_hat not in expression.free_symbols:
+        return list(sp.Add.make_args(expression))
+    powers = sp.Poly(expression, k_hat).terms()
+    return [sp.factor(c) * k_hat**n for (n,), c in powers if c != 0]
+
+
+def _enclosed(terms: list[sp.Expr], box: Box) -> Interval:
+    """Enclosure of Σ terms/Σ |terms| over a box: more digits at a point, more pieces on a range."""
+    from flint import ctx
+
+    before = ctx.prec
+    try:
+        for ctx.prec in _PRECISIONS:
+            low, high = _over_pieces(terms, box)
+            if low > 0 or high < 0:
+                break
+            if any(a != b for a, b in box.values()):
+                break
+    finally:
+        ctx.prec = before
+    return low, high
+
+
+def _over_pieces(terms: list[sp.Expr], box: Box) -> Interval:
+    pieces, done = [dict(box)], list[Interval]()
+    while pieces:
+        piece = pieces.pop()
+        low, high = _ratio(terms, piece)
+        wide = {s: (b - a) / abs(a + b) for s, (a, b) in piece.items() if a != b}
+        if low > 0 or high < 0 or not wide or len(done) + len(pieces) > _PIECES:
+            done.append((low, high))
+            continue
+        widest = max(wide, key=lambda s: wide[s])
+        a, b = piece[widest]
+        pieces += [piece | {widest: (a, (a + b) / 2)}, piece | {widest: ((a + b) / 2, b)}]
+    return min(low for low, _ in done), max(high for _, high in done)
+
+
+def _ratio(terms: list[sp.Expr], box: Box) -> Interval:
+    from flint import arb
+
+    balls = [enclose(t, box) for t in terms]
+    total, size = sum(balls, start=arb(0)), sum((abs(b) for b in balls), start=arb(0))
+    whole = (Fraction(-1), Fraction(1))
+    if not (total.is_finite() and size.is_finite()):
+        return whole
+    if not size > 0:
+        return (Fraction(0), Fraction(0)) if size.is_zero() else whole
+    ratio = total / size
+    return max(_rational(ratio.lower()), whole[0]), min(_rational(ratio.upper()), whole[1])
+
+
+def _rational(value: Any) -> Fraction:
+    exact = value.fmpq()
+    return Fraction(int(exact.p), int(exact.q))
+
+
+def critical_stiffness(
+    fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True
+) -> float:
+    """Stiffness k_c [N/m] below which the fault is unstable, from the closed form; not positive when none is.
+
+    Parameters
+    ----------
+    fault : Fault
+    pressure, loading_rate, inertia
+        As in `stability`.
+    """
+    expression = state_plant.critical_stiffness(fault.friction.symbolic(), inertia=inertia)
+    return float(_number(expression, fault, pressure, loading_rate)) * fault.mass
+
+
+def nucleation_length(fault: Fault, *, pressure: float = 0, loading_rate: float | None = None) -> float:
+    """Length [m] below which a fault with this friction slides stably; infinite when every length does.
+
+    Parameters
+    ----------
+    fault : Fault
+    pressure, loading_rate
+        As in `stability`.
+    """
+    expression = state_plant.nucleation_length(fault.friction.symbolic())
+    length = float(_number(expression, fault, pressure, loading_rate))
+    return length if length > 0 else float("inf")
+
+
+def _number(expression: sp.Expr, fault: Fault, pressure: float, rate: float | None) -> sp.Expr:
+    held = _interval(pressure, fault)[0]
+    values = {
+        **plant.plant_values(fault),
+        **fault.friction.values(),
+        p: sp.Rational(str(held)),
+        state_plant.loading_rate: sp.Rational(str(operating_rate(fault, rate))),
+        state_plant.shear_modulus: sp.Rational(str(rational(fault.shear_modulus))),
+    }
+    return sp.N(sp.sympify(expression).subs(values), 30)

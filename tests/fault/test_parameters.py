@@ -1,0 +1,99 @@
+"""Derived quantities against the paper's table and against hand calculation."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+
+REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
+
+
+@pytest.mark.parametrize(("fault", "frequency"), [(REAL, 0.6928), (LAB, 127.6)], ids=lambda v: getattr(v, "name", ""))
+def test_natural_frequency(fault, frequency):
+    # √(k/m) = √(G/ρ)/L: √1.2e7/5000 = 0.69282, √162.8159/0.1 = 127.599
+    assert fault.natural_frequency == pytest.approx(frequency, rel=1e-4)
+
+
+def test_stiffness_is_modulus_times_length():
+    # ERRATA 3: G/L, as printed, would give 6e6 N/m and ω_n = 1.4e-4 rad/s
+    assert REAL.stiffness == 30e9 * 5000
+    assert LAB.stiffness == pytest.approx(225.5e3 * 0.1)
+    printed = math.sqrt(30e9 / 5000 / REAL.mass)
+    assert printed == pytest.approx(1.4e-4, rel=0.02)
+    assert LAB.natural_frequency / REAL.natural_frequency == pytest.approx(184.17, rel=1e-4)  # λ_t of the table
+
+
+@pytest.mark.parametrize(
+    ("fault", "moment", "magnitude"), [(REAL, 6.25e17, 5.79), (LAB, 17, -5.25)], ids=lambda v: getattr(v, "name", "")
+)
+def test_moment_and_magnitude_of_the_table(fault, moment, magnitude):
+    assert fault.seismic_moment == pytest.approx(moment, rel=1e-12)
+    assert round(fault.magnitude, 2) == magnitude
+
+
+def test_magnitudes_differ_by_two_thirds_of_the_logarithm_of_the_ratio():
+    # ERRATA 4: 2/3·log10(3.68e16) = 11.044
+    assert REAL.magnitude - LAB.magnitude == pytest.approx(2 / 3 * math.log10(6.25e17 / 17))
+    assert REAL.magnitude - LAB.magnitude == pytest.approx(11.044, abs=5e-4)
+
+
+def test_everything_per_unit_mass_follows_from_density_and_length():
+    # m = 2500·1.25e11 = 3.125e14 kg; N̂ = 1/(ρL); k̂ = G/(ρL²); η̂ = η/m = 1.6 1/s
+    assert REAL.mass == 3.125e14
+    assert REAL.area == 2.5e7
+    assert REAL.authority == pytest.approx(8e-8)
+    assert REAL.specific_stiffness == pytest.approx(0.48)
+    assert REAL.specific_damping == pytest.approx(1.6)
+    assert REAL.damping_ratio == pytest.approx(1.6 / (2 * math.sqrt(0.48)))
+    assert REAL.stress_drop == pytest.approx(5e6)
+
+
+def test_without_a_stress_drop_there_is_no_earthquake():
+    calm = replace(REAL, friction=replace(REAL.friction, drop=0.0))
+    assert calm.seismic_moment == 0
+    assert calm.magnitude == -math.inf
+    assert calm.rest_slip == 0
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("name", ["density", "shear_modulus", "length", "effective_normal_stress", "sampling_time"])
+def test_unphysical_values_are_refused(name, value):
+    with pytest.raises(ParameterError, match=rf"^{name} must be positive and finite\. Received {value!r}"):
+        replace(REAL, **{name: value})
+
+
+def test_the_sign_of_stress_is_explained():
+    with pytest.raises(ParameterError, match=r"Compression is positive here; check the sign\."):
+        replace(REAL, effective_normal_stress=-5e7)
+
+
+def test_damping_may_vanish_but_not_be_negative():
+    assert replace(REAL, damping=0.0).damping_ratio == 0
+    with pytest.raises(ParameterError, match="damping must be zero or positive"):
+        replace(REAL, damping=-1.0)
+
+
+@pytest.mark.parametrize(
+    "extreme", [{"length": 1e300}, {"length": 1e-150}, {"density": 1e300, "length": 1e6}, {"shear_modulus": 1e307}]
+)
+def test_numbers_that_overflow_are_refused(extreme):
+    with pytest.raises(ParameterError, match="so extreme that derived quantities overflow"):
+        replace(REAL, **extreme)
+
+
+def test_sampling_is_fine_against_the_operation():
+    with pytest.raises(ParameterError, match="sampling_time must be at most a thousandth of the operation time"):
+        replace(REAL, sampling_time=REAL.reference.operation_time / 999)
+
+
+def test_a_fault_is_a_value():
+    assert replace(REAL) == REAL
+    assert hash(replace(REAL)) == hash(REAL)
+    assert REAL.with_box("ten-percent").box.name == "ten-percent"
+    assert REAL.box.name == "paper"
+    assert REAL.with_disturbance(LAB.disturbance).disturbance == LAB.disturbance
+    with pytest.raises(AttributeError):
+        REAL.density = 1.0

@@ -1,0 +1,79 @@
+"""Quantities with units, each wrong one with its own message."""
+
+import math
+
+import pytest
+
+from quakedesign.errors import UnitError
+from quakedesign.fault.units import si_value
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "value"),
+    [
+        ("30 GPa", "Pa", 30e9),
+        ("225.5 kPa", "Pa", 225500.0),
+        ("276.35 mm", "m", 0.27635),
+        ("184.17 hour", "s", 663012.0),
+        ("184 ms", "s", 0.184),
+        ("5e14 kg/s", "kg/s", 5e14),
+        ("2.5 g/cm^3", "kg/m^3", 2500.0),
+        ("2500 kg/m³", "kg/m^3", 2500.0),
+        ("-3.2e-6 1/s^2", "1/s^2", -3.2e-6),
+        ("60 rpm", "rad/s", 2 * math.pi),
+        ("10 %", "", 0.1),
+        ("0.4", "", 0.4),
+        (0.4, "", 0.4),
+        (3, "", 3.0),
+    ],
+)
+def test_conversion(quantity, unit, value):
+    assert si_value(quantity, unit, "it") == pytest.approx(value, rel=1e-15)
+
+
+def test_decimals_are_not_rounded_twice():
+    assert si_value("0.1 MPa", "Pa", "it") == 100000.0
+    assert si_value("276.35 mm", "m", "it") == 0.27635
+    assert si_value("7.1 mm", "m", "it") == 0.0071
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "reason"),
+    [
+        ("30 GPaa", "Pa", "whose unit is unknown. Check its spelling"),
+        ("30 m", "Pa", "which has another dimension"),
+        ("30 + 2 GPa", "Pa", "which has another dimension"),
+        ("30", "Pa", "without a unit. Add the unit"),
+        (30, "Pa", "without a unit. Add the unit"),
+        (30.5, "Pa", "without a unit. Add the unit"),
+        ("GPa", "Pa", "without a number. Add the number"),
+        ("", "Pa", "cannot be read"),
+        ("(1 Pa", "Pa", "cannot be read"),
+        ("1/0 Pa", "Pa", "cannot be read"),
+        ("9**9**9**9 Pa", "Pa", "cannot be read"),
+        ("1e999999999 Pa", "Pa", "cannot be read"),
+        ("20 degC", "Pa", "Received '20 degC'"),
+        ("10 m", "", "which has another dimension"),
+        ("1" * 101, "Pa", "a text of 101 characters"),
+        (True, "", "Received True"),
+        (None, "Pa", "Received None"),
+        ([1, "Pa"], "Pa", "Received [1, 'Pa']"),
+    ],
+    ids=lambda v: str(v)[:20],
+)
+def test_wrong_quantities(quantity, unit, reason):
+    with pytest.raises(UnitError) as raised:
+        si_value(quantity, unit, "shear_modulus")
+    message = str(raised.value)
+    assert message.startswith(
+        "shear_modulus must be a " + ("quantity in Pa, such as '30 GPa'" if unit else "plain number")
+    )
+    assert reason in message
+    assert "Received" in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize("quantity", ["0.11 Hz", "1 kHz"])
+def test_hertz_are_not_silently_radians_per_second(quantity):
+    with pytest.raises(UnitError, match=r"must be an angular frequency in rad/s\. Received .* Give 2π times it"):
+        si_value(quantity, "rad/s", "frequency")

@@ -1,0 +1,173 @@
+"""Enclosures contain every value; bounds are never below a sample."""
+
+from fractions import Fraction as F
+
+import flint
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from quakedesign.symbolic import AbsolutePower, SignedPower
+from quakedesign.symbolic.balls import ball, enclose, upper_bound
+
+x, y = sp.symbols("x y", real=True)
+SLACK = 1e-7  # a ball rounds its radius outward to 30 bits
+numbers = st.fractions(-4, 4, max_denominator=12)
+
+
+def sympy_rational(value):
+    return sp.Rational(value.numerator, value.denominator)
+
+
+def one_step(inner):
+    pairs = st.tuples(inner, inner)
+    return st.one_of(
+        pairs.map(lambda e: e[0] + e[1]),
+        pairs.map(lambda e: e[0] * e[1]),
+        pairs.map(lambda e: e[0] - e[1]),
+        pairs.map(lambda e: sp.Max(*e)),
+        pairs.map(lambda e: sp.Min(*e)),
+        pairs.map(lambda e: e[0] / (2 + sp.cos(e[1]))),
+        inner.map(sp.sin),
+        inner.map(lambda e: sp.exp(-AbsolutePower(e, sp.Rational(1, 2)))),
+        inner.map(lambda e: sp.exp(sp.sin(e))),
+        inner.map(sp.Abs),
+        inner.map(sp.asinh),
+        inner.map(lambda e: sp.log(e**2 + 1)),
+        inner.map(lambda e: (e**2 + 1) ** sp.Rational(-3, 2)),
+        st.tuples(inner, st.integers(2, 5)).map(lambda e: e[0] ** e[1]),
+        st.tuples(inner, st.sampled_from(("1/3", "1/2", "3/2", "2", "5/3"))).map(
+            lambda e: SignedPower(e[0], sp.Rational(e[1]))
+        ),
+        inner.map(lambda e: AbsolutePower(e, sp.Rational(5, 2))),
+    )
+
+
+expressions = st.recursive(st.sampled_from((x, y)) | numbers.map(sympy_rational), one_step, max_leaves=5)
+intervals = st.tuples(numbers, numbers).map(lambda ends: tuple(sorted(ends)))
+shares = st.fractions(0, 1, max_denominator=30)
+
+
+def exact(expression, at):
+    """Value with an error below 1e-25, as a ball."""
+    found = sp.N(sp.sympify(expression).subs({s: sympy_rational(v) for s, v in at.items()}), 40)
+    radius = "1e-25" if found == 0 else str(abs(sp.Float(found, 40)) * sp.Float("1e-25", 40))
+    return flint.arb(str(found), radius)
+
+
+@settings(max_examples=150, deadline=None)
+@given(expressions, intervals, intervals, shares, shares)
+def test_an_enclosure_contains_every_value(expression, first, second, along, across):
+    box = {x: first, y: second}
+    at = {x: first[0] + along * (first[1] - first[0]), y: second[0] + across * (second[1] - second[0])}
+    assert enclose(expression, box).overlaps(exact(expression, at))
+
+
+@given(intervals)
+def test_a_ball_contains_both_ends(ends):
+    found = ball(*ends)
+    assert all(found.contains(flint.arb(flint.fmpq(v.numerator, v.denominator))) for v in ends)
+
+
+UNBOUNDED = {
+    "1/x": 1 / x,
+    "1/x²": 1 / x**2,
+    "|x|^-½": AbsolutePower(x, -sp.Rational(1, 2)),
+    "⌈x⌋^-½": SignedPower(x, -sp.Rational(1, 2)),
+    "log": sp.log(x),
+    "root": sp.sqrt(x),
+}
+
+
+@pytest.mark.parametrize("ends", [(F(-1), F(1)), (F(-1, 3), F(2))], ids=str)
+@pytest.mark.parametrize("expression", UNBOUNDED.values(), ids=UNBOUNDED)
+def test_where_it_is_not_defined_the_enclosure_is_not_finite(expression, ends):
+    assert not enclose(expression, {x: ends}).is_finite()
+    with pytest.raises(ValueError, match="no finite bound"):
+        upper_bound(expression, {x: ends}, pieces=30)
+
+
+def test_a_negative_power_up_to_zero_is_unbounded():
+    for kind in (SignedPower, AbsolutePower):
+        assert not enclose(kind(x, -sp.Rational(1, 2)), {x: (F(0), F(1))}).is_finite()
+        assert float(enclose(kind(x, -sp.Rational(1, 2)), {x: (F(1, 4), F(1))}).upper()) == pytest.approx(2)
+
+
+def test_the_sign_at_zero_is_the_whole_interval():
+    sign = SignedPower(x, 0)
+    for ends, low, high in (
+        ((F(-1), F(1)), -1, 1),
+        ((F(0), F(1)), -1, 1),
+        ((F(1), F(2)), 1, 1),
+        ((F(-2), F(-1)), -1, -1),
+    ):
+        found = enclose(sign, {x: ends})
+        assert [float(found.lower()), float(found.upper())] == pytest.approx([low, high], abs=SLACK)
+
+
+def test_powers_are_enclosed_tightly():
+    assert float(enclose(x**2, {x: (F(-1), F(2))}).lower()) == pytest.approx(0, abs=SLACK)
+    assert float(enclose(x**2, {x: (F(-1), F(2))}).upper()) == pytest.approx(4)
+    assert float(enclose(x**3, {x: (F(-1), F(2))}).lower()) == pytest.approx(-1)
+
+
+@pytest.mark.parametrize("number", [sp.pi, sp.E, sp.sqrt(2) * sp.exp(sp.Rational(1, 3)), sp.Rational(1, 3)], ids=str)
+def test_numbers(number):
+    found = enclose(number, {})
+    assert found.overlaps(exact(number, {}))
+    assert float(found.rad()) < 1e-14
+
+
+@pytest.mark.parametrize("expression", [sp.gamma(x), sp.Integer(2) ** x, x**sp.pi, SignedPower(x, sp.sqrt(2))], ids=str)
+def test_what_has_no_enclosure_is_said(expression):
+    with pytest.raises(NotImplementedError, match="no enclosure for"):
+        enclose(expression, {x: (F(1), F(2))})
+
+
+MAXIMA = [
+    (x * (1 - x), {x: (F(0), F(1))}, 0.25),
+    (x**2 - 3, {x: (F(-1), F(1))}, 3),
+    (sp.sin(x), {x: (F(0), F(4))}, 1),
+    (x * sp.exp(-x), {x: (F(0), F(5))}, 0.36787944117144233),
+    (x * y - x, {x: (F(-1), F(1)), y: (F(-2), F(2))}, 3),
+    (SignedPower(x, sp.Rational(1, 3)) - x, {x: (F(-1), F(1))}, 0.38490017945975052),  # at 3^{-3/2}: 2/3^{3/2}
+    (-AbsolutePower(x, sp.Rational(3, 2)), {x: (F(-4), F(1))}, 8),
+    (sp.Max(x, 1 - x), {x: (F(0), F(1))}, 1),
+    (sp.Integer(0) * x, {x: (F(0), F(1))}, 0),
+    (sp.Integer(-2), {}, 2),
+]
+
+
+@pytest.mark.parametrize(("expression", "box", "largest"), MAXIMA, ids=lambda v: str(v)[:30])
+def test_known_maxima_are_bounded_within_the_tolerance(expression, box, largest):
+    bound = float(upper_bound(expression, box, tolerance=F(1, 100), pieces=3000))
+    assert largest * (1 - 1e-12) <= bound <= largest * 1.0101
+
+
+@settings(max_examples=40, deadline=None)
+@given(expressions, intervals, intervals)
+def test_a_bound_is_never_below_a_dense_sample(expression, first, second):
+    box = {x: first, y: second}
+    try:
+        bound = upper_bound(expression, box, pieces=8)
+    except ValueError:
+        return
+    numeric = sp.lambdify((x, y), expression.replace(SignedPower, signed).replace(AbsolutePower, absolute), "mpmath")
+    numeric_steps = [F(i, 8) for i in range(9)]
+    for i in numeric_steps:
+        for j in numeric_steps:
+            at = [float(low + share * (high - low)) for share, (low, high) in ((i, first), (j, second))]
+            assert abs(numeric(*at)) <= float(bound) * (1 + 1e-9) + 1e-9
+
+
+def signed(base, exponent):
+    return sp.sign(base) * sp.Abs(base) ** exponent
+
+
+def absolute(base, exponent):
+    return sp.Abs(base) ** exponent
+
+
+def test_an_early_stop_is_rigorous_too():
+    assert upper_bound(x * (1 - x), {x: (F(0), F(1))}, pieces=0) >= F(1, 4)

@@ -1,0 +1,81 @@
+"""Numbers become exact in one place, and only finite ones."""
+
+from fractions import Fraction as F
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quakedesign.errors import ParameterError
+from quakedesign.rationals import decimal, nearest, rational, text
+
+
+@pytest.mark.parametrize(
+    ("written", "exact"),
+    [
+        ("2.3", F(23, 10)),
+        ("4.51e-4", F(451, 1000000)),
+        ("23/10", F(23, 10)),
+        ("-3/4", F(-3, 4)),
+        ("+.5", F(1, 2)),
+        ("5.", F(5)),
+        (" 1E+3\n", F(1000)),
+        (0.1, F(1, 10)),
+        (-0.0, F(0)),
+        (7, F(7)),
+        (F(1, 3), F(1, 3)),
+        (np.float64(0.1), F(1, 10)),
+        (np.int64(-3), F(-3)),
+        (sp.Rational(2, 7), F(2, 7)),
+    ],
+    ids=repr,
+)
+def test_numbers_are_read_exactly(written, exact):
+    assert rational(written) == exact
+    assert type(rational(written)) is F
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        *("", ".", "abc", "1/0", "1/00", "3/-4", "1.5/2", "1_0", "0x1", "١", "1e5000", "nan", "inf", "1" * 301),
+        *(float("nan"), float("-inf"), True, None, 1j, [1], b"1"),
+    ],
+    ids=lambda written: repr(written)[:20],
+)
+def test_anything_else_is_refused_with_what_was_received(written):
+    with pytest.raises(ParameterError, match=r"^gain k1 must be a finite number.*Received .*\. Write for example"):
+        rational(written, "gain k1")
+
+
+@pytest.mark.parametrize("written", ["1e309", "1e-309", "9.9e999", 5e-324, 10**5000], ids=lambda w: str(type(w)))
+def test_a_number_that_no_float_can_show_is_refused(written):
+    with pytest.raises(ParameterError, match="at most 308 digits"):
+        rational(written)
+
+
+@given(st.fractions(), st.integers(1, 10**6))
+def test_the_nearest_multiple_is_at_most_half_a_step_away(value, denominator):
+    found = nearest(float(value), denominator)
+    assert (found * denominator).denominator == 1
+    assert abs(found - F(float(value))) <= F(1, 2 * denominator)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_only_finite_numbers_are_rounded(value):
+    with pytest.raises(ParameterError, match="finite"):
+        nearest(value, 10)
+
+
+@given(st.fractions())
+def test_text_is_in_lowest_terms_and_reads_back(value):
+    assert rational(text(value)) == value
+    assert text(F(6, 4)) == "3/2"
+
+
+def test_a_short_display_says_when_it_is_rounded():
+    assert decimal(F(1, 10)) == "0.1"
+    assert decimal(F(1, 3)) == "≈0.333333"
+    assert decimal(F(2, 3), digits=2) == "≈0.67"
