@@ -1,16 +1,20 @@
 """Plant, law and reference of one closed loop, from SymPy to CasADi functions."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import sympy as sp
 
 from quakedesign.controllers import Controller, Signals, SlidingMode
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
+from quakedesign.simulation.integrators import Integrator
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_casadi
+
+Motion = Callable[[Callable[[Any, Any, Any], Any], Any, Any], Any]
 
 phi = sp.Symbol("phi", real=True)
 r, r_rate, r_acceleration = sp.symbols("r r_rate r_acceleration", real=True)
@@ -86,9 +90,28 @@ class ClosedLoop:
         p [Pa] where there is no controller.
     """
 
+    plant_name: ClassVar[str] = "smooth"
+    plant_title: ClassVar[str] = ""
+    sticks: ClassVar[bool] = False
+
     fault: Fault
     controller: Controller | None = None
     constant_pressure: float = 0.0
+
+    def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
+        """State [x1, x2, ξ] (SX) after one step.
+
+        Parameters
+        ----------
+        method : type of Integrator
+        motion : callable
+            Time derivative of the state, given the plant as a function of t [s], x and p [Pa], how much of the step has
+            passed [-], and the state.
+        state : SX
+        step : float
+            [s].
+        """
+        return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)
 
     @property
     def integrals(self) -> tuple[sp.Symbol, ...]:
@@ -108,12 +131,12 @@ class ClosedLoop:
         """CasADi Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²]."""
         rates = [plant.x2, acceleration_expression(self.fault)]
         inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p]}
-        return _function("plant", inputs, {"dx": rates}, self._shaking)
+        return casadi_function("plant", inputs, {"dx": rates}, self.shaking)
 
     @cached_property
     def reference(self) -> Any:
         """CasADi Function t [s] → reference [m, m/s, m/s²]."""
-        return _function("reference", {"t": [plant.t]}, {"reference": list(reference_expressions(self.fault))})
+        return casadi_function("reference", {"t": [plant.t]}, {"reference": list(reference_expressions(self.fault))})
 
     @cached_property
     def law(self) -> Any:
@@ -124,9 +147,9 @@ class ClosedLoop:
             "reference": [r, r_rate, r_acceleration],
         }
         if self.controller is None:
-            return _function("law", inputs, {"p": [sp.Float(self.constant_pressure)], "dxi": []})
+            return casadi_function("law", inputs, {"p": [sp.Float(self.constant_pressure)], "dxi": []})
         pressure, rates = law_expressions(self.controller)
-        return _function("law", inputs, {"p": [pressure], "dxi": list(rates)})
+        return casadi_function("law", inputs, {"p": [pressure], "dxi": list(rates)})
 
     @cached_property
     def perturbation(self) -> Any:
@@ -140,15 +163,15 @@ class ClosedLoop:
             "h": [matched_perturbation(self.fault, self.divisor)],
             "mu": [friction_expression(self.fault)],
         }
-        return _function("perturbation", inputs, outputs, self._shaking)
+        return casadi_function("perturbation", inputs, outputs, self.shaking)
 
     @property
-    def _shaking(self) -> dict[sp.Symbol, sp.Expr]:
+    def shaking(self) -> dict[sp.Symbol, sp.Expr]:
         """φ̂_e [m/s²] in x1, x2 and t; kept apart, since a tiny constant would drown in SymPy's sum of floats."""
         return {phi: plant.with_disturbance(plant.disturbance(plant.x1, plant.x2, plant.t), self.fault)}
 
 
-def _function(
+def casadi_function(
     name: str,
     inputs: dict[str, list[sp.Symbol]],
     outputs: dict[str, list[sp.Expr]],

@@ -4,10 +4,9 @@ from collections.abc import Callable
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, Fault
-from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import Setting, run
+from quakedesign.simulation.run import Setting, loop_class, run
 from quakedesign.simulation.schemes import simulation_scheme
 from quakedesign.simulation.trajectory import Trajectory
 
@@ -23,6 +22,7 @@ def natural_earthquake(
     *,
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
+    plant: str = "smooth",
 ) -> Trajectory:
     """Let an uncontrolled fault go, under a constant acceleration of 3.2e-15 m/s² and a constant pressure.
 
@@ -32,7 +32,7 @@ def natural_earthquake(
         Its own disturbance is replaced.
     pressure : float
         Fluid pressure [Pa] from t = 0 on: 0 for a natural, positive for an induced earthquake.
-    progress, compiled
+    progress, compiled, plant
         As in `simulate`.
 
     Returns
@@ -54,7 +54,7 @@ def natural_earthquake(
     nudged = fault.with_disturbance(Disturbance(constant=NUDGE))
     step = min(fault.sampling_time, FINENESS / fault.natural_frequency)
     setting = Setting.of(nudged, step, _duration(fault), 2000, 0.0)
-    recorder = Recorder(ClosedLoop(nudged, None, pressure), simulation_scheme("continuous"), step)
+    recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
     return run(recorder, setting, integrator("dormand-prince"), progress=progress, compiled=compiled)
 
 

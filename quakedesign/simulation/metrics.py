@@ -4,7 +4,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
-EVENTS = ("diverged", "opening", "reverse_slip")
+EVENTS = ("diverged", "opening", "reverse_slip", "stick")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +68,21 @@ class Metrics:
         return _UNITS[name]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StickMetrics(Metrics):
+    """Figures of one run of a plant whose friction holds it at rest, given without a controller too.
+
+    Attributes
+    ----------
+    stick_fraction : float or None
+        Share of the steps with x2 = 0 over t > settled_from [-].
+    """
+
+    stick_fraction: float | None = None
+
+
 _UNITS = {
+    "stick_fraction": "",
     "max_slip_error": "m",
     "max_slip_rate_error": "m/s",
     "rms_slip_error": "m",
@@ -101,14 +115,18 @@ def metrics(
     steps: int,
     settled_from: float,
     seconds: float,
+    sticks: bool = False,
 ) -> Metrics:
     """Figures from what the loop accumulated; `step` [s] is the length of one step."""
+    kind = StickMetrics if sticks else Metrics
     if watched["diverged"] >= 0:
-        return Metrics(settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
+        return kind(settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
     figures = _whole_run(watched, step) | _settled(watched) if controlled else {}
     figures["peak_slip_rate"] = watched["peak_slip_rate"]
+    if sticks:
+        figures |= _shares(watched)
     finite = {name: value for name, value in figures.items() if math.isfinite(value)}
-    return Metrics(**finite, settled_from=settled_from, steps=steps, seconds=seconds)
+    return kind(**finite, settled_from=settled_from, steps=steps, seconds=seconds)
 
 
 def _whole_run(watched: dict[str, float], step: float) -> dict[str, float]:
@@ -117,6 +135,12 @@ def _whole_run(watched: dict[str, float], step: float) -> dict[str, float]:
         "max_pressure": watched["max_pressure"],
         "min_pressure": watched["min_pressure"],
     }
+
+
+def _shares(watched: dict[str, float]) -> dict[str, float]:
+    count = watched["settled_count"]
+    counted = {"stick_fraction": "rest_count", "reverse_slip_fraction": "reverse_count"}
+    return {name: watched[what] / count for name, what in counted.items()} if count else {}
 
 
 def _settled(watched: dict[str, float]) -> dict[str, float]:

@@ -20,6 +20,7 @@ START = {
     "pressure_variation": 0.0,
     "reverse_count": 0.0,
     "settled_count": 0.0,
+    "rest_count": 0.0,
     "peak_slip_rate": 0.0,
     "max_h_change": 0.0,
     "max_pressure": -math.inf,
@@ -29,6 +30,7 @@ START = {
     "diverged": NEVER,
     "opening": NEVER,
     "reverse_slip": NEVER,
+    "stick": NEVER,
 }
 
 
@@ -92,11 +94,14 @@ class Recorder:
         }
 
     def _after(self, before: dict[str, Any], vector: Any) -> dict[str, Any]:
+        import casadi as ca
+
         now = self.signals(vector)
         settled = now["time"] > vector[1]
         later = vector[0] > 0
         return {
             **_errors(before, now, settled),
+            "rest_count": before["rest_count"] + ca.logic_and(settled, self._rests(now)),
             **_pressures(before, now, settled, later),
             **_extremes(before, now, later),
             **self._events(before, now, vector),
@@ -112,11 +117,16 @@ class Recorder:
             "diverged": ca.logic_not(fine),
             "opening": now["pressure"] >= self.loop.fault.effective_normal_stress,
             "reverse_slip": now["slip_rate"] < 0,
+            "stick": ca.logic_and(vector[0] > 0, self._rests(now)),
         }
         return {
             name: ca.if_else(ca.logic_and(before[name] < 0, what), now["time"], before[name])
             for name, what in happening.items()
         }
+
+    def _rests(self, now: dict[str, Any]) -> Any:
+        """Whether friction holds the fault; a smooth plant is at rest only in passing."""
+        return now["slip_rate"] == 0 if self.loop.sticks else 0
 
 
 def _errors(before: dict[str, Any], now: dict[str, Any], settled: Any) -> dict[str, Any]:

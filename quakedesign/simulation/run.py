@@ -14,6 +14,7 @@ from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.simulation.backend import Backend, prepare
 from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.simulation.coulomb import CoulombLoop
 from quakedesign.simulation.integrators import Integrator, integrator
 from quakedesign.simulation.metrics import events, metrics
 from quakedesign.simulation.recorder import START, Recorder
@@ -37,6 +38,7 @@ def simulate(
     settled_from: float | None = None,
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
+    plant: str = "smooth",
 ) -> Trajectory:
     """Simulate a fault under a controller, from rest, with the fault's own disturbance and reference.
 
@@ -62,6 +64,9 @@ def simulate(
     compiled : bool, optional
         True: machine code or an error. False: CasADi's virtual machine. None: machine code if a C compiler
         works. The digits are the same.
+    plant : str
+        ``"smooth"``: eq. shift, which holds for slip rates that are not negative. ``"coulomb"``: friction opposes slip
+        in both directions and holds the fault at rest (ERRATA 14).
 
     Returns
     -------
@@ -71,13 +76,28 @@ def simulate(
     Raises
     ------
     ParameterError
-        For a step, duration or number of samples that is not positive and finite, or an unknown scheme or method.
+        For a step, duration or number of samples that is not positive and finite, or an unknown scheme, method or
+        plant.
     SimulationError
         When `compiled` is True and no compiler works.
     """
     setting = Setting.of(fault, step, duration, samples, settled_from)
-    recorder = Recorder(ClosedLoop(fault, controller), simulation_scheme(scheme), setting.step)
+    recorder = Recorder(loop_class(plant)(fault, controller), simulation_scheme(scheme), setting.step)
     return run(recorder, setting, integrator(method), progress=progress, compiled=compiled)
+
+
+def loop_class(plant: str) -> type[ClosedLoop]:
+    """Closed loop with a named plant.
+
+    Raises
+    ------
+    ParameterError
+        When there is none of that name.
+    """
+    found = {kind.plant_name: kind for kind in (ClosedLoop, CoulombLoop)}
+    if plant not in found:
+        raise ParameterError(f"plant must be one of {', '.join(found)}. Received {plant!r}.")
+    return found[plant]
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +170,7 @@ def run(
         steps=setting.steps,
         settled_from=setting.settled_from,
         seconds=ended - began,
+        sticks=recorder.loop.sticks,
     )
     return Trajectory(
         **_columns(recorder, kept, signals),
@@ -157,7 +178,7 @@ def run(
         events=events(watched),
         provenance=provenance,
         integral_units=recorder.loop.controller.integral_units if recorder.loop.controller else (),
-        name=f"{recorder.loop.fault.name}, {_law_title(recorder.loop.controller)}",
+        name=f"{recorder.loop.fault.name}, {_law_title(recorder.loop.controller)}{recorder.loop.plant_title}",
     )
 
 
@@ -199,9 +220,15 @@ def _provenance(recorder: Recorder, method: type[Integrator], backend: Backend) 
         "method": method.name,
         "step": recorder.step,
         "scheme": recorder.scheme.name,
+        "plant": recorder.loop.plant_name,
         "backend": backend.name,
         "backend_reason": backend.reason,
-    } | {f"version_{package}": _version(package) for package in ("casadi", "numpy", "quakedesign")}
+    } | library_versions("casadi", "numpy", "quakedesign")
+
+
+def library_versions(*packages: str) -> dict[str, str]:
+    """Installed version of each package, as provenance."""
+    return {f"version_{package}": _version(package) for package in packages}
 
 
 def _version(package: str) -> str:

@@ -45,7 +45,8 @@ class Trajectory:
     integral_units : tuple of str
     metrics : Metrics
     events : mapping of str to float
-        Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'_n), ``reverse_slip`` (x2 < 0).
+        Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'_n), ``reverse_slip`` (x2 < 0), ``stick``
+        (friction holds the fault at rest after the start; not watched on the smooth plant).
     provenance : mapping
         Method, step, scheme, backend and versions.
     """

@@ -25,9 +25,9 @@ class Continuous(Scheme):
         """State after one step of the integrator on plant and law together."""
         import casadi as ca
 
-        def field(passed: float, now: Any) -> Any:
+        def motion(plant: Any, passed: Any, now: Any) -> Any:
             time = (counter + passed) * step
             pressure, integral_rates = loop.law(now[:2], now[2:], loop.reference(time))
-            return ca.vertcat(loop.plant(time, now[:2], pressure), integral_rates)
+            return ca.vertcat(plant(time, now[:2], pressure), integral_rates)
 
-        return method.advance(field, state, step)
+        return loop.advance(method, motion, state, step)

@@ -1,0 +1,165 @@
+"""Integration of smooth differential equations to a tolerance, with crossings of one level found on the way."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.errors import ParameterError, SimulationError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+METHODS = {"dop853": "DOP853", "radau": "Radau"}
+TIGHTEST = 1e-13
+LOOSEST = 1e-3
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Instants [s], shape (n,); values there, shape (variables, n); instants at which the level was crossed [s]."""
+
+    time: "np.ndarray"
+    values: "np.ndarray"
+    crossings: "np.ndarray"
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Problem:
+    """y' = f(y, load) in the variables of a CasADi Function (y, load) → f, ∂f/∂y.
+
+    Attributes
+    ----------
+    rates : casadi.Function
+    scales : ndarray
+        Size of each variable below which its error counts absolutely.
+    watched : int
+        Index of the variable whose upward crossings of `level` are found.
+    level : float
+    """
+
+    rates: Any
+    scales: "np.ndarray"
+    watched: int
+    level: float
+
+    def integrate(
+        self, start: "np.ndarray", load: float, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
+    ) -> Solution:
+        """Follow the equations from times[0] to times[-1] under a constant load.
+
+        Parameters
+        ----------
+        start : ndarray
+        load : float
+        times : ndarray
+            Ascending instants [s].
+        every_step : bool
+            Return the accepted steps of the method; otherwise the values at `times`.
+        method : str
+            ``"dop853"`` (explicit, order 8; its interpolant of order 7 serves the instants) or ``"radau"`` (implicit,
+            order 5, for stiff problems; it stops at each instant).
+        rtol : float
+            Tolerance of one step, relative beyond `scales`.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown method, or a tolerance outside 1e-13 … 1e-3.
+        SimulationError
+            When the method cannot go on.
+        """
+        import numpy as np
+
+        _check(method, rtol)
+        field, jacobian = self._bound(load)
+        crossing = self._crossing()
+        spans = [times] if every_step or method == "dop853" else [times[i : i + 2] for i in range(len(times) - 1)]
+        found: list[tuple[np.ndarray, np.ndarray]] = []
+        crossed: list[np.ndarray] = []
+        evaluations, y = 0, start
+        for span in spans:
+            part = _solve(
+                field,
+                (span[0], span[-1]),
+                y,
+                method=METHODS[method],
+                t_eval=None if every_step else span,
+                events=crossing,
+                rtol=rtol,
+                atol=rtol * self.scales,
+                **({"jac": jacobian} if method == "radau" else {}),
+            )
+            found.append((part.t, part.y) if not found else (part.t[1:], part.y[:, 1:]))
+            crossed.append(part.t_events[0])
+            evaluations += part.nfev
+            y = part.y[:, -1]
+        values = np.concatenate([v for _, v in found], axis=1)
+        return Solution(np.concatenate([t for t, _ in found]), values, np.concatenate(crossed), evaluations)
+
+    def _bound(self, load: float) -> tuple[Any, Any]:
+        """Field and Jacobian as functions of (t, y)."""
+        import numpy as np
+
+        size = self.rates.size1_in(0)
+        field = _Bound.of(self.rates, 0, load, np.empty(size))
+        jacobian = _Bound.of(self.rates, 1, load, np.empty((size, size)))
+        return (lambda _, y: field.at(y)), (lambda _, y: jacobian.at(y).T)
+
+    def _crossing(self) -> Any:
+        def crossing(_: float, y: "np.ndarray") -> float:
+            return y[self.watched] - self.level
+
+        crossing.direction = 1.0  # type: ignore[attr-defined]
+        return crossing
+
+
+@dataclass(frozen=True)
+class _Bound:
+    """One output of a CasADi Function, evaluated through its buffers, which must live as long."""
+
+    state: "np.ndarray"
+    load: "np.ndarray"
+    result: "np.ndarray"
+    evaluate: Any
+    owners: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, function: Any, index: int, load: float, result: "np.ndarray") -> "_Bound":
+        import casadi as ca
+        import numpy as np
+
+        inputs = [ca.SX.sym("y", function.size1_in(0)), ca.SX.sym("load")]
+        dense: Any = ca.Function("dense", inputs, [ca.densify(function(*inputs)[index])])
+        state, given = np.empty(function.size1_in(0)), np.array([load])
+        buffer, evaluate = dense.buffer()
+        buffer.set_arg(0, state.data)
+        buffer.set_arg(1, given.data)
+        buffer.set_res(0, result.data)
+        return cls(state, given, result, evaluate, (dense, buffer))
+
+    def at(self, y: "np.ndarray") -> "np.ndarray":
+        """Result at a state; a matrix comes out transposed, as CasADi stores columns first."""
+        self.state[:] = y
+        self.evaluate()
+        return self.result.copy()
+
+
+def _solve(*arguments: Any, **options: Any) -> Any:
+    import numpy as np
+    from scipy.integrate import solve_ivp
+
+    with np.errstate(over="ignore", invalid="ignore"):  # of trial steps that are too long, and rejected for it
+        part = solve_ivp(*arguments, **options)
+    if not part.success:
+        raise SimulationError(
+            f"the integration stopped after {len(part.t)} points: {part.message} "
+            "Check that the slip rate stays finite, or loosen rtol."
+        )
+    return part
+
+
+def _check(method: str, rtol: float) -> None:
+    if method not in METHODS:
+        raise ParameterError(f"method must be one of {', '.join(METHODS)}. Received {method!r}.")
+    if not TIGHTEST <= rtol <= LOOSEST:
+        raise ParameterError(f"rtol must be between {TIGHTEST} and {LOOSEST}. Received {rtol!r}.")

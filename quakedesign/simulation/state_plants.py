@@ -1,0 +1,175 @@
+"""Spring-sliders whose friction has a state, as differential equations in logarithms of rate and state."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault, FrictionLaw
+from quakedesign.fault.checks import require_nonnegative, require_positive
+from quakedesign.rationals import rational
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.casadi_printer import to_casadi
+from quakedesign.symbolic.state_plant import loading_rate, rate, state_symbols
+
+slip, stretch = sp.symbols("slip stretch", real=True)
+log_rate = sp.Symbol("u", real=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringSlider:
+    """A block per unit of area: mass·v' = stiffness·stretch − normal_stress·μ(slip, v, state) − damping·v.
+
+    The stretch of the spring grows with the loading rate less the slip rate. Without mass the balance of forces is a
+    constraint, which its time derivative turns into v' (quasi-dynamic; needs normal_stress·∂μ/∂v + damping > 0).
+
+    Attributes
+    ----------
+    law : FrictionLaw
+    stiffness : float
+        [Pa/m], positive.
+    normal_stress : float
+        Effective normal stress less pressure [Pa], positive.
+    damping : float
+        [Pa·s/m], not negative.
+    mass : float
+        [kg/m²]; 0: quasi-dynamic.
+
+    Raises
+    ------
+    ParameterError
+        When a value is outside its range.
+    """
+
+    law: FrictionLaw
+    stiffness: float
+    normal_stress: float
+    damping: float = 0.0
+    mass: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive(stiffness=self.stiffness, normal_stress=self.normal_stress)
+        require_nonnegative(damping=self.damping, mass=self.mass)
+
+    @classmethod
+    def of(cls, fault: Fault, *, inertia: bool = True, pressure: float = 0.0) -> "SpringSlider":
+        """Spring-slider of a fault under a constant pressure [Pa], with its damping.
+
+        For radiation damping replace the fault's damping by `quakedesign.symbolic.state_plant.radiation_damping`.
+        """
+        return cls(
+            law=fault.friction,
+            stiffness=fault.stiffness / fault.area,
+            normal_stress=fault.effective_normal_stress - pressure,
+            damping=fault.damping / fault.area,
+            mass=fault.mass / fault.area if inertia else 0.0,
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Variables of `rates`: slip [m], stretch [m], log of the rate [m/s], logs of the states (in SI units)."""
+        return ("slip", "stretch", "log_slip_rate", *(f"log_{name}" for name in self.law.state_names))
+
+    @property
+    def numbers(self) -> dict[sp.Symbol, sp.Rational]:
+        """Exact values for the symbols of the force balance, of an area of 1 m²; a massless block has any mass."""
+        held = {
+            plant.m: self.mass or 1.0,
+            plant.k: self.stiffness,
+            plant.eta: self.damping,
+            plant.sigma: self.normal_stress,
+        }
+        exact = {symbol: sp.Rational(str(rational(value))) for symbol, value in held.items()}
+        return exact | {plant.A: sp.Integer(1), plant.p: sp.Integer(0)}
+
+    @cached_property
+    def derivation(self) -> tuple[sp.Expr, ...]:
+        """Rates of slip, stretch, v and the states, in `slip`, `stretch`, `rate`, the states and `loading_rate`."""
+        law, states = self.law.exact(), state_symbols(self.law.state_names)
+        state_rates = law.state_rates(slip, rate, *states)
+        friction = without_overflow(law.coefficient(slip, rate, *states))
+        acceleration = spring_acceleration().replace(plant.mu, lambda *_: friction)
+        acceleration = acceleration.subs(self.numbers)
+        moving = (rate, loading_rate - rate)
+        if not self.mass:
+            carried = zip((slip, stretch, *states), (*moving, *state_rates), strict=True)
+            change = sum((acceleration.diff(x) * dx for x, dx in carried), start=sp.Integer(0))
+            acceleration = -change / acceleration.diff(rate)
+        return (*moving, acceleration, *state_rates)
+
+    @cached_property
+    def rates(self) -> Any:
+        """CasADi Function (y as in `names`, loading rate [m/s]) → dy/dt, Jacobian."""
+        import casadi as ca
+
+        y, load, values = self._variables()
+        known = values | {loading_rate: load}
+        _, _, *logged = to_casadi(self.derivation, known)
+        logged = [change / values[x] for change, x in zip(logged, list(values)[2:], strict=True)]
+        field = ca.cse([ca.vertcat(values[rate], load - values[rate], *logged)])[0]
+        return ca.Function("rates", [y, load], [field, ca.jacobian(field, y)])
+
+    @cached_property
+    def readings(self) -> Any:
+        """CasADi Function y → friction coefficient [-], driving less resisting stress [Pa]."""
+        import casadi as ca
+
+        y, _, values = self._variables()
+        law, states = self.law.exact(), state_symbols(self.law.state_names)
+        (friction,) = to_casadi([without_overflow(law.coefficient(slip, rate, *states))], values)
+        driving = self.stiffness * y[1] - self.damping * values[rate]
+        return ca.Function("readings", [y], [friction, driving - self.normal_stress * friction])
+
+    def start(self, at_rate: float, states: tuple[float, ...] | None = None) -> list[float]:
+        """Vector y with the forces in balance at a rate [m/s], in its steady state unless another is given.
+
+        Raises
+        ------
+        ParameterError
+            When the rate or a state is not positive, or the number of states is not that of the law.
+        """
+        require_positive("Rate and state enter by their logarithms.", start_rate=at_rate)
+        held = self.law.steady_state(at_rate) if states is None else states
+        if len(held) != len(self.law.state_names):
+            raise ParameterError(f"start_state must hold {len(self.law.state_names)} values. Received {len(held)}.")
+        require_positive(
+            "Rate and state enter by their logarithms.", **dict(zip(self.law.state_names, held, strict=True))
+        )
+        logs = [float(sp.log(rational_number(value)).evalf(30)) for value in (at_rate, *held)]
+        friction = float(sp.N(self.law.exact().coefficient(0, *map(rational_number, (at_rate, *held))), 30))
+        return [0.0, (self.normal_stress * friction + self.damping * at_rate) / self.stiffness, *logs]
+
+    def _variables(self) -> tuple[Any, Any, dict[sp.Symbol, Any]]:
+        import casadi as ca
+
+        states = state_symbols(self.law.state_names)
+        y, load = ca.SX.sym("y", 3 + len(states)), ca.SX.sym("load")
+        logged = {x: ca.exp(y[2 + i]) for i, x in enumerate((rate, *states))}
+        return y, load, {slip: y[0], stretch: y[1]} | logged
+
+
+def rational_number(value: Any) -> sp.Rational:
+    """Exact SymPy number of a float."""
+    return sp.Rational(str(rational(float(value))))
+
+
+def without_overflow(friction: sp.Expr) -> sp.Expr:
+    """The same friction with arsinh z = L + log(1 + √(1 + e^(−2L))), L = log z: z of the regularised law is e^(μ/a)."""
+
+    def of_logarithm(z: sp.Expr) -> sp.Expr:
+        positive = {x: sp.Symbol(x.name, positive=True) for x in z.free_symbols}
+        back = {new: old for old, new in positive.items()}
+        logarithm = sp.expand_log(sp.log(z.subs(positive)), force=True).subs(back)
+        return logarithm + sp.log(1 + sp.sqrt(1 + sp.exp(-2 * logarithm)))
+
+    return friction.replace(sp.asinh, of_logarithm)
+
+
+def spring_acceleration() -> sp.Expr:
+    """v' [m/s²] of eq. springmodel in `stretch`, `rate` and μ, without disturbance."""
+    z, v, acceleration, far = sp.symbols("z v a delta_far", real=True)
+    balance = plant.force_balance().replace(plant.disturbance, lambda *_: sp.Integer(0))
+    moving = sp.solve(balance.subs(far, z + stretch), acceleration)[0]
+    return sp.expand(moving.subs({z: slip, v: rate}))

@@ -1,0 +1,250 @@
+"""Faults with rate-and-state friction under loading from afar: velocity steps and stick-slip cycles."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault, FrictionLaw
+from quakedesign.simulation.run import library_versions
+from quakedesign.simulation.smooth import Problem, Solution
+from quakedesign.simulation.state_plants import SpringSlider
+from quakedesign.simulation.state_trajectory import StateTrajectory
+
+if TYPE_CHECKING:
+    import numpy as np
+
+_ONSET = 10.0
+_SHARE_OF_STRETCH = 1e-3
+
+
+def simulate_state(
+    subject: Fault | SpringSlider,
+    loading: "float | Sequence[tuple[float, float]]",
+    *,
+    duration: float | None = None,
+    inertia: bool = True,
+    pressure: float = 0.0,
+    start_rate: float | None = None,
+    start_state: Sequence[float] | None = None,
+    times: "Sequence[float] | np.ndarray | None" = None,
+    onset_rate: float | None = None,
+    method: str = "radau",
+    rtol: float = 1e-9,
+) -> StateTrajectory:
+    """Simulate a fault whose friction has a state, uncontrolled, loaded from afar.
+
+    Rate and state are integrated in their logarithms, so that a hold of years and a slip of milliseconds keep the same
+    number of digits. At the start the forces are in balance.
+
+    Parameters
+    ----------
+    subject : Fault or SpringSlider
+        A fault with its own damping.
+    loading : float or sequence of (float, float)
+        v_∞ [m/s], for `duration`; or pairs of (time it lasts [s], v_∞ [m/s]), one after the other. Not negative.
+    duration : float, optional
+        [s]; only for a single loading rate.
+    inertia : bool
+        Of a fault: third order with inertia, or quasi-dynamic without. A `SpringSlider` has its own mass.
+    pressure : float
+        Constant fluid pressure [Pa]; of a fault only.
+    start_rate : float, optional
+        Slip rate at the start [m/s]; the first loading rate unless given.
+    start_state : sequence of float, optional
+        State at the start, in the law's units; steady at `start_rate` unless given.
+    times : sequence of float, optional
+        Instants to return [s]; every step of the method unless given.
+    onset_rate : float, optional
+        Slip rate whose upward crossings are events [m/s]; ten times the fastest loading rate unless given.
+    method : str
+        ``"radau"`` (stiff: inertia) or ``"dop853"`` (usually faster without inertia).
+    rtol : float
+        Tolerance of one step, for logarithms of rate and state absolute, 1e-13 … 1e-3.
+
+    Returns
+    -------
+    StateTrajectory
+
+    Raises
+    ------
+    ParameterError
+        For a law without state, or settings that are not positive, finite or known.
+    SimulationError
+        When the method cannot go on, as when the slip rate grows without bound (no inertia and no damping).
+    """
+    slider = (
+        subject if isinstance(subject, SpringSlider) else SpringSlider.of(subject, inertia=inertia, pressure=pressure)
+    )
+    if not slider.law.state_names:
+        raise ParameterError(f"the friction law must have a state. Received {slider.law.name}. Use simulate.")
+    pieces = _pieces(loading, duration)
+    first = pieces[0][1] if start_rate is None else start_rate
+    start = slider.start(first, None if start_state is None else tuple(start_state))
+    level = _ONSET * max(v for _, v in pieces) if onset_rate is None else onset_rate
+    problem = Problem(slider.rates, _scales(slider, start), 2, math.log(level) if level > 0 else math.inf)
+    history = _History(problem, pieces, _wanted(times, pieces), method, rtol)
+    name = f"{subject.name if isinstance(subject, Fault) else slider.law.name}, loaded from afar"
+    return _trajectory(name, slider, history, history.run(start), level)
+
+
+def velocity_step(
+    law: FrictionLaw,
+    stiffness: float,
+    loading: Sequence[tuple[float, float]],
+    *,
+    times: "Sequence[float] | np.ndarray | None" = None,
+    method: str = "dop853",
+    rtol: float = 1e-11,
+) -> StateTrajectory:
+    """Slide a sample through a spring whose far end is driven at given rates, as in the laboratory.
+
+    Starts in steady sliding at the first rate, with neither inertia nor damping. A rate of 0 is a hold.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+        With state.
+    stiffness : float
+        Change of friction per displacement of the far end [1/m]: stiffness per area over normal stress.
+    loading : sequence of (float, float)
+        Pairs of (time it lasts [s], rate of the far end [m/s]).
+    times, method, rtol
+        As in `simulate_state`.
+
+    Returns
+    -------
+    StateTrajectory
+
+    Raises
+    ------
+    ParameterError, SimulationError
+        As `simulate_state`.
+    """
+    slider = SpringSlider(law=law, stiffness=stiffness, normal_stress=1.0)
+    return simulate_state(slider, loading, times=times, method=method, rtol=rtol)
+
+
+def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
+    single = isinstance(loading, int | float)
+    if single == (duration is None):
+        raise ParameterError(
+            "loading must be one rate with a duration, or pairs of (time, rate) without. "
+            f"Received loading={loading!r}, duration={duration!r}."
+        )
+    pieces: list[tuple[Any, Any]] = [(duration, loading)] if single else list(loading)
+    for length, speed in pieces:
+        if not (math.isfinite(length) and length > 0 and math.isfinite(speed) and speed >= 0):
+            raise ParameterError(
+                "loading must last a positive time at a rate that is not negative, both finite. "
+                f"Received {length!r} s at {speed!r} m/s."
+            )
+    if not pieces:
+        raise ParameterError("loading must hold at least one pair of (time, rate). Received none.")
+    return [(float(length), float(speed)) for length, speed in pieces]
+
+
+def _wanted(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None":
+    import numpy as np
+
+    if times is None:
+        return None
+    wanted, end = np.asarray(times, dtype=float), math.fsum(length for length, _ in pieces)
+    if (
+        wanted.ndim != 1
+        or not len(wanted)
+        or np.any(np.diff(wanted) <= 0)
+        or wanted[0] < 0
+        or wanted[-1] > end * (1 + 1e-12)
+    ):
+        raise ParameterError(f"times must ascend between 0 and the duration ({end!r} s). Received {times!r}.")
+    return np.minimum(wanted, end)
+
+
+def _scales(slider: SpringSlider, start: list[float]) -> "np.ndarray":
+    """Critical slip for the displacements (or a share of the stretch), 1 for the logarithms."""
+    import numpy as np
+
+    length = getattr(slider.law, "critical_slip", abs(start[1]) * _SHARE_OF_STRETCH)
+    return np.array([length, length, *[1.0] * (len(start) - 2)])
+
+
+@dataclass(frozen=True)
+class _History:
+    problem: Problem
+    pieces: list[tuple[float, float]]
+    wanted: "np.ndarray | None"
+    method: str
+    rtol: float
+
+    def run(self, start: list[float]) -> Solution:
+        """Solution over all pieces; at a jump of the loading rate the variables are continuous."""
+        import numpy as np
+
+        parts: list[Solution] = []
+        y, now = np.array(start), 0.0
+        for length, load in self.pieces:
+            end = now + length
+            inner = np.empty(0) if self.wanted is None else self.wanted[(self.wanted > now) & (self.wanted < end)]
+            part = self.problem.integrate(
+                y,
+                load,
+                np.array([now, *inner, end]),
+                every_step=self.wanted is None,
+                method=self.method,
+                rtol=self.rtol,
+            )
+            parts.append(part)
+            y, now = part.values[:, -1], end
+        return self._joined(parts)
+
+    def _joined(self, parts: list[Solution]) -> Solution:
+        import numpy as np
+
+        time = np.concatenate([parts[0].time[:1], *(part.time[1:] for part in parts)])
+        values = np.concatenate([parts[0].values[:, :1], *(part.values[:, 1:] for part in parts)], axis=1)
+        if self.wanted is not None:
+            kept = np.isin(time, self.wanted)
+            time, values = time[kept], values[:, kept]
+        crossings = np.concatenate([part.crossings for part in parts])
+        return Solution(time, values, crossings, sum(part.evaluations for part in parts))
+
+    def load_point(self, time: "np.ndarray") -> "np.ndarray":
+        """Displacement of the far end [m]."""
+        import numpy as np
+
+        ends = np.cumsum([0.0, *(length for length, _ in self.pieces)])
+        passed = np.cumsum([0.0, *(length * load for length, load in self.pieces)])
+        return np.interp(time, ends, passed)
+
+
+def _trajectory(
+    name: str, slider: SpringSlider, history: _History, solution: Solution, level: float
+) -> StateTrajectory:
+    import numpy as np
+
+    friction, excess = (row.full().ravel() for row in slider.readings.map(len(solution.time))(solution.values))
+    return StateTrajectory(
+        name=name,
+        time=solution.time,
+        load_point=history.load_point(solution.time),
+        slip=solution.values[0],
+        slip_rate=np.exp(solution.values[2]),
+        stretch=solution.values[1],
+        friction=friction,
+        states=np.exp(solution.values[3:]),
+        state_names=slider.law.state_names,
+        state_units=slider.law.state_units,
+        imbalance=excess / slider.normal_stress,
+        onsets=solution.crossings,
+        onset_rate=level,
+        provenance={
+            "friction": slider.law.name,
+            "inertia": str(slider.mass > 0),
+            "method": history.method,
+            "rtol": history.rtol,
+            "evaluations": solution.evaluations,
+        }
+        | library_versions("scipy", "casadi", "numpy", "quakedesign"),
+    )

@@ -1,0 +1,93 @@
+"""What a simulation of a spring-slider with state returns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+
+SIGNALS = {
+    "load_point": ("displacement of the load point", "m"),
+    "slip": ("slip", "m"),
+    "slip_rate": ("slip rate", "m/s"),
+    "stretch": ("stretch of the spring", "m"),
+    "friction": ("friction coefficient", ""),
+}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StateTrajectory:
+    """One run of a spring-slider without control.
+
+    Attributes
+    ----------
+    name : str
+    time : ndarray
+        [s], shape (n,).
+    load_point, slip, stretch : ndarray
+        Displacement of the load point, slip, and stretch of the spring [m], shape (n,).
+    slip_rate : ndarray
+        [m/s], shape (n,).
+    friction : ndarray
+        Friction coefficient [-], shape (n,).
+    states : ndarray
+        State of friction, shape (number of variables, n), named `state_names`, in `state_units`.
+    state_names, state_units : tuple of str
+    imbalance : ndarray
+        Driving less resisting stress, as a share of the normal stress [-], shape (n,): what accelerates the mass.
+        Without mass it must vanish, and what is left of it is an error of the integration.
+    onsets : ndarray
+        Times [s] at which the slip rate rises through `onset_rate`.
+    onset_rate : float
+        [m/s].
+    provenance : mapping
+        Method, tolerance, evaluations and versions.
+    """
+
+    name: str
+    time: "np.ndarray" = field(repr=False)
+    load_point: "np.ndarray" = field(repr=False)
+    slip: "np.ndarray" = field(repr=False)
+    slip_rate: "np.ndarray" = field(repr=False)
+    stretch: "np.ndarray" = field(repr=False)
+    friction: "np.ndarray" = field(repr=False)
+    states: "np.ndarray" = field(repr=False)
+    state_names: tuple[str, ...]
+    state_units: tuple[str, ...]
+    imbalance: "np.ndarray" = field(repr=False)
+    onsets: "np.ndarray" = field(repr=False)
+    onset_rate: float
+    provenance: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def recurrence_intervals(self) -> "np.ndarray":
+        """Times between successive onsets [s]."""
+        import numpy as np
+
+        return np.diff(self.onsets)
+
+    def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
+        """Values, long name and SI unit of every signal, by name."""
+        found = {name: (getattr(self, name), *described) for name, described in SIGNALS.items()}
+        for name, values, unit in zip(self.state_names, self.states, self.state_units, strict=True):
+            found[name] = (values, f"state of friction {name}", unit)
+        return found
+
+    def to_xarray(self) -> Any:
+        """Return an xarray Dataset over ``time``, with units and long names."""
+        import xarray as xr
+
+        variables = {
+            name: ("time", values, {"long_name": title, "units": unit or "1"})
+            for name, (values, title, unit) in self.signals().items()
+        }
+        time = ("time", self.time, {"long_name": "time", "units": "s"})
+        return xr.Dataset(variables, coords={"time": time}, attrs={"title": self.name, **self.provenance})
+
+    def to_pandas(self) -> Any:
+        """Return a pandas DataFrame over the time [s]; the columns carry their units."""
+        import pandas as pd
+
+        columns = {f"{name} [{unit or '-'}]": values for name, (values, _, unit) in self.signals().items()}
+        return pd.DataFrame(columns, index=pd.Index(self.time, name="time [s]"))

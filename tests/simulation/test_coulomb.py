@@ -1,0 +1,262 @@
+"""Set-valued friction against closed forms, against another integrator with its own events, and against itself."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from quakedesign.controllers import published
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Disturbance, load_fault
+from quakedesign.simulation import Metrics, natural_earthquake, simulate
+from quakedesign.simulation.coulomb import CoulombLoop
+
+REAL = load_fault("real-fault")
+BLOCK = dataclasses.replace(REAL, damping=0.0, friction=dataclasses.replace(REAL.friction, drop=0.0))
+STRENGTH = BLOCK.friction.residual * BLOCK.authority * BLOCK.effective_normal_stress  # of constant friction [m/s²]
+FREQUENCY = BLOCK.natural_frequency
+
+
+def pushed(fault, **load):
+    return fault.with_disturbance(Disturbance(**load))
+
+
+def turning_points(parts, push=9.3, halves=8):
+    """Slips [units of μσ'N̂/k̂] at multiples of half a period, and the run."""
+    half = math.pi / FREQUENCY
+    run = simulate(
+        pushed(BLOCK, constant=push * STRENGTH),
+        step=half / parts,
+        duration=halves * half * (1 + 1e-9),
+        samples=halves * parts,
+        plant="coulomb",
+    )
+    return run.slip[::parts] * FREQUENCY**2 / STRENGTH, run
+
+
+def test_a_block_on_a_spring_loses_two_friction_lengths_every_half_cycle():
+    """A push of 9.3 μN: half amplitudes 9.3, 7.3, 5.3, 3.3, 1.3 about 9.3, 11.3, 9.3 …, then rest in the band."""
+    found, run = turning_points(320)
+    assert np.allclose(found, [0, 18.6, 4.0, 14.6, 8.0, 10.6, 10.6, 10.6, 10.6], rtol=0, atol=1e-10)
+    assert abs(1 + 9.3 - found[-1]) <= 1
+    half = math.pi / FREQUENCY
+    assert np.all(run.slip_rate[run.time > 5.001 * half] == 0)
+    assert len(set(run.slip[run.time > 5.001 * half])) == 1
+    assert run.events["reverse_slip"] == pytest.approx(half, abs=1.5 * half / 320)
+    assert run.events["stick"] == pytest.approx(5 * half, abs=1.5 * half / 320)
+
+
+def test_the_turning_points_converge_with_the_order_of_the_integrator():
+    exact = np.array([0, 18.6, 4.0, 14.6, 8.0, 10.6, 10.6, 10.6, 10.6])
+    errors = [np.max(np.abs(turning_points(parts)[0] - exact)) for parts in (20, 40, 80)]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(orders > 4.8)
+
+
+@pytest.mark.parametrize("push", [0.4, 1.9, 2.1, 3.7])
+def test_it_comes_back_only_if_the_spring_can_pull_it(push):
+    """From a critically loaded start the block overshoots to twice the push; it stays if that is at most 2 μN."""
+    found, run = turning_points(200, push, halves=3)
+    assert found[1] == pytest.approx(2 * push, rel=1e-9)
+    assert found[2] == pytest.approx(2 * push if push <= 2 else 4.0, rel=1e-9)
+    assert ("reverse_slip" in run.events) == (push > 2)
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        {"constant": -1e-3},
+        {"constant": -1.0, "amplitude": 0.9, "frequency": 0.3},
+        {"constant": -2 * STRENGTH * (1 - 1e-12)},
+        {},
+    ],
+)
+def test_a_load_that_friction_carries_never_moves_it(load):
+    run = simulate(pushed(REAL, **load), duration=2000.0, samples=10**6, plant="coulomb")
+    assert not np.any(run.slip)
+    assert not np.any(run.slip_rate)
+    assert run.metrics.stick_fraction == 1
+    assert set(run.events) == {"stick"}
+
+
+def test_a_load_just_beyond_the_band_moves_it_backward():
+    run = simulate(pushed(BLOCK, constant=-2 * STRENGTH * (1 + 1e-9)), duration=30.0, step=0.01, plant="coulomb")
+    assert np.min(run.slip) < 0
+    assert run.events["reverse_slip"] == 0.01
+
+
+def test_as_long_as_slip_is_forward_the_digits_are_those_of_the_smooth_plant():
+    smooth, set_valued = (natural_earthquake(REAL, pressure=1e6, plant=name) for name in ("smooth", "coulomb"))
+    stop = np.argmax(smooth.slip_rate < 0) if np.any(smooth.slip_rate < 0) else len(smooth.time)
+    assert stop > 500
+    assert np.array_equal(smooth.slip[:stop], set_valued.slip[:stop])
+    assert np.array_equal(smooth.slip_rate[:stop], set_valued.slip_rate[:stop])
+    assert smooth.metrics.peak_slip_rate == set_valued.metrics.peak_slip_rate
+
+
+def test_an_earthquake_ends_where_the_slip_rate_falls_to_zero():
+    """Underdamped, the smooth plant swings back; friction holds the real one there."""
+    light = dataclasses.replace(REAL, damping=REAL.damping / 20)
+    smooth, held = (natural_earthquake(light, plant=name) for name in ("smooth", "coulomb"))
+    assert "reverse_slip" in smooth.events
+    assert set(held.events) == {"stick"}
+    assert held.slip[-1] == pytest.approx(np.max(smooth.slip), rel=1e-4)
+    assert held.slip_rate[-1] == 0
+
+
+class Oracle:
+    """The inclusion by scipy: DOP853 in each of the three modes, switched at located events; eqs. typed in again."""
+
+    def __init__(self, fault, gains):
+        self.fault, self.gains = fault, gains
+
+    def pressure(self, y):
+        return -float(np.dot(self.gains, y))
+
+    def acceleration(self, t, y, direction):
+        fault, load, law = self.fault, self.fault.disturbance, self.fault.friction
+        coefficient = law.residual + law.drop * math.exp(-max(y[0], 0.0) / law.critical_slip)
+        start = (law.residual + law.drop) * fault.effective_normal_stress
+        shaking = load.constant + load.amplitude * math.sin(load.frequency * t) + load.slip_growth * y[0]
+        friction = direction * coefficient * (fault.effective_normal_stress - self.pressure(y))
+        spring = fault.specific_stiffness * y[0] + fault.specific_damping * y[1]
+        return shaking + fault.authority * (start - friction) - spring
+
+    def reference(self, t):
+        stage = t / self.fault.reference.operation_time
+        return self.fault.reference.target_slip * stage**3 * (10 - 15 * stage + 6 * stage**2)
+
+    def run(self, y, times):
+        t, end, found = 0.0, times[-1], np.empty((4, len(times)))
+        while t < end:
+            direction = self.direction(t, y)
+            solution = solve_ivp(
+                lambda now, z, d=direction: self.field(now, z, d),
+                (t, end),
+                y,
+                method="DOP853",
+                events=self.ends(direction),
+                dense_output=True,
+                rtol=1e-12,
+                atol=1e-18,
+                max_step=0.05,
+            )
+            covered = (times >= t) & (times <= solution.t[-1])
+            if np.any(covered):
+                found[:, covered] = solution.sol(times[covered])
+            t, y = solution.t[-1], solution.y[:, -1].copy()
+            if direction:
+                y[1] = 0.0
+            self.leaving = 0 if direction else (1 if self.acceleration(t, y, 0) > 0 else -1)
+        return found
+
+    leaving = 0
+
+    def direction(self, t, y):
+        if y[1] != 0:
+            return int(np.sign(y[1]))
+        if self.leaving:
+            return self.leaving
+        return int(self.acceleration(t, y, 1) > 0) - int(self.acceleration(t, y, -1) < 0)
+
+    def field(self, t, y, direction):
+        rates = [y[1], self.acceleration(t, y, direction)] if direction else [0.0, 0.0]
+        return [*rates, y[0] - self.reference(t), y[2]]
+
+    def ends(self, direction):
+        def stop(t, y):
+            return y[1]
+
+        def forward(t, y):
+            return self.acceleration(t, y, 1)
+
+        def backward(t, y):
+            return -self.acceleration(t, y, -1)
+
+        found = [stop] if direction else [forward, backward]
+        for event in found:
+            event.terminal = True
+            event.direction = -direction if direction else 1
+        return found
+
+
+def test_a_shaken_block_agrees_with_scipys_events():
+    """Stick, slip forward and slip backward under a harmonic load: about thirty changes between them."""
+    fault = pushed(BLOCK, constant=-STRENGTH, amplitude=1.6 * STRENGTH, frequency=0.31)
+    times = np.linspace(0, 200.0, 401)
+    expected = Oracle(fault, [0.0] * 4).run([0.0] * 4, times)
+    assert {-1, 0, 1} <= set(np.sign(expected[1]))
+    run = simulate(fault, step=0.02, duration=200.01, samples=400, plant="coulomb")
+    assert np.allclose(run.time, times)
+    assert {"reverse_slip", "stick"} <= set(run.events)
+    assert np.max(np.abs(run.slip - expected[0])) < 1e-10 * np.ptp(expected[0])
+
+
+def test_the_published_linear_law_sticks_most_of_the_time_and_agrees_with_scipy():
+    """ERRATA 14: e-LQR with the paper's shaking, where the smooth plant runs backward."""
+    controller = published("real-fault")["elqr"]
+    run = simulate(REAL, controller, step=0.0046, duration=200.0, samples=400, plant="coulomb")
+    expected = Oracle(REAL, [float(gain) for gain in controller.gains.values()]).run([0.0] * 4, run.time)
+    assert "reverse_slip" not in run.events
+    assert run.metrics.stick_fraction > 0.9
+    assert np.max(np.abs(run.slip - expected[0])) < 1e-9 * np.max(expected[0])
+
+
+@pytest.mark.parametrize("law", ["cta", "dia", "elqr"])
+def test_published_controllers_follow_the_reference_without_reverse_slip(law):
+    """In the paper's runs δ' < 0 nearly half of the time; with friction in both directions the fault rests instead."""
+    controller = published("real-fault")[law]
+    smooth, held = (simulate(REAL, controller, duration=20000.0, plant=name) for name in ("smooth", "coulomb"))
+    assert smooth.metrics.reverse_slip_fraction > 0.3
+    assert held.metrics.reverse_slip_fraction == 0
+    assert held.metrics.stick_fraction > 0.5
+    assert set(held.events) == {"stick"}
+    assert held.metrics.max_slip_error < 1.05 * smooth.metrics.max_slip_error
+    assert held.metrics.pressure_total_variation < smooth.metrics.pressure_total_variation
+
+
+def test_the_monitor_agrees_with_numpy():
+    run = simulate(
+        pushed(BLOCK, amplitude=3 * STRENGTH, frequency=0.3),
+        duration=100.0,
+        step=0.05,
+        samples=10**6,
+        settled_from=10.0,
+        plant="coulomb",
+    )
+    kept = run.time > 10.0
+    assert run.metrics.stick_fraction == np.mean(run.slip_rate[kept] == 0)
+    assert run.metrics.reverse_slip_fraction == np.mean(run.slip_rate[kept] < 0)
+    assert run.metrics.reverse_slip_fraction > 0.05
+    assert run.events["stick"] == run.time[1:][np.argmax(run.slip_rate[1:] == 0)]
+    assert Metrics.unit("stick_fraction") == ""
+
+
+@pytest.mark.parametrize("law", ["cta", "elqr"])
+def test_both_backends_give_the_same_digits(law):
+    setting = {"duration": 1001 * REAL.sampling_time, "samples": 40, "plant": "coulomb"}
+    fast, slow = (simulate(REAL, published("real-fault")[law], compiled=c, **setting) for c in (None, False))
+    if fast.provenance["backend"] != "compiled":
+        pytest.skip(fast.provenance["backend_reason"])
+    for name, (values, _, _) in fast.signals().items():
+        assert np.array_equal(values, slow.signals()[name][0]), name
+    assert fast.provenance["plant"] == "coulomb"
+    assert fast.name.endswith("Coulomb friction")
+
+
+def test_an_opened_fault_has_no_friction_in_any_direction():
+    field = CoulombLoop(REAL).directed
+    opened = REAL.effective_normal_stress * 1.01
+    rates = {float(field(0, [0.1, 0.2], opened, direction)[1]) for direction in (1, -1)}
+    free = REAL.friction.bounds[1] * REAL.authority * REAL.effective_normal_stress
+    free -= REAL.specific_stiffness * 0.1 + REAL.specific_damping * 0.2
+    free += REAL.disturbance.slip_growth * 0.1
+    assert len(rates) == 1
+    assert rates.pop() == pytest.approx(free, rel=1e-12)
+
+
+def test_an_unknown_plant_is_refused():
+    with pytest.raises(ParameterError, match=r"smooth, coulomb.*'sticky'"):
+        simulate(REAL, plant="sticky")
