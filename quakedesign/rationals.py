@@ -62,14 +62,3 @@ def nearest(value: float, denominator: int) -> Fraction:
     if not math.isfinite(value):
         raise ParameterError(f"a finite number is needed for rounding. Received {value!r}.")
     return Fraction(round(Fraction(value) * denominator), denominator)
-
-
-def text(value: Fraction) -> str:
-    """Canonical text of a rational: ``p`` or ``p/q`` in lowest terms."""
-    return str(Fraction(value))
-
-
-def decimal(value: Fraction, digits: int = 6) -> str:
-    """Short display of a rational; exact when it fits, else rounded to `digits` significant digits."""
-    short = f"{float(value):.{digits}g}"
-    return short if Fraction(short) == value else f"≈{short}"

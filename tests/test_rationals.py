@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import decimal, nearest, rational, text
+from quakedesign.rationals import nearest, rational
 
 
 @pytest.mark.parametrize(
@@ -67,15 +67,3 @@ def test_the_nearest_multiple_is_at_most_half_a_step_away(value, denominator):
 def test_only_finite_numbers_are_rounded(value):
     with pytest.raises(ParameterError, match="finite"):
         nearest(value, 10)
-
-
-@given(st.fractions())
-def test_text_is_in_lowest_terms_and_reads_back(value):
-    assert rational(text(value)) == value
-    assert text(F(6, 4)) == "3/2"
-
-
-def test_a_short_display_says_when_it_is_rounded():
-    assert decimal(F(1, 10)) == "0.1"
-    assert decimal(F(1, 3)) == "≈0.333333"
-    assert decimal(F(2, 3), digits=2) == "≈0.67"
