@@ -255,3 +255,28 @@ def test_bad_fault_files_are_one_line(old, new, said, capsys, tmp_path):
     assert code == 2
     assert said in err
     assert len(err.strip().splitlines()) == 1
+
+
+def test_friction_with_a_state_is_described_and_refused_where_it_is_not_covered(capsys, tmp_path):
+    import importlib.resources
+
+    text = (importlib.resources.files("quakedesign.fault") / "presets" / "real-fault.toml").read_text()
+    start, end = text.index("[friction]"), text.index("[task]")
+    law = """[friction]
+law = "rate-and-state-aging"
+reference_coefficient = 0.6
+direct_effect = 0.01
+evolution_effect = 0.015
+critical_slip = "10 mm"
+reference_rate = "1e-6 m/s"
+slowest_rate = "1e-12 m/s"
+fastest_rate = "1 m/s"
+"""
+    path = tmp_path / "state.toml"
+    path.write_text(text[:start] + law + text[end:])
+    assert run(capsys, "fault", str(path))[0] == 0
+    for command in (("design", str(path), "--out", str(tmp_path / "out")), ("simulate", str(path))):
+        code, _, err = run(capsys, *command)
+        assert code == 2
+        assert "simulate_state" in err
+    assert [p.name for p in tmp_path.iterdir()] == ["state.toml"]

@@ -93,6 +93,19 @@ class Fault:
                 f"{remedy}"
             ) from None
 
+    def require_memoryless(self, purpose: str) -> None:
+        """Refuse friction with a state variable where only slip and slip rate are covered.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if self.friction.state_names:
+            raise ParameterError(
+                f"{purpose} needs a friction law of slip and slip rate alone. Received {self.friction.name}, with the "
+                f"state {', '.join(self.friction.state_names)}. Use derive, stability or simulate_state for it."
+            )
+
     def with_box(self, name: str) -> "Fault":
         """Return the same fault with a named uncertainty box."""
         return replace(self, box=uncertainty_box(name))

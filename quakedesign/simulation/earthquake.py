@@ -46,6 +46,7 @@ def natural_earthquake(
     ParameterError
         For a pressure that is not below the effective normal stress.
     """
+    fault.require_memoryless("the natural earthquake")
     if not abs(pressure) < fault.effective_normal_stress:
         raise ParameterError(
             f"pressure must be below the effective normal stress ({fault.effective_normal_stress!r} Pa) in size. "

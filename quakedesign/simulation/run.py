@@ -81,6 +81,7 @@ def simulate(
     SimulationError
         When `compiled` is True and no compiler works.
     """
+    fault.require_memoryless("a controlled run")
     setting = Setting.of(fault, step, duration, samples, settled_from)
     recorder = Recorder(loop_class(plant)(fault, controller), simulation_scheme(scheme), setting.step)
     return run(recorder, setting, integrator(method), progress=progress, compiled=compiled)

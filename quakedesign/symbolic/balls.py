@@ -9,6 +9,7 @@ from typing import Any
 
 import sympy as sp
 
+from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
@@ -194,7 +195,7 @@ def upper_bound(
 
     Raises
     ------
-    ValueError
+    ParameterError
         When no finite bound is found.
     """
     order = count()
@@ -213,7 +214,10 @@ def upper_bound(
             heapq.heappush(heap, (-_upper(expression, part), next(order), part))
     result = -heap[0][0]
     if result == float("inf"):
-        raise ValueError("no finite bound was found")
+        raise ParameterError(
+            f"no finite bound was found in {pieces} subdivisions of the box. An expression that is defined all over it "
+            "is expected. Narrow the ranges."
+        )
     return Fraction(result)
 
 

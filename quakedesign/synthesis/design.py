@@ -122,6 +122,7 @@ def design(fault: Fault, controller: str = "cta") -> Design:
     """
     if controller not in DESIGNABLE:
         raise UnknownNameError(f"controller to design must be one of {', '.join(DESIGNABLE)}. Received {controller!r}.")
+    fault.require_memoryless("design")
     return _design_linear(fault) if controller == "elqr" else _design_sliding_mode(fault, controller)
 
 
@@ -216,6 +217,7 @@ def assess(fault: Fault, controller: Controller) -> Design:
     Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's
     sectors. A law that certificates cannot express yet is ``UNDECIDED``.
     """
+    fault.require_memoryless("a verdict on gains")
     if not isinstance(controller, SlidingMode):
         return _judged(fault, controller, find_certificate(linear_loop(fault, controller), 2), {})
     limit = controller.lipschitz_limit / controller.scale
