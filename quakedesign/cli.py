@@ -1,11 +1,12 @@
 """The command line. Every command returns its exit code; heavy libraries load inside the commands."""
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
@@ -299,6 +300,7 @@ def simulate(
     step: float | None = None,
     scheme: str = "continuous",
     method: str = "dormand-prince",
+    plant: str = "smooth",
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
@@ -319,6 +321,8 @@ def simulate(
         continuous.
     method
         dormand-prince or rk4.
+    plant
+        smooth (the paper's, for forward slip) or coulomb (set-valued friction: stick, slip, reversal).
     out
         NetCDF file to write.
     force
@@ -341,6 +345,7 @@ def simulate(
             step=step,
             scheme=scheme,
             method=method,
+            plant=plant,
             tell=lambda done: tell("simulation", done),
         )
     if out is not None:
@@ -363,6 +368,73 @@ def simulate(
     return 0
 
 
+@app.command
+def scale(
+    source: str,
+    target: str,
+    /,
+    *,
+    controller: str = "cta",
+    gains: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, consume_multiple=True)] = ("published",),
+    clock: Literal["operation-time", "natural-period"] | None = None,
+    json: Json = False,
+) -> int:
+    """Carry gains from one fault to a similar one, and say which dimensionless groups differ.
+
+    Parameters
+    ----------
+    source
+        Fault that the gains are for: preset or path of a .toml file.
+    target
+        Fault to carry them to.
+    controller
+        cta, dia or elqr.
+    gains
+        published, or the gains of the law (λ = 1, divisor μ_res·N̂_min of the source).
+    clock
+        What fixes the scale of time: operation-time or natural-period; chosen by their agreement unless given.
+    json
+        Print JSON.
+    """
+    from quakedesign.report.scaling import scale_answer, scale_lines
+
+    clocks = {None: None, "operation-time": "reference.operation_time", "natural-period": "shear_modulus"}
+    answer = scale_answer(source, target, controller, gains, clock=clocks[clock])
+    if json:
+        _print(answer)
+    else:
+        print("\n".join(scale_lines(answer)))
+    return 0
+
+
+@app.command
+def errata(*rows: int, json: Json = False) -> int:
+    """Show where the paper cannot be taken literally, each row checked again now.
+
+    Parameters
+    ----------
+    rows
+        Numbers of rows; all unless given.
+    json
+        Print JSON.
+    """
+    from quakedesign.report.errata import errata_rows, run_rows
+
+    numbers = list(rows) or [row.number for row in errata_rows()]
+    found = []
+    with _progress() as tell:
+        for i, number in enumerate(numbers):
+            tell(f"row {number}", i / len(numbers))
+            found += run_rows([number])
+    if json:
+        _print({"errata": found})
+    else:
+        for row in found:
+            print(f"{row['row']}. {'holds' if row['holds'] else 'DOES NOT HOLD'} ({row['kind']}): {row['evidence']}")
+            print(f"    printed: {row['printed']}\n    correct: {row['correct']}")
+    return 0
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its code; every refusal is one line on stderr and exit code 2."""
     try:
@@ -378,6 +450,12 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
+    except Exception as error:
+        if "QUAKEDESIGN_TRACEBACK" in os.environ:
+            raise
+        defect = " ".join(f"{type(error).__name__}: {error}".split())
+        print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the place.", file=sys.stderr)
+        sys.exit(3)
 
 
 def _refuse(reason: str) -> None:

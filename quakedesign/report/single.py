@@ -39,6 +39,7 @@ def run_single(
     step: float | None,
     scheme: str,
     method: str,
+    plant: str,
     tell: Callable[[float], None],
 ) -> tuple[Trajectory, list[Premise]]:
     """Run a loop; the premise `on_trajectory` of a sliding mode is against the limit of its gains.
@@ -50,9 +51,9 @@ def run_single(
     if controller == "none":
         if step is not None or gains != ("published",):
             raise ParameterError("without a controller there are no gains and the step follows from the fault.")
-        return natural_earthquake(fault), []
+        return natural_earthquake(fault, plant=plant), []
     law = chosen_controller(fault, controller, gains)
-    run = run_loop(fault, law, step=step, scheme=scheme, method=method, progress=tell)
+    run = run_loop(fault, law, step=step, scheme=scheme, method=method, plant=plant, progress=tell)
     if not isinstance(law, SlidingMode):
         return run, []
     premise = on_trajectory(law, float(law.lipschitz_limit), run)

@@ -1,0 +1,185 @@
+"""Where the paper cannot be taken literally: every point as a check that computes, found in ``proofs/errata``."""
+
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from time import perf_counter
+from types import ModuleType
+from typing import Any
+
+from quakedesign.errors import ParameterError, UnknownNameError
+
+KINDS = ("symbolic identity", "counterexample", "numeric reproduction")
+_HEADER = "| row | printed | correct | check | result |\n|---:|---|---|---|---|"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a check computed.
+
+    Attributes
+    ----------
+    holds : bool
+        Whether the corrected form stands, and the printed one falls where the row says so.
+    evidence : str
+        The numbers, in one line.
+    """
+
+    holds: bool
+    evidence: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One point at which the paper is corrected, with its check.
+
+    Attributes
+    ----------
+    number : int
+    printed, correct : str
+        Both forms, in one line of text.
+    kind : str
+        One of `KINDS`.
+    check : callable
+        Returns a `Finding`. Its optional argument replaces the corrected form by another, which must then fail.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown kind.
+    """
+
+    number: int
+    printed: str
+    correct: str
+    kind: str
+    check: Callable[..., Finding]
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ParameterError(f"kind of an erratum must be one of {', '.join(KINDS)}. Received {self.kind!r}.")
+
+
+def errata_folder() -> Path:
+    """Folder of the checks: inside an installed package, or beside the package in a checkout.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is none.
+    """
+    package = Path(__file__).resolve().parent.parent
+    places = [base / "proofs" / "errata" for base in (package, package.parent)]
+    for place in places:
+        if place.is_dir():
+            return place
+    raise UnknownNameError(
+        f"the checks of the errata must be in {places[0]}. Found nothing. Install the package again."
+    )
+
+
+@cache
+def errata_rows() -> tuple[Row, ...]:
+    """Every row, by number.
+
+    Raises
+    ------
+    ParameterError
+        When two rows carry the same number.
+    """
+    modules = [_load(path) for path in sorted(errata_folder().glob("*.py"))]
+    rows = sorted((row for module in modules for row in module.ROWS), key=lambda row: row.number)
+    numbers = [row.number for row in rows]
+    if len(set(numbers)) != len(numbers):
+        twice = sorted({n for n in numbers if numbers.count(n) > 1})
+        raise ParameterError(f"every erratum must have one row. Received {twice} twice. Rename one of them.")
+    return tuple(rows)
+
+
+def _load(path: Path) -> ModuleType:
+    """Module at a path; registered, so that its functions can be found again by name."""
+    name = f"quakedesign_errata_{path.stem}"
+    spec = spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def find_rows(numbers: Iterable[int | str] = ()) -> tuple[Row, ...]:
+    """Rows of given numbers in the order asked for, each once; all of them without numbers.
+
+    Raises
+    ------
+    UnknownNameError
+        For a number without a row, and for anything that is not a whole number.
+    """
+    known = {str(row.number): row for row in errata_rows()}
+    wanted = list(dict.fromkeys(str(n).strip() for n in numbers))
+    for number in wanted:
+        if number not in known:
+            first, last = min(map(int, known)), max(map(int, known))
+            raise UnknownNameError(
+                f"row of the errata must be a whole number from {first} to {last}. Received {number!r}. "
+                "Leave it out to run every row."
+            )
+    return tuple(known[n] for n in wanted) if wanted else errata_rows()
+
+
+def run_rows(numbers: Iterable[int | str] = ()) -> list[dict[str, Any]]:
+    """Run the checks of some rows, or of all.
+
+    Parameters
+    ----------
+    numbers : iterable of int or str
+        Rows wanted; all without any.
+
+    Returns
+    -------
+    list of dict
+        Keys row, printed, correct, kind, holds, evidence and seconds [s].
+
+    Raises
+    ------
+    UnknownNameError
+        For a number without a row; nothing runs then.
+    """
+    return [_run(row) for row in find_rows(numbers)]
+
+
+def _run(row: Row) -> dict[str, Any]:
+    began = perf_counter()
+    finding = row.check()
+    return {
+        "row": row.number,
+        "printed": row.printed,
+        "correct": row.correct,
+        "kind": row.kind,
+        "holds": bool(finding.holds),
+        "evidence": finding.evidence,
+        "seconds": perf_counter() - began,
+    }
+
+
+def errata_table(results: Sequence[dict[str, Any]] | None = None) -> str:
+    """Markdown table of results of `run_rows`; runs every row where none are given."""
+    found = run_rows() if results is None else results
+    return "\n".join([_HEADER, *(_line(result) for result in found)]) + "\n"
+
+
+def _line(result: dict[str, Any]) -> str:
+    verdict = "holds" if result["holds"] else "**fails**"
+    row, *texts = (_cell(str(result[key])) for key in ("row", "printed", "correct", "kind", "evidence"))
+    return f"| {row} | {' | '.join(texts[:3])} | {verdict}: {texts[3]} |"
+
+
+def _cell(text: str) -> str:
+    """Text that Markdown shows as it is, in one cell."""
+    for sign in "\\|*_":
+        text = text.replace(sign, f"\\{sign}")
+    return " ".join(text.split())
