@@ -1,6 +1,28 @@
-"""SymPy derivations: signed powers, plant, error dynamics, terms, enclosures."""
+"""SymPy derivations: signed powers, plant, error dynamics, homogeneity, Filippov fields, cells, lifts, enclosures."""
 
+from quakedesign.symbolic.filippov import FilippovField, SetValued, filippov_derivative, restrict
+from quakedesign.symbolic.homogeneity import Homogeneity, dilate, homogeneous
+from quakedesign.symbolic.lifting import lift
 from quakedesign.symbolic.model import Model, derive
+from quakedesign.symbolic.normal_form import normal_form, solve_signed
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, off_kinks
+from quakedesign.symbolic.weights import weights_for
 
-__all__ = ["AbsolutePower", "Model", "SignedPower", "derive", "off_kinks"]
+__all__ = [
+    "AbsolutePower",
+    "FilippovField",
+    "Homogeneity",
+    "Model",
+    "SetValued",
+    "SignedPower",
+    "derive",
+    "dilate",
+    "filippov_derivative",
+    "homogeneous",
+    "lift",
+    "normal_form",
+    "off_kinks",
+    "restrict",
+    "solve_signed",
+    "weights_for",
+]

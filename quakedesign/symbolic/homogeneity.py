@@ -10,7 +10,6 @@ from quakedesign.errors import ParameterError
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.filippov import FilippovField
 from quakedesign.symbolic.normal_form import normal_form, signs, symbols_of
-from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 Weights = Mapping[sp.Symbol, int | sp.Rational]
 epsilon = sp.Symbol("epsilon", positive=True)
@@ -77,7 +76,7 @@ class Counterexample:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Homogeneity:
-    """Answer to: is it r-homogeneous, and of which degree? (Bacciotti and Rosier 2005; Levant 2005 for inclusions.)
+    """Whether something is r-homogeneous, and of which degree (Bacciotti and Rosier 2005; Levant 2005 for inclusions).
 
     Attributes
     ----------
@@ -128,7 +127,8 @@ def dilation(weights: Weights, factor: sp.Expr = epsilon) -> dict[sp.Symbol, sp.
     wrong = {state: weight for state, weight in exact.items() if not (weight.is_Rational and weight > 0)}
     if wrong or not factor.is_positive:
         raise ParameterError(
-            f"weights must be positive rationals and the factor positive. Received {wrong or factor}. Use for example 3, 2, 1."
+            f"weights must be positive rationals and the factor positive. Received {wrong or factor}. "
+            "Use for example 3, 2, 1."
         )
     return {state: factor**weight * state for state, weight in exact.items()}
 
@@ -138,7 +138,7 @@ def dilate(expression: sp.Expr, weights: Weights, factor: sp.Expr = epsilon) -> 
     return normal_form(normal_form(expression).subs(dilation(weights, factor), simultaneous=True))
 
 
-def homogeneity(
+def homogeneous(
     subject: sp.Expr | FilippovField | Mapping[sp.Symbol, sp.Expr],
     weights: Weights,
     degree: int | sp.Rational | None = None,
@@ -199,7 +199,7 @@ def _degrees(dilated: sp.Expr) -> set[sp.Rational] | None:
     """Exponents of ε in the terms of a sum; None where ε is not a factor."""
     found = set()
     for term in sp.Add.make_args(dilated) if dilated != 0 else ():
-        rest, power = term.as_independent(epsilon, as_Add=False)
+        power = term.as_independent(epsilon, as_Add=False)[1]
         base, exponent = power.as_base_exp()
         if power != 1 and (base != epsilon or not exponent.is_Rational):
             return None
@@ -258,61 +258,3 @@ def _differ(left: sp.Expr, right: sp.Expr) -> bool:
     except (NotImplementedError, AttributeError):
         return False
     return bool(enclosure.is_finite() and not enclosure.contains(0))
-
-
-def weights_for(
-    field: FilippovField | Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational
-) -> dict[sp.Symbol, sp.Rational]:
-    """Weights that make a field homogeneous of a degree, from the linear equations that its terms impose, then proved.
-
-    Parameters
-    ----------
-    field : FilippovField or mapping of Symbol to Expr
-    degree : int or Rational
-        Such as −1 for sliding modes with a discontinuous integral.
-
-    Returns
-    -------
-    dict of Symbol to Rational
-
-    Raises
-    ------
-    ParameterError
-        When no weights exist, or they are not unique.
-    """
-    rates = field.rates if isinstance(field, FilippovField) else field
-    unknown = {state: sp.Dummy(f"r_{state}", positive=True) for state in rates}
-    equations: list[sp.Expr] = []
-    for state, rate in rates.items():
-        for term in sp.Add.make_args(normal_form(rate)):
-            if term != 0:
-                equations.append(_weight(term, unknown, equations) - unknown[state] - degree)
-    solution = sp.linsolve([e for e in equations if e != 0], *unknown.values())
-    values = next(iter(solution), ())
-    if not values or not all(v.is_Rational and v > 0 for v in values):
-        raise ParameterError(
-            f"the terms impose no unique positive weights for degree {degree}. Solving gives {solution}. Try another degree."
-        )
-    weights = dict(zip(rates, values, strict=True))
-    if not homogeneity(field, weights, degree):
-        raise ParameterError(
-            f"with the weights {weights} that the terms impose, homogeneity of degree {degree} is not proved."
-        )
-    return weights
-
-
-def _weight(e: sp.Expr, unknown: Mapping[sp.Symbol, sp.Symbol], equations: list[sp.Expr]) -> sp.Expr:
-    """Degree of a product in the unknown weights; sums inside powers add equations for their terms."""
-    if not e.has(*unknown):
-        return sp.Integer(0)
-    if e in unknown:
-        return unknown[e]
-    if e.is_Mul:
-        return sum((_weight(factor, unknown, equations) for factor in e.args), start=sp.Integer(0))
-    if e.is_Add:
-        first, *others = (_weight(term, unknown, equations) for term in e.args)
-        equations += [first - other for other in others]
-        return first
-    if e.is_Pow or isinstance(e, SignedPower | AbsolutePower):
-        return _weight(e.args[0], unknown, equations) * e.args[1]
-    raise ParameterError(f"{e} is not built from signed powers; it has no weight.")

@@ -81,19 +81,17 @@ def solve_signed(condition: sp.Expr | sp.Eq, variable: sp.Symbol) -> sp.Expr:
         )
     coefficient, power = own[0].as_independent(variable, as_Add=False)
     inner, exponent = _odd_power(power, left)
-    if coefficient.is_zero is not False and not coefficient.is_nonzero:
+    if not coefficient.is_nonzero:
         raise ParameterError(f"the coefficient {coefficient} of {power} must not vanish. Declare its symbols positive.")
     target = -SignedPower(normal_form((left - own[0]) / coefficient), 1 / exponent)
     return normal_form(target) if inner == variable else solve_signed(inner - target, variable)
 
 
 def _odd_power(power: sp.Expr, left: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    if isinstance(power, SignedPower) and power.args[1].is_positive:
-        return power.args
-    base, exponent = power.as_base_exp()
-    if exponent.is_Integer and exponent > 0 and exponent % 2 == 1 and not isinstance(base, AbsolutePower):
-        inner, inner_exponent = base.args if isinstance(base, SignedPower) else (base, sp.Integer(1))
-        return inner, inner_exponent * exponent
+    base, n = power.as_base_exp()
+    inner, a = base.args if isinstance(base, SignedPower) else (base, sp.Integer(1))
+    if n.is_Integer and n % 2 == 1 and (a * n).is_positive and not isinstance(base, AbsolutePower):
+        return inner, a * n
     raise ParameterError(
         f"{power} in {left} = 0 takes a value twice or jumps. Only odd powers ⌈·⌋^a, a > 0, are solved."
     )
@@ -113,6 +111,8 @@ def _flat(e: sp.Expr) -> sp.Expr:
     if e.is_Pow and isinstance(arguments[0], AbsolutePower):
         x, a = arguments[0].args
         return AbsolutePower(x, a * arguments[1])
+    if e.is_Pow and arguments[0].is_Add and arguments[0].is_nonnegative and not arguments[1].is_Integer:
+        return _spread(AbsolutePower, normal_form(arguments[0]), arguments[1])
     return e.func(*arguments)
 
 
@@ -121,7 +121,8 @@ def _spread(kind: type, inner: sp.Expr, a: sp.Expr) -> sp.Expr:
     content, rest = _content(inner)
     result = sp.Integer(1)
     for factor in (*sp.Mul.make_args(content), *sp.Mul.make_args(rest)):
-        result *= factor**a if factor.is_positive else _spread_factor(kind, factor, a)
+        plain = factor.is_positive or (factor.is_nonnegative and a.is_positive and not factor.is_Add)
+        result *= factor**a if plain else _spread_factor(kind, factor, a)
     return result
 
 

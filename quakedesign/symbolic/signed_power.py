@@ -88,6 +88,8 @@ class AbsolutePower(_Power):
         Exponent; a negative one arises only from derivatives off the kinks.
     """
 
+    is_nonnegative = True
+
     @classmethod
     def eval(cls, x: Any, a: Any) -> sp.Expr | None:
         """Evaluate a = 0, numbers, and drop signs."""

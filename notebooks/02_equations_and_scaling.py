@@ -1,0 +1,99 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # From the force balance to instability and scaling
+#
+# Nothing on this page is typed in that can be derived: the equations come from one force balance, the verdicts from exact arithmetic.
+
+# %%
+import dataclasses
+
+import sympy as sp
+
+# %matplotlib inline
+import quakedesign as qd
+from quakedesign.symbolic import homogeneous, plant, weights_for
+from quakedesign.symbolic.stability import critical_stiffness, nucleation_length, stability
+
+plant.force_balance()
+
+# %% [markdown]
+# Measured from the equilibrium without pressure and disturbance, per unit mass, with $x_1$ the slip [m] and $x_2$ the slip rate [m/s]:
+
+# %%
+plant.shifted_acceleration()
+
+# %% [markdown]
+# The Jacobian keeps the pressure $p$, because withdrawal ($p<0$) raises the softening. The origin is unstable if **either** inequality holds.
+
+# %%
+fault = qd.load_fault("real-fault")
+model = qd.derive(fault)
+model
+
+# %% [markdown]
+# ## A verdict with a margin
+# The conditions are evaluated in exact arithmetic; the margin says how far the fault is from the boundary.
+
+# %%
+for pressure in ("0", "-20e6", "40e6"):
+    verdict = stability(fault, pressure=pressure)
+    margin = min(float(condition.margin[0]) for condition in verdict.conditions)
+    print(f"p = {float(pressure) / 1e6:5.0f} MPa: {verdict.outcome.name.lower()}, margin {margin:+.3f}")
+print(f"critical stiffness {critical_stiffness(fault):.4g} N/m, nucleation length {nucleation_length(fault):.4g} m")
+
+# %%
+from quakedesign.report.stability_map import stability_map
+
+stability_map(fault)
+
+# %% [markdown]
+# ## Friction of one's own
+# [own/hyperbolic_friction.py](own/hyperbolic_friction.py) lies outside the package. It goes through the same calls.
+
+# %%
+from own.hyperbolic_friction import HyperbolicWeakening
+
+mine = dataclasses.replace(fault, friction=HyperbolicWeakening(residual=0.2353, drop=0.1, length=0.5))
+print(qd.derive(mine).reasons[0])
+print(stability(mine).outcome.name.lower())
+qd.derive(mine).acceleration
+
+# %% [markdown]
+# ## A control law of one's own
+# [own/third_order_law.py](own/third_order_law.py) has signed powers inside a sign. The weights that make it homogeneous follow from linear equations;
+# the degree is then proved by an identity, or refuted by a point.
+
+# %%
+from own import third_order_law as law
+
+weights = weights_for(law.field, -1)
+found = homogeneous(law.field, weights)
+print({str(s): w for s, w in weights.items()}, found.verdict, found.degree)
+print(homogeneous(law.field, {law.x1: 1, law.x2: 1, law.x3: 1}).verdict)
+found
+
+# %% [markdown]
+# ## Scaling
+# The dimensionless groups are computed from the units. Two faults are similar if all groups agree; gains then carry over.
+
+# %%
+from quakedesign.report.scaling import scale_answer, scale_lines
+
+answer = scale_answer("lab-fault", "real-fault", "cta", "published")
+print("\n".join(scale_lines(answer)))
+
+# %%
+unstable = {f.name: qd.derive(f).unstable for f in (fault, mine, qd.load_fault("lab-fault"))}
+assert found.verdict == "proved" and found.degree == -1 and all(unstable.values()) and answer["similar"]
