@@ -1,10 +1,11 @@
 """SymPy derivations: signed powers, plant, error dynamics, homogeneity, Filippov fields, cells, lifts, enclosures."""
 
-from quakedesign.symbolic.filippov import FilippovField, SetValued, filippov_derivative, restrict
+from quakedesign.symbolic.filippov import FilippovField, filippov_derivative
 from quakedesign.symbolic.homogeneity import Homogeneity, dilate, homogeneous
 from quakedesign.symbolic.lifting import lift
 from quakedesign.symbolic.model import Model, derive
 from quakedesign.symbolic.normal_form import normal_form, solve_signed
+from quakedesign.symbolic.set_valued import SetValued, restrict
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, off_kinks
 from quakedesign.symbolic.weights import weights_for
 

@@ -85,6 +85,10 @@ class Cell:
         """
         return as_data(self.polynomial, self.variables, parameters or {})
 
+    def _repr_latex_(self) -> str:
+        conditions = [f"{sp.latex(e)}=0" for e in self.equalities] + [rf"{sp.latex(e)}\ge 0" for e in self.inequalities]
+        return r"$\displaystyle " + r",\;".join([sp.latex(self.polynomial), *conditions]) + "$"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lifted:

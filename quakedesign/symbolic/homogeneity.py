@@ -12,7 +12,7 @@ from quakedesign.symbolic.filippov import FilippovField
 from quakedesign.symbolic.normal_form import normal_form, signs, symbols_of
 
 Weights = Mapping[sp.Symbol, int | sp.Rational]
-epsilon = sp.Symbol("epsilon", positive=True)
+epsilon = sp.Dummy("epsilon", positive=True)  # never the same as a symbol of the user's
 _TRIES = 50
 
 

@@ -127,6 +127,8 @@ def test_asymmetric_intervals_have_exact_ends():
         assert value.upper.subs(x, number) == 1 + max(-number, 3 * number)
         assert value.lower.subs(x, number) == 1 + min(-number, 3 * number)
     assert SetValued(expression=d, intervals={d: (-0.1, 0.3)}).upper == R(3, 10)
+    with pytest.raises(ParameterError, match="lower end first"):
+        SetValued(expression=d, intervals={d: (L, -L)})
 
 
 def test_squares_of_a_selection_are_refused():

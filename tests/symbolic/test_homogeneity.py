@@ -124,6 +124,12 @@ def test_a_counterexample_never_lies_on_a_switching_surface():
     assert all(factor**2 * point[x] + factor * point[y] != 0 for factor in (1, 2, 4))
 
 
+def test_a_parameter_may_have_the_name_of_the_dilation():
+    own = sp.Symbol("epsilon", positive=True)
+    assert homogeneous(own * x**3, {x: 1}).degree == 3
+    assert homogeneous(own * x**3 + x, {x: 1}).verdict == "refuted"
+
+
 def test_zero_is_homogeneous():
     assert homogeneous(sp.Integer(0), {x: 1})
     assert homogeneous({x: sp.Integer(0), y: y}, {x: 1, y: 1}).degree == 0

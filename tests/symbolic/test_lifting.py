@@ -188,3 +188,4 @@ def test_no_derivation_takes_more_than_two_seconds():
 def test_lifts_are_shown_as_latex():
     _, lifted = dia()
     assert "w_{1}^{3}" in lifted._repr_latex_()
+    assert "=0" in next(iter(lifted.cells()))._repr_latex_()
