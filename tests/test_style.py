@@ -9,7 +9,14 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 
-@pytest.mark.parametrize("tool", [("ruff", "check", "--no-cache", "."), ("mypy",)], ids=lambda tool: tool[0])
+TOOLS = {
+    "lint": ("ruff", "check", "--no-cache", "."),
+    "format": ("ruff", "format", "--check", "--no-cache", "."),
+    "types": ("mypy",),
+}
+
+
+@pytest.mark.parametrize("tool", TOOLS.values(), ids=TOOLS)
 def test_tool_is_green(tool):
     call = [sys.executable, "-m", *tool]
     done = subprocess.run(call, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL)

@@ -495,9 +495,7 @@ def test_elimination_agrees_with_leading_minors_by_permutations():
     for _ in range(200):
         rows = [[generator.randint(-4, 4) for _ in range(4)] for _ in range(4)]
         shift = generator.randint(0, 3)
-        matrix = [
-            [sum(row[i] * row[j] for row in rows) - shift * (i == j) for j in range(4)] for i in range(4)
-        ]
+        matrix = [[sum(row[i] * row[j] for row in rows) - shift * (i == j) for j in range(4)] for i in range(4)]
         expected = all(leibniz([row[:k] for row in matrix[:k]]) > 0 for k in range(1, 5))
         verdicts.add(expected)
         assert checker.is_positive_definite(matrix, checker.Budget()) is expected
@@ -582,10 +580,7 @@ BROKEN = {
         "obligations",
     ),
     # rationals
-    **{
-        f"rational {text!r}": (relay, [("gains", "k", text)], "k must be")
-        for text in UNUSUAL
-    },
+    **{f"rational {text!r}": (relay, [("gains", "k", text)], "k must be") for text in UNUSUAL},
     "rational as integer": (relay, [("gains", "k", 2)], "k must be"),
     "rational as float": (relay, [("gains", "k", 2.5)], "a number"),
     "rational as boolean": (relay, [("gains", "k", False)], "k must be"),
@@ -886,9 +881,7 @@ def large_gram():
 
 def large_elimination():
     document = relay()
-    entries = [
-        "9" * 100 if i == j else "1" for i, j in itertools.combinations_with_replacement(range(200), 2)
-    ]
+    entries = ["9" * 100 if i == j else "1" for i, j in itertools.combinations_with_replacement(range(200), 2)]
     document["witnesses"][0]["squares"] = [square([0], [[i] for i in range(200)], *entries)] * 2
     return document
 

@@ -30,9 +30,7 @@ def test_both_libraries_agree_with_sympy(expression):
     import casadi as ca
 
     symbols = ca.SX.sym("x"), ca.SX.sym("y")
-    function = ca.Function(
-        "f", list(symbols), to_casadi([expression], dict(zip((x, y), symbols, strict=True)))
-    )
+    function = ca.Function("f", list(symbols), to_casadi([expression], dict(zip((x, y), symbols, strict=True))))
     (in_numpy,) = to_numpy([expression], {x: POINTS, y: 0.3})
     expected = [oracle(expression, a, 0.3) for a in POINTS]
     assert np.allclose([float(function(a, 0.3)) for a in POINTS], expected, rtol=1e-14, atol=1e-15)

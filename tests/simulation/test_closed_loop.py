@@ -33,9 +33,7 @@ def test_the_reference_is_the_integral_of_its_rate(name):
     moving = {plant.t: sp.Rational(int(end), 3)}
     s = sp.Symbol("s")
     assert sp.integrate(rate.args[0][0].subs(plant.t, s), (s, 0, moving[plant.t])) == slip.subs(moving)
-    assert sp.integrate(acceleration.args[0][0].subs(plant.t, s), (s, 0, moving[plant.t])) == rate.subs(
-        moving
-    )
+    assert sp.integrate(acceleration.args[0][0].subs(plant.t, s), (s, 0, moving[plant.t])) == rate.subs(moving)
     assert rate.subs(plant.t, 2 * end) == acceleration.subs(plant.t, end) == 0
 
 

@@ -15,9 +15,7 @@ def test_a_casadi_function_has_names():
     function = to_casadi(LAB)
     assert function.name_in() == ["t", "x", "p"]
     assert function.name_out() == ["dx"]
-    assert np.allclose(
-        function(t=0, x=[0, 0.5], p=0)["dx"].full().ravel(), [0.5, -0.5 * LAB.specific_damping]
-    )
+    assert np.allclose(function(t=0, x=[0, 0.5], p=0)["dx"].full().ravel(), [0.5, -0.5 * LAB.specific_damping])
 
 
 def test_a_closed_loop_function_integrates_to_the_simulated_run():
@@ -40,9 +38,7 @@ def test_python_control_joins_fault_and_law():
     fault, law = to_iosystem(LAB), to_iosystem(published("lab-fault")["elqr"])
     assert (fault.input_labels, fault.output_labels) == (["p"], ["slip", "slip_rate"])
     assert (law.input_labels, law.output_labels) == (["slip", "slip_rate", "r", "r_rate"], ["p"])
-    joined = control.interconnect(
-        [fault, law], inputs=["r", "r_rate"], outputs=["slip", "p"], check_unused=False
-    )
+    joined = control.interconnect([fault, law], inputs=["r", "r_rate"], outputs=["slip", "p"], check_unused=False)
     run = simulate(LAB, published("lab-fault")["elqr"], step=1e-4, duration=0.1, samples=200)
     response = control.input_output_response(
         joined,

@@ -28,9 +28,7 @@ def acceleration(fault, t, slip, rate, pressure):
     stress, load = fault.effective_normal_stress, fault.disturbance
     friction = coefficient(fault, slip) * (stress - pressure) - coefficient(fault, 0.0) * stress
     shaking = load.constant + load.amplitude * math.sin(load.frequency * t) + load.slip_growth * slip
-    return (
-        shaking - fault.authority * friction - fault.specific_stiffness * slip - fault.specific_damping * rate
-    )
+    return shaking - fault.authority * friction - fault.specific_stiffness * slip - fault.specific_damping * rate
 
 
 def reference(fault, t):
@@ -50,9 +48,7 @@ def elqr_field(fault, gains):
     return field
 
 
-@pytest.mark.parametrize(
-    ("fault", "step", "duration"), [(REAL, 0.0046, 400.0), (LAB, 2e-5, 2.0)], ids=["real", "lab"]
-)
+@pytest.mark.parametrize(("fault", "step", "duration"), [(REAL, 0.0046, 400.0), (LAB, 2e-5, 2.0)], ids=["real", "lab"])
 def test_the_linear_law_agrees_with_scipy(fault, step, duration):
     """The early slip swings through zero, where friction has a kink and a fixed step its second order only."""
     controller = published(fault.name)["elqr"]
@@ -70,9 +66,7 @@ def test_the_linear_law_agrees_with_scipy(fault, step, duration):
     )
     assert np.max(np.abs(oracle.y[0] - run.slip)) < 1e-6 * scale[0]
     assert np.max(np.abs(oracle.y[1] - run.slip_rate)) < 1e-6 * scale[1]
-    assert np.allclose(
-        run.pressure, -np.array(gains) @ oracle.y, rtol=0, atol=1e-5 * np.max(np.abs(run.pressure))
-    )
+    assert np.allclose(run.pressure, -np.array(gains) @ oracle.y, rtol=0, atol=1e-5 * np.max(np.abs(run.pressure)))
 
 
 def test_the_uncontrolled_fault_agrees_with_scipy():
@@ -131,10 +125,7 @@ def test_a_broken_compiler_falls_back_or_is_reported(monkeypatch):
 def test_every_step_is_taken_whatever_is_kept():
     """4099 steps are no multiple of any stride or chunk; the end must not depend on how they are cut."""
     controller = published("real-fault")["cta"]
-    runs = [
-        simulate(REAL, controller, duration=4099.5 * 0.184, samples=n, compiled=False)
-        for n in (1, 7, 2000, 4099)
-    ]
+    runs = [simulate(REAL, controller, duration=4099.5 * 0.184, samples=n, compiled=False) for n in (1, 7, 2000, 4099)]
     assert {run.metrics.steps for run in runs} == {4099}
     assert {run.time[-1] for run in runs} == {4099 * 0.184}
     assert {(run.slip[-1], run.metrics.rms_pressure, run.metrics.max_h_rate) for run in runs} == {
@@ -149,9 +140,7 @@ def test_a_float_that_means_ten_steps_gives_ten():
 
 @pytest.mark.parametrize("law", LAWS)
 def test_the_reference_rests_after_the_operation(law):
-    brief = dataclasses.replace(
-        LAB, reference=dataclasses.replace(LAB.reference, target_slip=1e-4, operation_time=2.0)
-    )
+    brief = dataclasses.replace(LAB, reference=dataclasses.replace(LAB.reference, target_slip=1e-4, operation_time=2.0))
     run = simulate(brief, published("lab-fault")[law], duration=3.0, samples=300)
     after = run.time > 2.0
     assert np.allclose(run.reference, [reference(brief, t)[0] for t in run.time], rtol=1e-12, atol=1e-18)

@@ -29,9 +29,7 @@ PROBLEMS = {
 @pytest.mark.parametrize("name", integrators())
 def test_the_error_falls_with_the_stated_order(name, problem):
     method = integrator(name)
-    coarse, fine = (
-        final_error(method, *PROBLEMS[problem][:3], steps, PROBLEMS[problem][3]) for steps in (20, 40)
-    )
+    coarse, fine = (final_error(method, *PROBLEMS[problem][:3], steps, PROBLEMS[problem][3]) for steps in (20, 40))
     assert math.log2(coarse / fine) > method.order - 0.25
 
 
