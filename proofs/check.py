@@ -29,7 +29,7 @@ MAX_DENOMINATOR_BITS = 2**14  # common denominator of a Gram matrix or of weight
 MAX_STEPS = 10**8  # operations on integers of 1024 bits, about a microsecond each
 
 RATIONAL = re.compile(r"-?(0|[1-9][0-9]{0,399})(/[1-9][0-9]{0,399})?")
-INTEGER = re.compile(r"0|[1-9][0-9]{0,5}")
+INTEGER = re.compile(r"0|[1-9][0-9]{0,2}")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 LAW = re.compile(r"[A-Za-z0-9_-]{1,40}")
 STRING = re.compile(r'"(?:[^"\\]++|\\.)*+"?', re.DOTALL)  # cannot fail once begun, hence linear
@@ -106,7 +106,7 @@ def refuse_number(text: str) -> NoReturn:
 
 def read_integer(text: str) -> int:
     """Convert a non-negative integer; no integer of the format has more than six digits."""
-    need(INTEGER.fullmatch(text) is not None, "an integer", "0 or [1-9][0-9]* of at most 6 digits", text)
+    need(INTEGER.fullmatch(text) is not None, "an integer", "0 or [1-9][0-9]* of at most 3 digits", text)
     return int(text)
 
 
@@ -417,7 +417,7 @@ def add_square(total: Polynomial, value: Any, where: str, loop: Loop, budget: Bu
     square, size = read_object(value, where, ("times", "basis", "gram")), len(loop.weights)
     factor = read_exponents(square["times"], f"{where} times", size, 1 if loop.domain == "cells" else 0)
     rows = read_list(square["basis"], f"{where} basis", 1, MAX_BASIS)
-    basis = [read_exponents(row, f"{where} basis", size, 10**6) for row in rows]
+    basis = [read_exponents(row, f"{where} basis", size, 999) for row in rows]
     need(len(set(basis)) == len(basis), f"{where} basis", "without repetitions", rows)
     pairs = list(combinations_with_replacement(range(len(basis)), 2))
     entries = read_list(square["gram"], f"{where} gram", len(pairs), len(pairs))

@@ -1,5 +1,6 @@
 """The command line. Every command returns its exit code; heavy libraries load inside the commands."""
 
+import io
 import json
 import os
 import sys
@@ -437,6 +438,9 @@ def errata(*rows: int, json: Json = False) -> int:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its code; every refusal is one line on stderr and exit code 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.exit(code if isinstance(code, int) else 0)

@@ -280,3 +280,18 @@ fastest_rate = "1 m/s"
         assert code == 2
         assert "simulate_state" in err
     assert [p.name for p in tmp_path.iterdir()] == ["state.toml"]
+
+
+def test_a_certificate_without_disturbance_does_not_cover_a_fault(capsys, tmp_path):
+    out = tmp_path / "quiet.json"
+    gains = ("--gains", "7", "5", "2.3", "1.1", "--gain-range", "1", "57/40")
+    assert run(capsys, "certify", "cta", *gains, "--lipschitz", "0", "--out", str(out))[0] == 0
+    code, said, _ = run(capsys, "check", str(out), "--fault", "lab-fault")
+    assert code == 1
+    assert "must hold 0 inside" in said
+
+
+def test_a_path_that_no_system_accepts_is_one_line(capsys):
+    code, _, err = run(capsys, "check", "a" * 300)
+    assert code == 2
+    assert "must exist" in err

@@ -33,7 +33,9 @@ def _same_field(loop: Loop) -> None:
         f"the gains, constants or uncertain parameters are not those of {loop.law}.",
     )
     require(
-        derived.states == loop.states and derived.domain == loop.domain and _sorted(derived) == _sorted(loop),
+        list(derived.states.items()) == list(loop.states.items())
+        and derived.domain == loop.domain
+        and _sorted(derived) == _sorted(loop),
         f"the field is not that of {loop.law}.",
     )
 

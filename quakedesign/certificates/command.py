@@ -34,7 +34,11 @@ def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tu
 
 
 def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
-    if not path.is_file():
+    try:
+        known = path.is_file()
+    except (OSError, ValueError):
+        known = False
+    if not known:
         raise CertificateError(f"certificate file must exist. Received {path}. Check the path.")
     try:
         certificate = load_certificate(path)
@@ -60,6 +64,8 @@ def _covers(certificate: Certificate, fault: Fault) -> list[str]:
         divisor = least_authority(fault)
         ranges = {"beta": coefficient_range(fault, divisor)}
         zero = Errors(slip=Fraction(0), rate=Fraction(0), acceleration=Fraction(0))
+        if certified_lipschitz(certificate) <= 0:
+            raise CertificateError("the certified range of d = h' must hold 0 inside to cover a fault")
         rate = largest_matched_rate(fault, divisor, zero)
         least = float(rate / certified_lipschitz(certificate))
         said.append(f"|h'| <= {float(rate):.4g} m/s^3 along the reference needs a scale of at least {least:.4g}")
@@ -79,6 +85,6 @@ def statement(certificate: Certificate) -> list[str]:
     if certificate.refutation is not None:
         point = ", ".join(f"{name}: {v}" for name, v in certificate.refutation.point.items())
         return [*lines, f"Filippov equilibrium away from the origin, in cell coordinates {point}"]
-    lines.append(f"V = {from_terms(certificate.lyapunov, symbols)}")
+    lines.append("V = " + " + ".join(f"({from_terms([term], symbols)})" for term in certificate.lyapunov))
     lines.append(", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
     return lines

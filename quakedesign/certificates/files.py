@@ -18,6 +18,7 @@ _LARGEST_FILE = 4 << 20
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 _LAW = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _RATIONAL = re.compile(r"(-?)(0|[1-9][0-9]{0,399})(?:/([1-9][0-9]{0,399}))?")
+_GRID_BITS = 1 << 14
 _LIMITS = {"states": 6, "uncertain": 8, "parameters": 64, "terms": 200, "basis": 200, "witnesses": 4096}
 
 
@@ -90,7 +91,7 @@ def _no_float(text: str):
 
 
 def _integer(text: str) -> int:
-    _need(len(text) <= 4 and text != "-0", f"the integer {text[:20]} is out of range")
+    _need(len(text) <= 3 and text != "-0", f"the integer {text[:20]} is out of range")
     return int(text)
 
 
@@ -191,7 +192,7 @@ def _term(raw: Any, loop: Loop) -> Term:
     coefficient = _rational(number)
     _need(coefficient != 0, "a term must not be zero")
     known = {*loop.gains, *loop.constants, *loop.uncertain}
-    parameters = tuple(_list(names, "parameters", 24))
+    parameters = tuple(_list(names, "parameters", 32))
     _need(all(isinstance(n, str) and n in known for n in parameters), "a term has an unknown parameter")
     factors = tuple(_factor(entry, loop) for entry in _list(powers, "factors", _LIMITS["states"]))
     _need(len({f[0] for f in factors}) == len(factors), "a state occurs twice in a term")
@@ -224,16 +225,26 @@ def _witness(raw: dict[str, Any], variables: int) -> Witness:
     blocks = []
     for entry in _list(raw["squares"], "squares", 1 << variables):
         block = _keys(entry, {"times", "basis", "gram"})
+        gram = [_rational(v) for v in _list(block["gram"], "gram")]
+        _common_grid(gram)
         basis = _list(block["basis"], "basis", _LIMITS["basis"])
         size = len(basis)
         blocks.append(
             Block(
                 times=_exponents(block["times"], variables, 1),
                 basis=tuple(_exponents(b, variables, 999) for b in basis),
-                gram=tuple(_rational(v) for v in _list(block["gram"], "gram", length=size * (size + 1) // 2)),
+                gram=tuple(_list(gram, "gram", length=size * (size + 1) // 2)),
             )
         )
     return Witness(multiplier=multiplier, blocks=tuple(blocks))
+
+
+def _common_grid(gram: list[Fraction]) -> None:
+    """Refuse a Gram matrix whose common denominator would make exact arithmetic slow."""
+    common = 1
+    for entry in gram:
+        common = math.lcm(common, entry.denominator)
+        _need(common.bit_length() <= _GRID_BITS, f"the common denominator of a Gram matrix exceeds {_GRID_BITS} bits")
 
 
 def _equilibrium(raw: Any) -> Equilibrium:

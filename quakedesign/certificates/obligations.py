@@ -29,6 +29,8 @@ class Obligations:
     def derivative(self) -> tuple[Term, ...]:
         """Terms of V̇; refused unless V is C¹ and V̇ affine in every uncertain parameter."""
         symbols = self.loop.symbols
+        kinks = [t for t in self.lyapunov for _, a, kind in t.factors if a < 1 or (kind == "a" and a == 1)]
+        require(not kinks, "V is not continuously differentiable term by term.")
         try:
             rate = lie_derivative(from_terms(self.lyapunov, symbols), sympy_field(self.loop))
         except KinkError as error:

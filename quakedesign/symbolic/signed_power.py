@@ -6,6 +6,7 @@ from contextvars import ContextVar
 from typing import Any
 
 import sympy as sp
+from sympy.core.cache import clear_cache
 
 from quakedesign.errors import KinkError
 
@@ -20,6 +21,7 @@ def off_kinks() -> Iterator[None]:
         yield
     finally:
         _ALLOW_KINKS.reset(token)
+        clear_cache()  # SymPy remembers derivatives, and must not remember these outside
 
 
 class _Power(sp.Function):

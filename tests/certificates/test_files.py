@@ -157,3 +157,41 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path):
     certificate.save(tmp_path / "good.json")
     assert load_certificate(tmp_path / "good.json") == certificate
     assert [p.name for p in tmp_path.iterdir()] == ["good.json"]
+
+
+def test_a_function_with_a_kink_is_refused_even_if_its_terms_cancel(texts, standalone):
+    raw = json.loads(texts["cta"])
+    raw["V"] += [["1", [], [["e2", "1/2", "s"]]], ["-1", [], [["e2", "1/2", "s"]]]]
+    assert verdicts(json.dumps(raw), standalone)[:2] == ("refused", "refused")
+
+
+def test_a_derivative_once_taken_off_the_kinks_does_not_prove_a_kink(texts):
+    from quakedesign.certificates.obligations import Obligations
+    from quakedesign.symbolic import off_kinks
+    from quakedesign.symbolic.terms import from_terms
+
+    raw = json.loads(texts["cta"])
+    raw["V"].append(["1/1152921504606846976", [], [["e1", "1", "a"], ["e2", "1", "s"]]])
+    certificate = parse_certificate(json.dumps(raw))
+    symbols = certificate.loop.symbols
+    with off_kinks():
+        for state in certificate.loop.states:
+            from_terms(certificate.lyapunov, symbols).diff(symbols[state])
+    with pytest.raises(CertificateError, match="continuously differentiable"):
+        _ = Obligations(certificate.loop, certificate.lyapunov).derivative
+
+
+def test_a_matrix_with_huge_denominators_is_refused_in_bounded_time(texts, standalone):
+    raw = json.loads(texts["cta"])
+    size = 12
+    entries = [f"1/{10**398 + 2 * i + 1}" for i in range(size * (size + 1) // 2)]
+    basis = [[i, 0, 0] for i in range(size)]
+    raw["witnesses"][0]["squares"].append({"times": [0, 0, 0], "basis": basis, "gram": entries})
+    assert verdicts(json.dumps(raw), standalone)[:2] == ("refused", "refused")
+
+
+def test_reordered_states_are_refused_by_the_package(texts):
+    raw = json.loads(texts["no"])
+    raw["states"] = {"e3": 1, "e2": 2, "e1": 3}
+    with pytest.raises(CertificateError, match="field is not that of"):
+        parse_certificate(json.dumps(raw)).check()
