@@ -28,6 +28,10 @@ class KinkError(QuakedesignError, ArithmeticError):
     """A derivative asked for at a point where the expression has none."""
 
 
+class PolynomialError(QuakedesignError, ValueError):
+    """A text that is not a polynomial or a constraint, or too large to be read as one."""
+
+
 class CertificateError(QuakedesignError, ValueError):
     """A certificate file that is not one, or whose proof does not hold."""
 

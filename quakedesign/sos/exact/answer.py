@@ -1,0 +1,71 @@
+"""What the engine says: a verdict with its proof, which can be checked again without a solver."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares, holds
+from quakedesign.sos.exact.statement import Statement
+
+
+class Positivity(Enum):
+    """Outcome of a question about a polynomial."""
+
+    SOS = "sos"
+    NOT_SOS = "not-sos"
+    NEGATIVE = "negative"
+    UNDECIDED = "undecided"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+_KIND = {SumOfSquares: Positivity.SOS, Functional: Positivity.NOT_SOS, Point: Positivity.NEGATIVE}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """Verdict on one statement.
+
+    Attributes
+    ----------
+    statement : Statement
+        What was decided, including the multiplier and the degree that were used.
+    proof : SumOfSquares, Functional, Point or None
+    blocks : mapping of str to list of int
+        Sizes of the Gram matrices before and after reduction.
+    seconds : float
+        Wall time [s].
+    versions : mapping of str to str
+        Solver and arithmetic used.
+    """
+
+    statement: Statement
+    proof: Proof | None
+    blocks: Mapping[str, list[int]] = field(default_factory=dict)
+    seconds: float = 0.0
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> Positivity:
+        """``sos``, ``not-sos``, ``negative`` or ``undecided``."""
+        return Positivity.UNDECIDED if self.proof is None else _KIND[type(self.proof)]
+
+    def check(self) -> bool:
+        """Whether the proof decides the statement, in exact arithmetic and without a solver.
+
+        An undecided answer claims nothing and is True.
+        """
+        return self.proof is None or holds(self.statement, self.proof)
+
+    def save(self, path) -> None:
+        """Write the file of FORMAT.md, whole or not at all.
+
+        Raises
+        ------
+        CertificateError
+            When nothing was decided, or the proof is too large for the format.
+        """
+        from quakedesign.sos.exact.files import save
+
+        save(self.statement, self.proof, path)

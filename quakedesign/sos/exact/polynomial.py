@@ -1,0 +1,115 @@
+"""Sparse polynomials with rational coefficients: exponents to nonzero coefficient."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import cache, reduce
+from itertools import combinations_with_replacement
+from typing import Any
+
+Exponents = tuple[int, ...]
+Polynomial = Mapping[Exponents, Fraction]
+"""Sparse polynomial: exponents to nonzero rational coefficient."""
+
+
+@cache
+def ring(variables: int) -> Any:
+    """Multivariate polynomial ring over ℚ (python-flint context)."""
+    from flint import fmpq_mpoly_ctx
+
+    return fmpq_mpoly_ctx.get([f"u{i}" for i in range(variables)], "degrevlex")
+
+
+def element(polynomial: Polynomial, variables: int) -> Any:
+    """Element of the ring."""
+    from flint import fmpq
+
+    entries = {e: fmpq(c.numerator, c.denominator) for e, c in polynomial.items() if c}
+    return ring(variables).from_dict(entries)
+
+
+def mapping(polynomial: Any) -> dict[Exponents, Fraction]:
+    """Sparse form of an element of the ring."""
+    return {tuple(map(int, e)): Fraction(int(c.p), int(c.q)) for e, c in polynomial.to_dict().items()}
+
+
+def product(variables: int, factors: Iterable[Polynomial]) -> dict[Exponents, Fraction]:
+    """Product of polynomials; one for none."""
+    return mapping(reduce(lambda left, right: left * element(right, variables), factors, ring(variables).constant(1)))
+
+
+def constant(variables: int, value: Fraction = Fraction(1)) -> dict[Exponents, Fraction]:
+    """Constant polynomial."""
+    return {(0,) * variables: value} if value else {}
+
+
+def combination(parts: Iterable[tuple[Fraction, Polynomial]]) -> dict[Exponents, Fraction]:
+    """Σ c·p."""
+    total: dict[Exponents, Fraction] = {}
+    for factor, part in parts:
+        for e, c in part.items():
+            total[e] = total.get(e, Fraction(0)) + factor * c
+    return {e: c for e, c in total.items() if c}
+
+
+def degree(polynomial: Polynomial) -> int:
+    """Total degree; 0 for zero."""
+    return max((sum(e) for e in polynomial), default=0)
+
+
+def evaluate(polynomial: Polynomial, point: Sequence[Fraction]) -> Fraction:
+    """Exact value at a rational point."""
+    total = Fraction(0)
+    for e, c in polynomial.items():
+        total += c * monomial(point, e)
+    return total
+
+
+def monomial(values: Sequence[Fraction], exponents: Exponents) -> Fraction:
+    """Π values_i^exponents_i."""
+    result = Fraction(1)
+    for v, e in zip(values, exponents, strict=True):
+        if e:
+            result *= Fraction(v) ** e
+    return result
+
+
+def rescaled(polynomial: Polynomial, scale: Sequence[Fraction]) -> dict[Exponents, Fraction]:
+    """P(scale ∘ ũ) as a polynomial in ũ."""
+    return {e: c * monomial(scale, e) for e, c in polynomial.items()}
+
+
+def times(left: Exponents, right: Exponents) -> Exponents:
+    """Product of two monomials."""
+    return tuple(a + b for a, b in zip(left, right, strict=True))
+
+
+def monomials(variables: int, most: int, least: int = 0) -> Iterator[Exponents]:
+    """All exponents of total degree least … most, lowest degree first."""
+    for total in range(least, most + 1):
+        for chosen in combinations_with_replacement(range(variables), total):
+            exponents = [0] * variables
+            for i in chosen:
+                exponents[i] += 1
+            yield tuple(exponents)
+
+
+def from_sympy(expression: Any, variables: Sequence[Any]) -> dict[Exponents, Fraction]:
+    """Sparse form of a SymPy polynomial with rational coefficients.
+
+    Raises
+    ------
+    PolynomialError
+        When it is not one.
+    """
+    import sympy as sp
+
+    from quakedesign.errors import PolynomialError
+
+    try:
+        terms = sp.Poly(expression, *variables, domain="QQ").terms()
+    except (sp.PolynomialError, sp.CoercionFailed) as error:
+        raise PolynomialError(
+            f"a polynomial in {', '.join(map(str, variables))} with rational coefficients is needed. "
+            f"Received {str(expression)[:80]} ({error}). Write floats as exact rationals."
+        ) from None
+    return {tuple(e): Fraction(int(c.p), int(c.q)) for e, c in terms if c}

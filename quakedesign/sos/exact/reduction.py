@@ -1,0 +1,127 @@
+"""Exact reduction of the monomial bases before anything is solved.
+
+One rule does the work of Newton polytope and diagonal inconsistency. Let e be a monomial to which no equality and
+only diagonal Gram entries contribute, each with a positive factor. If its coefficient in the target is zero, all these
+diagonal entries vanish, and so do their rows. Repeated on ℝⁿ until nothing changes, every vertex v of the convex hull of
+the basis has 2v in the support of the target, so the basis lies in half of its Newton polytope (Reznick 1978).
+"""
+
+from collections import Counter, defaultdict
+from fractions import Fraction
+
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, times
+from quakedesign.sos.exact.statement import Statement
+
+Bases = tuple[tuple[Exponents, ...], ...]
+
+
+def full_bases(statement: Statement) -> Bases:
+    """For every product of inequalities all monomials whose squares keep the degree."""
+    size = len(statement.variables)
+    return tuple(tuple(monomials(size, (statement.degree - degree(w)) // 2)) for w in statement.weights)
+
+
+def reduced_bases(statement: Statement) -> Bases:
+    """Monomials that can occur in the squares of a proof, for every product of inequalities.
+
+    Returns
+    -------
+    tuple of tuple of exponents
+        A proof of the statement exists with the full bases if and only if one exists with these.
+    """
+    alive = [dict.fromkeys(basis) for basis in full_bases(statement)]
+    others, diagonal = _contributions(statement, alive)
+    open_to_equalities = reach(statement)
+    target = statement.target
+    waiting = list(diagonal)
+    while waiting:
+        e = waiting.pop()
+        if e in target or e in open_to_equalities or others[e] or any(c <= 0 for _, _, c in diagonal[e]):
+            continue
+        for k, b, _ in list(diagonal[e]):
+            if b in alive[k]:
+                del alive[k][b]
+                waiting += _forget(statement.weights[k], k, b, alive[k], others, diagonal)
+    return tuple(tuple(basis) for basis in alive)
+
+
+def _contributions(statement: Statement, alive):
+    """Number of off-diagonal entries, and the diagonal ones, that feed each monomial."""
+    others: Counter[Exponents] = Counter()
+    diagonal: dict[Exponents, set[tuple[int, Exponents, Fraction]]] = defaultdict(set)
+    for k, (weight, basis) in enumerate(zip(statement.weights, alive, strict=True)):
+        elements = list(basis)
+        for i, left in enumerate(elements):
+            for e, c in weight.items():
+                shifted = times(left, e)
+                diagonal[times(shifted, left)].add((k, left, c))
+                others.update(times(shifted, right) for right in elements[i + 1 :])
+    return others, diagonal
+
+
+def _forget(weight: Polynomial, k: int, gone: Exponents, basis, others, diagonal) -> list[Exponents]:
+    """Take the entries of one basis element away; the monomials that they fed."""
+    touched = []
+    for e, c in weight.items():
+        shifted = times(gone, e)
+        own = times(shifted, gone)
+        diagonal[own].discard((k, gone, c))
+        touched.append(own)
+        for other in basis:
+            shared = times(shifted, other)
+            others[shared] -= 1
+            touched.append(shared)
+    return touched
+
+
+def reach(statement: Statement) -> set[Exponents]:
+    """Monomials to which a multiple of an equality may contribute."""
+    size = len(statement.variables)
+    found = set()
+    for h in statement.equalities:
+        for m in monomials(size, statement.degree - degree(h)):
+            found.update(times(m, e) for e in h)
+    return found
+
+
+def parity_classes(statement: Statement, basis: tuple[Exponents, ...]) -> list[tuple[int, ...]]:
+    """Indices of basis elements that no sign change of variables, under which everything is invariant, tells apart.
+
+    The Gram matrix may be taken block diagonal in these classes (Löfberg 2009).
+    """
+    echelon = _parity_echelon(statement)
+    classes: dict[int, list[int]] = defaultdict(list)
+    for index, b in enumerate(basis):
+        classes[_residue(b, echelon)].append(index)
+    return [tuple(c) for c in classes.values()]
+
+
+def invariant(statement: Statement, exponents: Exponents) -> bool:
+    """Whether a monomial keeps its sign under every sign change that leaves the statement invariant."""
+    return _residue(exponents, _parity_echelon(statement)) == 0
+
+
+def _parity_echelon(statement: Statement) -> dict[int, int]:
+    """Echelon basis over GF(2) of the parities that occur, leading bit to vector."""
+    echelon: dict[int, int] = {}
+    for p in (statement.target, *statement.inequalities, *statement.equalities):
+        for e in p:
+            vector = _reduce(_bits(e), echelon)
+            if vector:
+                echelon[vector.bit_length()] = vector
+    return echelon
+
+
+def _residue(exponents: Exponents, echelon: dict[int, int]) -> int:
+    return _reduce(_bits(exponents), echelon)
+
+
+def _reduce(vector: int, echelon: dict[int, int]) -> int:
+    for lead in sorted(echelon, reverse=True):
+        if vector >> (lead - 1) & 1:
+            vector ^= echelon[lead]
+    return vector
+
+
+def _bits(exponents: Exponents) -> int:
+    return sum((x & 1) << i for i, x in enumerate(exponents))

@@ -1,0 +1,131 @@
+"""What is asked: is multiplier · polynomial in the cone of a simple semialgebraic set?"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import combinations
+
+from quakedesign.errors import PolynomialError
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, constant, degree, product
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statement:
+    """multiplier · polynomial = Σ_S (Π_{i∈S} g_i)·σ_S + Σ_k q_k h_k with sums of squares σ_S, all of bounded degree.
+
+    Attributes
+    ----------
+    variables : tuple of str
+    polynomial : mapping of exponents to Fraction
+    inequalities : tuple of Polynomial
+        g_i ≥ 0 on the set.
+    equalities : tuple of Polynomial
+        h_k = 0 on the set.
+    products : tuple of tuple of int
+        The index sets S; the empty one is always there.
+    degree : int
+        Largest degree of a summand.
+    multiplier : mapping of exponents to Fraction
+    """
+
+    variables: tuple[str, ...]
+    polynomial: Polynomial
+    inequalities: tuple[Polynomial, ...] = ()
+    equalities: tuple[Polynomial, ...] = ()
+    products: tuple[tuple[int, ...], ...] = ((),)
+    degree: int
+    multiplier: Polynomial
+
+    def __post_init__(self) -> None:
+        size = len(self.variables)
+        polynomials = (self.polynomial, self.multiplier, *self.inequalities, *self.equalities)
+        if len(set(self.variables)) != size or any(len(e) != size for p in polynomials for e in p):
+            raise PolynomialError(f"every polynomial must be in the {size} different variables {self.variables}.")
+        if not self.multiplier or not all(self.inequalities) or not all(self.equalities):
+            raise PolynomialError("multiplier, inequalities and equalities must not be zero. Drop a zero one.")
+        allowed = range(len(self.inequalities))
+        well_formed = all(i in allowed for s in self.products for i in s) and all(
+            tuple(sorted(set(s))) == s for s in self.products
+        )
+        if () not in self.products or len(set(self.products)) != len(self.products) or not well_formed:
+            raise PolynomialError(
+                f"products must be different increasing index sets with (). Received {self.products}."
+            )
+
+    @cached_property
+    def target(self) -> dict[Exponents, Fraction]:
+        """multiplier · polynomial."""
+        return product(len(self.variables), (self.multiplier, self.polynomial))
+
+    def weight(self, chosen: tuple[int, ...]) -> dict[Exponents, Fraction]:
+        """Π_{i∈S} g_i."""
+        return product(len(self.variables), (self.inequalities[i] for i in chosen))
+
+    @cached_property
+    def weights(self) -> tuple[dict[Exponents, Fraction], ...]:
+        """Π_{i∈S} g_i for every S."""
+        return tuple(self.weight(s) for s in self.products)
+
+    @cached_property
+    def dense(self) -> bool:
+        """Whether the set is ℝⁿ or an orthant, so that a multiplier may vanish on a thin part of it."""
+        return not self.equalities and all(self.is_variable(g) for g in self.inequalities)
+
+    @staticmethod
+    def is_variable(polynomial: Polynomial) -> bool:
+        """Whether a polynomial is a positive multiple of one variable."""
+        return len(polynomial) == 1 and all(sum(e) == 1 and c > 0 for e, c in polynomial.items())
+
+
+def statement(
+    variables: tuple[str, ...],
+    polynomial: Polynomial,
+    *,
+    inequalities: tuple[Polynomial, ...] = (),
+    equalities: tuple[Polynomial, ...] = (),
+    multiplier: Polynomial | None = None,
+    products: bool | None = None,
+    degree_bound: int | None = None,
+) -> Statement:
+    """Statement with the usual choices.
+
+    Parameters
+    ----------
+    variables : tuple of str
+    polynomial : mapping of exponents to Fraction
+    inequalities, equalities : tuple of Polynomial
+    multiplier : mapping of exponents to Fraction, optional
+        One unless given.
+    products : bool, optional
+        All squarefree products of inequalities (Schmüdgen) if True, each alone (Putinar) if False. Unless given,
+        products of inequalities that are variables (orthant), each alone of the others.
+    degree_bound : int, optional
+        Unless given, the smallest even degree that holds multiplier · polynomial and every constraint.
+    """
+    size = len(variables)
+    factor = constant(size) if multiplier is None else dict(multiplier)
+    target = product(size, (factor, polynomial))
+    least = max(degree(p) for p in (target, *inequalities, *equalities))
+    bound = degree_bound if degree_bound is not None else least + least % 2
+    plain = [i for i, g in enumerate(inequalities) if Statement.is_variable(g)]
+    others = [i for i in range(len(inequalities)) if i not in plain]
+    if products is None:
+        sets = [*_subsets(plain, len(plain)), *((i,) for i in others)]
+    else:
+        sets = list(_subsets(range(len(inequalities)), len(inequalities) if products else 1))
+    degrees = [degree(g) for g in inequalities]
+    kept = tuple(sorted({s for s in sets if sum(degrees[i] for i in s) <= bound} | {()}, key=lambda s: (len(s), s)))
+    return Statement(
+        variables=variables,
+        polynomial=polynomial,
+        inequalities=inequalities,
+        equalities=equalities,
+        products=kept,
+        degree=bound,
+        multiplier=factor,
+    )
+
+
+def _subsets(indices, largest: int):
+    for size in range(largest + 1):
+        yield from combinations(indices, size)

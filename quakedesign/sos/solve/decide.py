@@ -1,0 +1,189 @@
+"""The search for a proof of one statement: solve, round, look for a point, refute, pass to a face."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from quakedesign.rationals import nearest
+from quakedesign.sos.exact.polynomial import Exponents
+from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds
+from quakedesign.sos.exact.reduction import full_bases, parity_classes, reduced_bases
+from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.solve.faces import Block, at_kernels, at_zeros
+from quakedesign.sos.solve.moment import MomentProgram, Solution
+from quakedesign.sos.solve.points import local_minima, negative_point, rational_zeros
+from quakedesign.sos.solve.rounding_exact import relations, rounded
+from quakedesign.sos.solve.scaling import Scaled, scaled
+
+_STRICT = 1e-7
+_ROUNDS = 4
+_KERNELS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+
+
+@dataclass
+class Search:
+    """One statement under way.
+
+    Attributes
+    ----------
+    original : Statement
+    """
+
+    original: Statement
+    moved: Scaled = field(init=False)
+    statement: Statement = field(init=False)
+    blocks: list[Block] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.moved = scaled(self.original)
+        self.statement = self.moved.statement
+        self.blocks = initial_blocks(self.statement)
+
+    def run(self) -> Proof | None:
+        """Checked proof, or None."""
+        solution, program = self._solve(self.blocks)
+        if solution is not None and solution.margin > _STRICT:
+            found = self._finish(rounded(self.statement, self.blocks, solution))
+            if found is not None:
+                return found
+        candidates = list(local_minima(self.statement, self._hints(solution)))
+        point = negative_point(self.statement, candidates, self.moved.scale)
+        if point is not None:
+            return self._finish(point)
+        found = self._outside(program)
+        if found is not None:
+            return found
+        if solution is not None and solution.margin < -_STRICT and program is not None:
+            found = self._refute(program, solution)
+            if found is not None:
+                return found
+        found = self._on_faces(candidates, solution)
+        if found is None and solution is not None and solution.margin < 0 and program is not None:
+            found = self._refute(program, solution)
+        return found
+
+    def _solve(self, blocks: list[Block]) -> tuple[Solution | None, MomentProgram | None]:
+        if not blocks:
+            return None, None
+        rows = [{e: float(c) for e, c in r.items()} for _, _, r in relations(self.statement)]
+        program = MomentProgram([b.shape() for b in blocks], rows)
+        if not program.covers(self.statement.target):
+            return None, program
+        return program.solve({e: float(c) for e, c in self.statement.target.items()}), program
+
+    def _hints(self, solution: Solution | None) -> list[list[float]]:
+        """First moments of the functional, where it has a mass."""
+        if solution is None:
+            return []
+        size = len(self.statement.variables)
+        mass = solution.functional.get((0,) * size, 0.0)
+        units = [tuple(int(i == j) for j in range(size)) for i in range(size)]
+        if not mass > 1e-9 or not all(u in solution.functional for u in units):
+            return []
+        return [[solution.functional[u] / mass for u in units]]
+
+    def _finish(self, proof: Proof | None) -> Proof | None:
+        """Proof of the statement as it was asked, checked."""
+        if proof is None:
+            return None
+        restored = self.moved.restore(proof)
+        if isinstance(restored, SumOfSquares):
+            return restored
+        return restored if holds(self.original, restored) else None
+
+    def _outside(self, program: MomentProgram | None) -> Proof | None:
+        """Refutation by a monomial of the target that nothing can produce."""
+        known = set() if program is None else set(program.index)
+        target = self.statement.target
+        for e in target:
+            if e not in known:
+                return self._finish(Functional(values={e: Fraction(-1 if target[e] > 0 else 1)}))
+        return None
+
+    def _refute(self, program: MomentProgram, solution: Solution) -> Proof | None:
+        target = {e: float(c) for e, c in self.statement.target.items()}
+        found = program.interior(target, solution.margin / 2)
+        for values in (found, solution.functional) if found is not None else (solution.functional,):
+            for bits in (6, 10, 14, 18, 22, 26, 32, 40):
+                proof = Functional(values=self._consistent(values, bits))
+                if holds(self.statement, proof):
+                    return self._finish(proof)
+        return None
+
+    def _consistent(self, values: Mapping[Exponents, float], bits: int) -> dict[Exponents, Fraction]:
+        """Functional rounded to multiples of 2^-bits of its largest value, exactly zero on the equalities."""
+        size = max(abs(v) for v in values.values())
+        exact = {e: nearest(v / size, 2**bits) for e, v in values.items()}
+        rows = [r for _, _, r in relations(self.statement)]
+        if rows:
+            exact = _project(exact, rows)
+        return {e: v for e, v in exact.items() if v}
+
+    def _on_faces(self, candidates, solution: Solution | None) -> Proof | None:
+        zeros = rational_zeros(self.statement, candidates, self.moved.scale)
+        blocks = at_zeros(self.blocks, zeros) if zeros else self.blocks
+        for start in _KERNELS:
+            found = self._descend(blocks, start)
+            if found is not None:
+                return found
+        return None
+
+    def _descend(self, blocks: list[Block], threshold: float) -> Proof | None:
+        for _ in range(_ROUNDS):
+            solution = self._solve(blocks)[0] if blocks else self._nothing()
+            if solution is None:
+                return None
+            if solution.margin > 1e-9:
+                found = self._finish(rounded(self.statement, blocks, solution))
+                if found is not None:
+                    return found
+            smaller = at_kernels(blocks, solution.grams, threshold, self.moved.scale)
+            if smaller is None:
+                return None
+            blocks = smaller
+        return None
+
+
+    def _nothing(self) -> Solution:
+        """Answer without squares, where only multiples of the equalities are left."""
+        count = sum(1 for _ in relations(self.statement))
+        return Solution(margin=1.0, grams=[], moments=[], functional={}, cofactors=[0.0] * count)
+
+
+def initial_blocks(statement: Statement) -> list[Block]:
+    """Blocks after the exact reduction, split by sign symmetry."""
+    found = []
+    for chosen, weight, basis in zip(statement.products, statement.weights, reduced_bases(statement), strict=True):
+        for part in parity_classes(statement, basis):
+            found.append(Block(product=chosen, weight=weight, monomials=tuple(basis[i] for i in part)))
+    return found
+
+
+def block_sizes(statement: Statement) -> dict[str, list[int]]:
+    """Sizes of the Gram matrices before and after the exact reduction, largest first."""
+    before = sorted((len(b) for b in full_bases(statement)), reverse=True)
+    after = sorted((len(b.monomials) for b in initial_blocks(statement)), reverse=True)
+    return {"before": before, "after": after}
+
+
+def _project(values: dict[Exponents, Fraction], rows) -> dict[Exponents, Fraction]:
+    """Nearest-looking values that satisfy every relation: the pivots follow from the others."""
+    from flint import fmpq, fmpq_mat
+
+    keys = sorted({e for r in rows for e in r} | set(values), key=lambda e: (sum(e), e), reverse=True)
+    index = {e: i for i, e in enumerate(keys)}
+    matrix = [[fmpq(0)] * len(keys) for _ in rows]
+    for line, r in zip(matrix, rows, strict=True):
+        for e, c in r.items():
+            line[index[e]] = fmpq(c.numerator, c.denominator)
+    reduced, rank = fmpq_mat(matrix).rref()
+    table = reduced.tolist()[:rank]
+    result = dict(values)
+    for row in table:
+        pivot = next(i for i, v in enumerate(row) if v != 0)
+        total = Fraction(0)
+        for i in range(pivot + 1, len(keys)):
+            if row[i] != 0:
+                total -= Fraction(int(row[i].p), int(row[i].q)) * values.get(keys[i], Fraction(0))
+        result[keys[pivot]] = total
+    return result

@@ -1,0 +1,174 @@
+"""Questions about positivity, answered with a proof or with ``undecided``."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+from quakedesign.errors import PolynomialError
+from quakedesign.sos.exact.answer import Answer, Positivity
+from quakedesign.sos.exact.polynomial import Polynomial, combination, degree, from_sympy, product
+from quakedesign.sos.exact.proofs import Proof, SumOfSquares
+from quakedesign.sos.exact.statement import Statement, statement
+
+_GROWTH = (0, 2)
+
+
+def prove(
+    polynomial: Any,
+    *,
+    on: Sequence[Any] = (),
+    multiplier: Any = None,
+    variables: Sequence[Any] | None = None,
+    margin: Any = 0,
+    products: bool | None = None,
+    degree_bound: int | None = None,
+) -> Answer:
+    """Decide whether a polynomial is a sum of squares, or has such a proof of positivity on a set.
+
+    Parameters
+    ----------
+    polynomial : str, SymPy expression or mapping of exponents to Fraction
+        With rational coefficients; text in the grammar of `quakedesign.sos.exact.text`.
+    on : sequence of str or SymPy relation
+        Constraints of the set such as ``"x >= 0"``, ``"x^2 + y^2 <= 1"``, ``"x*y == 1"``; ℝⁿ unless given.
+    multiplier : str, SymPy expression or mapping, optional
+        multiplier · polynomial is decided instead; ``"auto"`` tries powers of 1 + Σx_i² (of Σx_i² for forms, of Σx_i
+        for forms on the orthant) up to the third.
+    variables : sequence of str or Symbol, optional
+        Their order; in order of appearance unless given.
+    margin : rational, optional
+        polynomial − margin·Σ x_i^d (forms of degree d) or − margin·(1 + Σ x_i^d) is decided instead.
+    products : bool, optional
+        All squarefree products of inequalities if True, none if False; unless given, products of variables only.
+    degree_bound : int, optional
+        Largest degree of a summand. Unless given the smallest even one that fits is tried, and on a constrained set
+        the next even one.
+
+    Returns
+    -------
+    Answer
+        Its ``verdict`` is ``sos``, ``not-sos``, ``negative`` or ``undecided``, and only checked proofs are returned.
+
+    Raises
+    ------
+    PolynomialError
+        When the input cannot be read, or the multiplier is not shown to be positive.
+    """
+    start = perf_counter()
+    names, exact, inequalities, equalities, factor = _read(polynomial, on, multiplier, variables)
+    exact = _with_margin(exact, margin, len(names))
+    growth = _GROWTH if (inequalities or equalities) and degree_bound is None else (0,)
+    answer: Answer | None = None
+    for chosen in _multipliers(exact, factor, inequalities, equalities):
+        for more in growth:
+            asked = statement(
+                names, exact, inequalities=inequalities, equalities=equalities, multiplier=chosen, products=products,
+                degree_bound=degree_bound,
+            )
+            if more:
+                asked = statement(
+                    names, exact, inequalities=inequalities, equalities=equalities, multiplier=chosen,
+                    products=products, degree_bound=asked.degree + more,
+                )
+            found = decide(asked)
+            if found.verdict in (Positivity.SOS, Positivity.NEGATIVE):
+                return replace(found, seconds=perf_counter() - start)
+            answer = found if answer is None or answer.verdict is Positivity.UNDECIDED else answer
+    assert answer is not None
+    return replace(answer, seconds=perf_counter() - start)
+
+
+def decide(asked: Statement) -> Answer:
+    """Search for a proof of exactly one statement.
+
+    Raises
+    ------
+    PolynomialError
+        When the multiplier is not shown to be positive.
+    """
+    from quakedesign.sos.solve.decide import Search, block_sizes
+
+    squares = _squares_of_multiplier(asked)
+    start = perf_counter()
+    proof: Proof | None
+    if not asked.target:
+        proof = SumOfSquares(squares=(), cofactors=tuple({} for _ in asked.equalities))
+    else:
+        proof = Search(asked).run()
+    if isinstance(proof, SumOfSquares):
+        proof = replace(proof, multiplier=squares)
+    answer = Answer(
+        statement=asked,
+        proof=proof,
+        blocks=block_sizes(asked),
+        seconds=perf_counter() - start,
+        versions=_versions(),
+    )
+    return answer if answer.check() else replace(answer, proof=None)
+
+
+def _versions() -> dict[str, str]:
+    from importlib.metadata import version
+
+    return {name: version(name) for name in ("quakedesign", "clarabel", "python-flint")}
+
+
+def _read(polynomial: Any, on: Sequence[Any], multiplier: Any, variables: Sequence[Any] | None):
+    from quakedesign.sos.exact.reading import read
+
+    return read(polynomial, on, multiplier, variables)
+
+
+def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:
+    from quakedesign.rationals import rational
+
+    amount = rational(margin, "margin")
+    if not amount:
+        return polynomial
+    top = degree(polynomial)
+    if top % 2 or amount < 0:
+        raise PolynomialError(f"a margin needs a polynomial of even degree and must be positive. Received {top}, {margin}.")
+    powers = {tuple(top * (i == j) for j in range(size)): Fraction(1) for i in range(size)}
+    if any(sum(e) != top for e in polynomial):
+        powers[(0,) * size] = Fraction(1)
+    return combination([(Fraction(1), polynomial), (-amount, powers)])
+
+
+def _multipliers(polynomial, factor, inequalities, equalities):
+    """Multipliers to try: the given one, or one and growing powers."""
+    if factor != "auto":
+        return [factor]
+    size = len(next(iter(polynomial), (0,)))
+    top = degree(polynomial)
+    form = all(sum(e) == top for e in polynomial)
+    orthant = inequalities and not equalities and all(Statement.is_variable(g) for g in inequalities)
+    step = 1 if orthant and form else 2
+    base: dict = {tuple(step * (i == j) for j in range(size)): Fraction(1) for i in range(size)}
+    if not form:
+        base[(0,) * size] = Fraction(1)
+    return [product(size, [base] * k) for k in range(4)]
+
+
+def _squares_of_multiplier(asked: Statement):
+    """The multiplier as a sum of squares, unless its coefficients show that it is positive."""
+    from quakedesign.sos.exact.proofs import multiplier_is_positive
+
+    if multiplier_is_positive(asked, ()):
+        return ()
+    own = statement(
+        asked.variables, asked.multiplier, inequalities=asked.inequalities,
+        degree_bound=max(asked.degree, degree(asked.multiplier) + degree(asked.multiplier) % 2),
+    )
+    found = decide(replace(own, products=asked.products))
+    if isinstance(found.proof, SumOfSquares) and multiplier_is_positive(asked, found.proof.squares):
+        return found.proof.squares
+    where = "is positive on a dense part of the set" if asked.dense else "has a sum of squares with a positive constant"
+    raise PolynomialError(
+        f"multiplier must be shown to be positive, that is, it {where}. This was not possible for the given one. "
+        "Use for example 1 + x^2."
+    )
+
+
+__all__ = ["decide", "from_sympy", "prove"]

@@ -1,0 +1,164 @@
+"""Faces of the cone: where a target has rational zeros, or a Gram matrix a rational kernel, the basis shrinks.
+
+A wrong guess costs time, never truth: the proof is checked against the full statement in the end.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, evaluate, monomial
+from quakedesign.sos.exact.proofs import Element
+from quakedesign.sos.solve.moment import Shape
+
+Row = tuple[Fraction, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """One block of the search.
+
+    Attributes
+    ----------
+    product : tuple of int
+        Inequalities multiplied.
+    weight : Polynomial
+        Their product.
+    monomials : tuple of exponents
+        m (length n).
+    face : tuple of rows, optional
+        The basis is face·m (r × n); m itself unless given.
+    """
+
+    product: tuple[int, ...]
+    weight: Polynomial
+    monomials: tuple[Exponents, ...]
+    face: tuple[Row, ...] | None = None
+
+    @property
+    def basis(self) -> tuple[Element, ...]:
+        """Entries of b."""
+        if self.face is None:
+            return self.monomials
+        return tuple(_element(dict(zip(self.monomials, row, strict=True))) for row in self.face)
+
+    def shape(self) -> Shape:
+        """The block in floats."""
+        face = None if self.face is None else [[float(v) for v in row] for row in self.face]
+        weight = {e: float(c) for e, c in self.weight.items()}
+        return Shape(weight=weight, basis=self.monomials, face=face)
+
+    def restricted(self, kernel: Sequence[Row]) -> "Block | None":
+        """Block whose Gram matrix has the given vectors (in the present basis) in its kernel; None if nothing is left."""
+        from flint import fmpq, fmpq_mat
+
+        if not kernel:
+            return self
+        reduced, rank = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in kernel]).rref()
+        rows = [[Fraction(int(v.p), int(v.q)) for v in row] for row in reduced.tolist()[:rank]]
+        pivots = [next(i for i, v in enumerate(row) if v) for row in rows]
+        size = len(self.monomials) if self.face is None else len(self.face)
+        complement = []
+        for free in (i for i in range(size) if i not in pivots):
+            new = [Fraction(0)] * size
+            new[free] = Fraction(1)
+            for pivot, row in zip(pivots, rows, strict=True):
+                new[pivot] = -row[free]
+            complement.append(tuple(new))
+        return self._with(complement) if complement else None
+
+    def _with(self, rows: list[Row]) -> "Block":
+        if self.face is not None:
+            columns = list(zip(*self.face, strict=True))
+            rows = [tuple(sum((a * b for a, b in zip(row, c, strict=True)), start=Fraction(0)) for c in columns) for row in rows]
+        if all(sum(map(bool, row)) == 1 for row in rows):
+            return replace(self, monomials=tuple(self.monomials[next(i for i, v in enumerate(r) if v)] for r in rows), face=None)
+        used = [i for i in range(len(self.monomials)) if any(row[i] for row in rows)]
+        return replace(
+            self,
+            monomials=tuple(self.monomials[i] for i in used),
+            face=tuple(tuple(row[i] for i in used) for row in rows),
+        )
+
+    def at(self, point: Sequence[Fraction]) -> Row:
+        """Basis at a point."""
+        values = [monomial(point, e) for e in self.monomials]
+        if self.face is None:
+            return tuple(values)
+        return tuple(sum((a * v for a, v in zip(row, values, strict=True)), start=Fraction(0)) for row in self.face)
+
+
+def _element(polynomial: Polynomial) -> Element:
+    kept = {e: c for e, c in polynomial.items() if c}
+    if len(kept) == 1 and next(iter(kept.values())) == 1:
+        return next(iter(kept))
+    return kept
+
+
+def at_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[Fraction]]) -> list[Block]:
+    """Blocks whose squares vanish at the given zeros of the target."""
+    kept = []
+    for block in blocks:
+        live = [z for z in zeros if evaluate(block.weight, z) > 0]
+        smaller = block.restricted([block.at(z) for z in live])
+        if smaller is not None:
+            kept.append(smaller)
+    return kept
+
+
+def at_kernels(blocks: Sequence[Block], grams: Sequence, threshold: float, scale: Sequence[Fraction]) -> list[Block] | None:
+    """Blocks without the numerical kernels of their Gram matrices, rounded; None if there is no kernel."""
+    kept, found = [], False
+    for block, gram in zip(blocks, grams, strict=True):
+        kernel = _kernel(block, gram, threshold, scale)
+        found = found or bool(kernel)
+        smaller = block.restricted(kernel)
+        if smaller is not None:
+            kept.append(smaller)
+    return kept if found else None
+
+
+def _kernel(block: Block, gram, threshold: float, scale: Sequence[Fraction]) -> list[Row]:
+    """Rational basis of the eigenspace of small eigenvalues, in the simplest fractions of the unscaled variables."""
+    import numpy as np
+    from scipy.linalg import qr
+
+    values, vectors = np.linalg.eigh(gram)
+    space = vectors[:, values < threshold].T
+    if not len(space):
+        return []
+    _, _, order = qr(space, pivoting=True)
+    pivots = order[: len(space)]
+    echelon = np.linalg.solve(space[:, pivots], space)
+    units = [float(monomial(scale, e)) for e in block.monomials] if block.face is None else [1.0] * gram.shape[0]
+    rows = []
+    for pivot, row in zip(pivots, echelon, strict=True):
+        rows.append(tuple(
+            _entry(float(v), float(units[j] / units[pivot])) for j, v in enumerate(row)
+        ))
+    return rows
+
+
+def _entry(value: float, unit: float) -> Fraction:
+    """Simplest fraction near value·unit, over unit (a power of two)."""
+    if abs(value) < 1e-5:
+        return Fraction(0)
+    return simplest(value * unit, 1e-5) / Fraction(unit)
+
+
+def simplest(value: float, tolerance: float) -> Fraction:
+    """Fraction of smallest denominator within a relative tolerance of a nonzero number."""
+    exact = Fraction(value)
+    width = abs(exact) * Fraction(tolerance)
+    low, high = exact - width, exact + width
+    return -_between(-high, -low) if exact < 0 else _between(low, high)
+
+
+def _between(low: Fraction, high: Fraction) -> Fraction:
+    """Fraction of smallest denominator in [low, high], 0 < low (continued fractions)."""
+    whole = low.numerator // low.denominator
+    if whole == low:
+        return Fraction(whole)
+    if whole + 1 <= high:
+        return Fraction(whole + 1)
+    return whole + 1 / _between(1 / (high - whole), 1 / (low - whole))

@@ -1,0 +1,199 @@
+"""Local minima of a polynomial on its set, as hints for a negative point and for rational zeros."""
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, evaluate
+from quakedesign.sos.exact.proofs import Point, holds
+from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.solve.faces import simplest
+
+_SEED = 20240607
+
+
+class Arrays:
+    """A polynomial as arrays, for values and gradients at many points."""
+
+    def __init__(self, polynomial: Polynomial, variables: int) -> None:
+        import numpy as np
+
+        self.exponents = np.array(list(polynomial), dtype=np.int64).reshape(-1, variables)
+        self.coefficients = np.array([float(c) for c in polynomial.values()])
+
+    def __call__(self, x) -> float:
+        """Value at a point."""
+        import numpy as np
+
+        return float(self.coefficients @ np.prod(np.asarray(x)[None, :] ** self.exponents, axis=1))
+
+    def gradient(self, x):
+        """Gradient at a point."""
+        import numpy as np
+
+        x = np.asarray(x)
+        result = np.zeros(len(x))
+        for i in range(len(x)):
+            lower = self.exponents.copy()
+            factor = lower[:, i] * self.coefficients
+            lower[:, i] = np.maximum(lower[:, i] - 1, 0)
+            result[i] = factor @ np.prod(x[None, :] ** lower, axis=1)
+        return result
+
+
+def local_minima(statement: Statement, hints: Sequence[Sequence[float]] = (), starts: int = 24) -> Iterator[list[float]]:
+    """Local minima of the polynomial on the set, from seeded starts; floating point, on ℝⁿ also towards infinity.
+
+    On ℝⁿ and orthants the homogenised polynomial is minimised on the sphere (x_i = v_i² where x_i ≥ 0); with other
+    constraints SLSQP works in the variables themselves.
+    """
+    if statement.dense:
+        yield from _on_sphere(statement, hints, starts)
+    else:
+        yield from _constrained(statement, hints, starts)
+
+
+def _on_sphere(statement: Statement, hints, starts: int) -> Iterator[list[float]]:
+    import numpy as np
+    from scipy.optimize import minimize
+
+    size = len(statement.variables)
+    p = statement.polynomial
+    top = degree(p)
+    homogeneous = all(sum(e) == top for e in p)
+    signed = [any(g.keys() == {_unit(size, i)} for g in statement.inequalities) for i in range(size)]
+    lift = {(*(2 * x if s else x for x, s in zip(e, signed, strict=True)), 2 * (top - sum(e))): c for e, c in p.items()}
+    form = Arrays(lift, size + 1)
+    weights = np.array([2.0 if s else 1.0 for s in signed])
+
+    def spread(v):
+        return np.append(v, 0.0 if homogeneous else 1.0) if homogeneous else v
+
+    def value(v):
+        full = np.append(v, 1.0) if homogeneous else v
+        x = _state(full[:-1], signed)
+        level = float(x @ x) + (0.0 if homogeneous else full[-1] ** 4)
+        gradient = form.gradient(full)
+        grown = np.where(signed, 4 * np.abs(full[:-1]) ** 3 * np.sign(full[:-1]), 2 * full[:-1])
+        if not homogeneous:
+            grown = np.append(grown, 4 * full[-1] ** 3)
+        gradient = gradient[:-1] if homogeneous else gradient
+        number = form(full)
+        scale = level ** (top / 2)
+        return number / scale, gradient / scale - number / scale * (top / 2) * grown / level
+
+    del spread, weights
+    random = np.random.default_rng(_SEED)
+    begin = [*(_lifted(h, signed, homogeneous) for h in hints)]
+    count = size if homogeneous else size + 1
+    begin += [random.standard_normal(count) for _ in range(starts)]
+    for v in begin:
+        if not float(np.linalg.norm(v)) > 0:
+            continue
+        answer = minimize(value, np.asarray(v) / np.linalg.norm(v), jac=True, method="BFGS", options={"gtol": 1e-10})
+        x = _state(answer.x[:size], signed)
+        last = 1.0 if homogeneous else float(answer.x[-1]) ** 2
+        if homogeneous:
+            yield (x / np.abs(x).max()).tolist()
+        elif last > 1e-9 * np.abs(x).max():
+            yield (x / last).tolist()
+        else:
+            for far in (1e1, 1e2, 1e4):
+                yield (x / np.abs(x).max() * far).tolist()
+
+
+def _state(v, signed):
+    import numpy as np
+
+    return np.where(signed, v**2, v)
+
+
+def _lifted(hint, signed, homogeneous: bool):
+    import numpy as np
+
+    x = np.where(signed, np.sqrt(np.abs(hint)), hint)
+    return x if homogeneous else np.append(x, 1.0)
+
+
+def _unit(size: int, index: int) -> Exponents:
+    return tuple(int(i == index) for i in range(size))
+
+
+def _constrained(statement: Statement, hints, starts: int) -> Iterator[list[float]]:
+    import numpy as np
+    from scipy.optimize import minimize
+
+    size = len(statement.variables)
+    p = Arrays(statement.polynomial, size)
+    limits = [("ineq", Arrays(g, size)) for g in statement.inequalities]
+    limits += [("eq", Arrays(h, size)) for h in statement.equalities]
+    constraints = [{"type": kind, "fun": g, "jac": g.gradient} for kind, g in limits]
+    random = np.random.default_rng(_SEED)
+    begin = [*map(np.asarray, hints), *(random.standard_normal(size) * s for s in (0.3, 1.0, 3.0) for _ in range(starts // 3))]
+    for v in begin:
+        try:
+            with np.errstate(all="ignore"):
+                answer = minimize(
+                    p, v, jac=p.gradient, method="SLSQP", constraints=constraints, options={"ftol": 1e-14, "maxiter": 200}
+                )
+        except (ValueError, FloatingPointError):
+            continue
+        if np.all(np.isfinite(answer.x)):
+            yield answer.x.tolist()
+
+
+def negative_point(statement: Statement, candidates: Sequence[Sequence[float]], scale: Sequence[Fraction]) -> Point | None:
+    """Point of the set where the polynomial is negative, with small fractions; None if no candidate leads to one."""
+    import numpy as np
+
+    p = Arrays(statement.polynomial, len(statement.variables))
+    ranked = sorted(candidates, key=lambda x: p(x) / (1 + float(np.abs(x).max())) ** max(degree(statement.polynomial), 1))
+    for x in ranked[:12]:
+        for tolerance in (0.3, 0.1, 1e-2, 1e-4, 1e-7, 1e-10, 1e-14):
+            point = Point(coordinates=rationalised(x, scale, tolerance))
+            if holds(statement, point):
+                return point
+    return None
+
+
+def rational_zeros(
+    statement: Statement, candidates: Sequence[Sequence[float]], scale: Sequence[Fraction]
+) -> list[tuple[Fraction, ...]]:
+    """Different rational points of the set among the candidates where the polynomial vanishes exactly."""
+    found = dict[tuple[Fraction, ...], None]()
+    for x in candidates:
+        for lead in _leads(statement, x):
+            for tolerance in (1e-3, 1e-5, 1e-7):
+                point = rationalised([v / lead for v in x] if lead else list(x), scale, tolerance)
+                if any(point) and _vanishes(statement, point):
+                    found[point] = None
+                    break
+            else:
+                continue
+            break
+    return list(found)
+
+
+def _vanishes(statement: Statement, point: tuple[Fraction, ...]) -> bool:
+    return (
+        evaluate(statement.polynomial, point) == 0
+        and all(evaluate(g, point) >= 0 for g in statement.inequalities)
+        and all(evaluate(h, point) == 0 for h in statement.equalities)
+    )
+
+
+def _leads(statement: Statement, x: Sequence[float]) -> list[float]:
+    """Coordinates to divide by: a zero of a form is a ray."""
+    top = degree(statement.polynomial)
+    if statement.equalities or any(sum(e) != top for e in statement.polynomial):
+        return [0.0]
+    size = max(map(abs, x))
+    return [abs(v) for v in x if abs(v) > 1e-3 * size]
+
+
+def rationalised(x: Sequence[float], scale: Sequence[Fraction], tolerance: float) -> tuple[Fraction, ...]:
+    """Simplest fractions, in the unscaled variables, within a tolerance relative to the largest coordinate."""
+    size = max((abs(v) for v in x), default=0.0)
+    return tuple(
+        Fraction(0) if abs(v) <= tolerance * size else simplest(v * float(s), tolerance * min(1.0, size / abs(v))) / s
+        for v, s in zip(x, scale, strict=True)
+    )
