@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 from quakedesign.certificates.claim import Certificate, Verdict
-from quakedesign.certificates.files import load_certificate
+from quakedesign.certificates.files import certificate_of, read_json
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import (
     Errors,
@@ -16,6 +17,10 @@ from quakedesign.certificates.premises import (
 )
 from quakedesign.errors import CertificateError
 from quakedesign.fault import Fault, load_fault
+from quakedesign.sos import Answer, Positivity
+from quakedesign.sos.exact.files import is_about_polynomial
+from quakedesign.sos.exact.files import read as read_polynomial_file
+from quakedesign.sos.exact.words import sentences
 from quakedesign.symbolic.terms import from_terms
 
 
@@ -41,12 +46,25 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
     if not known:
         raise CertificateError(f"certificate file must exist. Received {path}. Check the path.")
     try:
-        certificate = load_certificate(path)
+        raw = read_json(path)
+        if is_about_polynomial(raw):
+            return _polynomial(raw)
+        certificate = certificate_of(raw)
         verdict = certificate.check()
         more = _covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []
     except CertificateError as error:
         return f"invalid: {' '.join(str(error).split())}", []
     return str(verdict), [*statement(certificate), *more]
+
+
+def _polynomial(raw: Any) -> tuple[str, list[str]]:
+    """Verdict on a file about a plain polynomial."""
+    statement, proof = read_polynomial_file(raw)
+    answer = Answer(statement=statement, proof=proof)
+    if not answer.check():
+        raise CertificateError("the proof does not decide the statement")
+    kind = "proved" if answer.verdict is Positivity.SOS else "refuted"
+    return kind, [line for line in sentences(answer) if not line.endswith("exact arithmetic")]
 
 
 def _covers(certificate: Certificate, fault: Fault) -> list[str]:

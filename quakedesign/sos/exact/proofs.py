@@ -184,7 +184,7 @@ def _monomial_gram(basis: Sequence[Element], gram: Sequence[Fraction]):
     scale = lcm(1, *(q.denominator for q in gram))
     integers = [[q.numerator * (scale // q.denominator) for q in row] for row in full]
     if all(isinstance(b, tuple) for b in basis):
-        if len(set(basis)) != len(basis):  # type: ignore[arg-type]
+        if len(set(basis)) != len(basis):
             raise ValueError("a monomial occurs twice in a basis.")
         return list(basis), integers, scale
     from flint import fmpz_mat

@@ -75,6 +75,7 @@ def _sympy(given: Any, names: tuple[str, ...]) -> dict[Exponents, Fraction]:
 
 
 def _constraint(given: Any, names: tuple[str, ...]) -> tuple[str, dict[Exponents, Fraction]]:
+    kind: str
     if isinstance(given, str):
         kind, _, polynomial = text.parse_constraint(given, names)
     else:

@@ -1,16 +1,21 @@
 """Exact reduction of the monomial bases before anything is solved.
 
 One rule does the work of Newton polytope and diagonal inconsistency. Let e be a monomial to which no equality and
-only diagonal Gram entries contribute, each with a positive factor. If its coefficient in the target is zero, all these
-diagonal entries vanish, and so do their rows. Repeated on ℝⁿ until nothing changes, every vertex v of the convex hull of
-the basis has 2v in the support of the target, so the basis lies in half of its Newton polytope (Reznick 1978).
+only diagonal Gram entries contribute, each with a positive factor. If its coefficient in the target is zero, all
+these diagonal entries vanish, and so do their rows. Repeated on ℝⁿ until nothing changes, every vertex v of the
+convex hull of the basis has 2v in the support of the target, so the basis lies in half of its Newton polytope
+(Reznick 1978).
 """
 
 from collections import Counter, defaultdict
 from fractions import Fraction
+from math import comb
 
+from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, times
 from quakedesign.sos.exact.statement import Statement
+
+_MONOMIALS, _PAIRS = 2_000, 8_000_000
 
 Bases = tuple[tuple[Exponents, ...], ...]
 
@@ -18,11 +23,23 @@ Bases = tuple[tuple[Exponents, ...], ...]
 def full_bases(statement: Statement) -> Bases:
     """For every product of inequalities all monomials whose squares keep the degree."""
     size = len(statement.variables)
-    return tuple(tuple(monomials(size, (statement.degree - degree(w)) // 2)) for w in statement.weights)
+    halves = [(statement.degree - degree(w)) // 2 for w in statement.weights]
+    counts = [comb(size + h, size) if h >= 0 else 0 for h in halves]
+    if max(counts, default=0) > _MONOMIALS or sum(n * n for n in counts) > _PAIRS:
+        raise PolynomialError(
+            f"a basis must have at most {_MONOMIALS} monomials, and all together {_PAIRS} pairs. "
+            f"Received {max(counts)} monomials in the largest of {len(counts)}. Lower the degree."
+        )
+    return tuple(tuple(monomials(size, h)) for h in halves)
 
 
 def reduced_bases(statement: Statement) -> Bases:
     """Monomials that can occur in the squares of a proof, for every product of inequalities.
+
+    Raises
+    ------
+    PolynomialError
+        When there are too many monomials to begin with.
 
     Returns
     -------
@@ -77,7 +94,7 @@ def _forget(weight: Polynomial, k: int, gone: Exponents, basis, others, diagonal
 def reach(statement: Statement) -> set[Exponents]:
     """Monomials to which a multiple of an equality may contribute."""
     size = len(statement.variables)
-    found = set()
+    found = set[Exponents]()
     for h in statement.equalities:
         for m in monomials(size, statement.degree - degree(h)):
             found.update(times(m, e) for e in h)

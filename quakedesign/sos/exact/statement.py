@@ -1,4 +1,4 @@
-"""What is asked: is multiplier · polynomial in the cone of a simple semialgebraic set?"""
+"""What is asked: whether multiplier · polynomial is in the cone of a simple semialgebraic set."""
 
 from dataclasses import dataclass
 from fractions import Fraction

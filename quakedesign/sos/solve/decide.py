@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from quakedesign.rationals import nearest
-from quakedesign.sos.exact.polynomial import Exponents
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial
 from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds
 from quakedesign.sos.exact.reduction import full_bases, parity_classes, reduced_bases
 from quakedesign.sos.exact.statement import Statement
-from quakedesign.sos.solve.faces import Block, at_kernels, at_zeros
+from quakedesign.sos.solve.faces import Block, at_kernels, at_zeros, modulo
 from quakedesign.sos.solve.moment import MomentProgram, Solution
 from quakedesign.sos.solve.points import local_minima, negative_point, rational_zeros
 from quakedesign.sos.solve.rounding_exact import relations, rounded
@@ -17,7 +17,7 @@ from quakedesign.sos.solve.scaling import Scaled, scaled
 
 _STRICT = 1e-7
 _ROUNDS = 4
-_KERNELS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+_KERNELS = ((1e-6, 1e-5), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
 
 
 @dataclass
@@ -32,12 +32,14 @@ class Search:
     original: Statement
     moved: Scaled = field(init=False)
     statement: Statement = field(init=False)
+    relations: list[Polynomial] = field(init=False)
     blocks: list[Block] = field(init=False)
 
     def __post_init__(self) -> None:
         self.moved = scaled(self.original)
         self.statement = self.moved.statement
-        self.blocks = initial_blocks(self.statement)
+        self.relations = [r for _, _, r in relations(self.statement)]
+        self.blocks = modulo(initial_blocks(self.statement), self.relations)
 
     def run(self) -> Proof | None:
         """Checked proof, or None."""
@@ -65,7 +67,7 @@ class Search:
     def _solve(self, blocks: list[Block]) -> tuple[Solution | None, MomentProgram | None]:
         if not blocks:
             return None, None
-        rows = [{e: float(c) for e, c in r.items()} for _, _, r in relations(self.statement)]
+        rows = [{e: float(c) for e, c in r.items()} for r in self.relations]
         program = MomentProgram([b.shape() for b in blocks], rows)
         if not program.covers(self.statement.target):
             return None, program
@@ -114,21 +116,20 @@ class Search:
         """Functional rounded to multiples of 2^-bits of its largest value, exactly zero on the equalities."""
         size = max(abs(v) for v in values.values())
         exact = {e: nearest(v / size, 2**bits) for e, v in values.items()}
-        rows = [r for _, _, r in relations(self.statement)]
-        if rows:
-            exact = _project(exact, rows)
+        if self.relations:
+            exact = _project(exact, self.relations)
         return {e: v for e, v in exact.items() if v}
 
     def _on_faces(self, candidates, solution: Solution | None) -> Proof | None:
         zeros = rational_zeros(self.statement, candidates, self.moved.scale)
         blocks = at_zeros(self.blocks, zeros) if zeros else self.blocks
-        for start in _KERNELS:
-            found = self._descend(blocks, start)
+        for threshold, tolerance in _KERNELS:
+            found = self._descend(blocks, threshold, tolerance)
             if found is not None:
                 return found
         return None
 
-    def _descend(self, blocks: list[Block], threshold: float) -> Proof | None:
+    def _descend(self, blocks: list[Block], threshold: float, tolerance: float) -> Proof | None:
         for _ in range(_ROUNDS):
             solution = self._solve(blocks)[0] if blocks else self._nothing()
             if solution is None:
@@ -137,17 +138,15 @@ class Search:
                 found = self._finish(rounded(self.statement, blocks, solution))
                 if found is not None:
                     return found
-            smaller = at_kernels(blocks, solution.grams, threshold, self.moved.scale)
+            smaller = at_kernels(blocks, solution.grams, threshold, tolerance, self.moved.scale)
             if smaller is None:
                 return None
             blocks = smaller
         return None
 
-
     def _nothing(self) -> Solution:
         """Answer without squares, where only multiples of the equalities are left."""
-        count = sum(1 for _ in relations(self.statement))
-        return Solution(margin=1.0, grams=[], moments=[], functional={}, cofactors=[0.0] * count)
+        return Solution(margin=1.0, grams=[], moments=[], functional={}, cofactors=[0.0] * len(self.relations))
 
 
 def initial_blocks(statement: Statement) -> list[Block]:

@@ -1,6 +1,6 @@
 """Questions about positivity, answered with a proof or with ``undecided``."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from time import perf_counter
@@ -64,13 +64,23 @@ def prove(
     for chosen in _multipliers(exact, factor, inequalities, equalities):
         for more in growth:
             asked = statement(
-                names, exact, inequalities=inequalities, equalities=equalities, multiplier=chosen, products=products,
+                names,
+                exact,
+                inequalities=inequalities,
+                equalities=equalities,
+                multiplier=chosen,
+                products=products,
                 degree_bound=degree_bound,
             )
             if more:
                 asked = statement(
-                    names, exact, inequalities=inequalities, equalities=equalities, multiplier=chosen,
-                    products=products, degree_bound=asked.degree + more,
+                    names,
+                    exact,
+                    inequalities=inequalities,
+                    equalities=equalities,
+                    multiplier=chosen,
+                    products=products,
+                    degree_bound=asked.degree + more,
                 )
             found = decide(asked)
             if found.verdict in (Positivity.SOS, Positivity.NEGATIVE):
@@ -129,7 +139,9 @@ def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:
         return polynomial
     top = degree(polynomial)
     if top % 2 or amount < 0:
-        raise PolynomialError(f"a margin needs a polynomial of even degree and must be positive. Received {top}, {margin}.")
+        raise PolynomialError(
+            f"a margin needs a polynomial of even degree and must be positive. Received {top}, {margin}."
+        )
     powers = {tuple(top * (i == j) for j in range(size)): Fraction(1) for i in range(size)}
     if any(sum(e) != top for e in polynomial):
         powers[(0,) * size] = Fraction(1)
@@ -158,7 +170,9 @@ def _squares_of_multiplier(asked: Statement):
     if multiplier_is_positive(asked, ()):
         return ()
     own = statement(
-        asked.variables, asked.multiplier, inequalities=asked.inequalities,
+        asked.variables,
+        asked.multiplier,
+        inequalities=asked.inequalities,
         degree_bound=max(asked.degree, degree(asked.multiplier) + degree(asked.multiplier) % 2),
     )
     found = decide(replace(own, products=asked.products))

@@ -49,7 +49,7 @@ class Block:
         return Shape(weight=weight, basis=self.monomials, face=face)
 
     def restricted(self, kernel: Sequence[Row]) -> "Block | None":
-        """Block whose Gram matrix has the given vectors (in the present basis) in its kernel; None if nothing is left."""
+        """Block whose Gram matrix has the given vectors (in the present basis) in its kernel; None if empty."""
         from flint import fmpq, fmpq_mat
 
         if not kernel:
@@ -70,9 +70,14 @@ class Block:
     def _with(self, rows: list[Row]) -> "Block":
         if self.face is not None:
             columns = list(zip(*self.face, strict=True))
-            rows = [tuple(sum((a * b for a, b in zip(row, c, strict=True)), start=Fraction(0)) for c in columns) for row in rows]
+            rows = [
+                tuple(sum((a * b for a, b in zip(row, c, strict=True)), start=Fraction(0)) for c in columns)
+                for row in rows
+            ]
         if all(sum(map(bool, row)) == 1 for row in rows):
-            return replace(self, monomials=tuple(self.monomials[next(i for i, v in enumerate(r) if v)] for r in rows), face=None)
+            return replace(
+                self, monomials=tuple(self.monomials[next(i for i, v in enumerate(r) if v)] for r in rows), face=None
+            )
         used = [i for i in range(len(self.monomials)) if any(row[i] for row in rows)]
         return replace(
             self,
@@ -106,11 +111,36 @@ def at_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[Fraction]]) -> li
     return kept
 
 
-def at_kernels(blocks: Sequence[Block], grams: Sequence, threshold: float, scale: Sequence[Fraction]) -> list[Block] | None:
+def modulo(blocks: Sequence[Block], relations: Sequence[Polynomial]) -> list[Block]:
+    """Blocks without the monomials that multiples of the equalities express by lower ones."""
+    return [b for b in (_modulo(block, relations) for block in blocks) if b is not None]
+
+
+def _modulo(block: Block, relations: Sequence[Polynomial]) -> Block | None:
+    from flint import fmpq, fmpq_mat
+
+    order = sorted(block.monomials, key=lambda e: (sum(e), e), reverse=True)
+    index = {e: i for i, e in enumerate(order)}
+    inside = [r for r in relations if all(e in index for e in r)]
+    if not inside:
+        return block
+    rows = [[fmpq(0)] * len(order) for _ in inside]
+    for row, r in zip(rows, inside, strict=True):
+        for e, c in r.items():
+            row[index[e]] = fmpq(c.numerator, c.denominator)
+    reduced, rank = fmpq_mat(rows).rref()
+    led = {order[next(i for i, v in enumerate(row) if v != 0)] for row in reduced.tolist()[:rank]}
+    kept = tuple(e for e in block.monomials if e not in led)
+    return replace(block, monomials=kept) if kept else None
+
+
+def at_kernels(
+    blocks: Sequence[Block], grams: Sequence, threshold: float, tolerance: float, scale: Sequence[Fraction]
+) -> list[Block] | None:
     """Blocks without the numerical kernels of their Gram matrices, rounded; None if there is no kernel."""
     kept, found = [], False
     for block, gram in zip(blocks, grams, strict=True):
-        kernel = _kernel(block, gram, threshold, scale)
+        kernel = _kernel(block, gram, threshold, tolerance, scale)
         found = found or bool(kernel)
         smaller = block.restricted(kernel)
         if smaller is not None:
@@ -118,7 +148,7 @@ def at_kernels(blocks: Sequence[Block], grams: Sequence, threshold: float, scale
     return kept if found else None
 
 
-def _kernel(block: Block, gram, threshold: float, scale: Sequence[Fraction]) -> list[Row]:
+def _kernel(block: Block, gram, threshold: float, tolerance: float, scale: Sequence[Fraction]) -> list[Row]:
     """Rational basis of the eigenspace of small eigenvalues, in the simplest fractions of the unscaled variables."""
     import numpy as np
     from scipy.linalg import qr
@@ -130,20 +160,26 @@ def _kernel(block: Block, gram, threshold: float, scale: Sequence[Fraction]) -> 
     _, _, order = qr(space, pivoting=True)
     pivots = order[: len(space)]
     echelon = np.linalg.solve(space[:, pivots], space)
-    units = [float(monomial(scale, e)) for e in block.monomials] if block.face is None else [1.0] * gram.shape[0]
-    rows = []
-    for pivot, row in zip(pivots, echelon, strict=True):
-        rows.append(tuple(
-            _entry(float(v), float(units[j] / units[pivot])) for j, v in enumerate(row)
-        ))
-    return rows
+    units = _units(block, scale)
+    return [
+        tuple(_entry(float(v), units[j] / units[pivot], tolerance) for j, v in enumerate(row))
+        for pivot, row in zip(pivots, echelon, strict=True)
+    ]
 
 
-def _entry(value: float, unit: float) -> Fraction:
-    """Simplest fraction near value·unit, over unit (a power of two)."""
-    if abs(value) < 1e-5:
+def _units(block: Block, scale: Sequence[Fraction]) -> list[Fraction]:
+    """Size of every basis element in the scaled variables; of its own leading monomial on a face."""
+    sizes = [monomial(scale, e) for e in block.monomials]
+    if block.face is None:
+        return sizes
+    return [sizes[next((i for i, v in enumerate(row) if v == 1), 0)] for row in block.face]
+
+
+def _entry(value: float, unit: Fraction, tolerance: float) -> Fraction:
+    """Simplest fraction near value·unit, over unit."""
+    if abs(value) < tolerance:
         return Fraction(0)
-    return simplest(value * unit, 1e-5) / Fraction(unit)
+    return simplest(value * float(unit), tolerance) / unit
 
 
 def simplest(value: float, tolerance: float) -> Fraction:

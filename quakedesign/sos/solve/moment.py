@@ -103,6 +103,7 @@ class MomentProgram:
             sum((m[_diagonal(b.size)].sum(axis=0) for m, b in zip(rows, self.blocks, strict=True)), start=0.0)
         ).reshape(1, -1)
         self._solver: Any = None
+        self._accuracy = 0.0
 
     def covers(self, target: Mapping[Exponents, Any]) -> bool:
         """Whether every monomial of a target can be produced at all."""
@@ -199,7 +200,7 @@ def _unique(stacked: list):
     span = together.max(axis=0).astype(object) + 1
     if int(np.prod(span)) < 2**62:
         radix = np.concatenate([[1], np.cumprod(span[:-1])]).astype(np.int64)
-        codes, first, where = np.unique(together @ radix, return_index=True, return_inverse=True)
+        _, first, where = np.unique(together @ radix, return_index=True, return_inverse=True)
         return together[first], where
     keys, where = np.unique(together, axis=0, return_inverse=True)
     return keys, where.reshape(-1)

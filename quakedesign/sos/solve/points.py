@@ -9,6 +9,7 @@ from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.faces import simplest
 
 _SEED = 20240607
+_SIMPLE = (Fraction(0), Fraction(1), Fraction(-1), Fraction(1, 2), Fraction(2))
 
 
 class Arrays:
@@ -40,7 +41,9 @@ class Arrays:
         return result
 
 
-def local_minima(statement: Statement, hints: Sequence[Sequence[float]] = (), starts: int = 24) -> Iterator[list[float]]:
+def local_minima(
+    statement: Statement, hints: Sequence[Sequence[float]] = (), starts: int = 24
+) -> Iterator[list[float]]:
     """Local minima of the polynomial on the set, from seeded starts; floating point, on ℝⁿ also towards infinity.
 
     On ℝⁿ and orthants the homogenised polynomial is minimised on the sphere (x_i = v_i² where x_i ≥ 0); with other
@@ -128,12 +131,20 @@ def _constrained(statement: Statement, hints, starts: int) -> Iterator[list[floa
     limits += [("eq", Arrays(h, size)) for h in statement.equalities]
     constraints = [{"type": kind, "fun": g, "jac": g.gradient} for kind, g in limits]
     random = np.random.default_rng(_SEED)
-    begin = [*map(np.asarray, hints), *(random.standard_normal(size) * s for s in (0.3, 1.0, 3.0) for _ in range(starts // 3))]
+    begin = [
+        *map(np.asarray, hints),
+        *(random.standard_normal(size) * s for s in (0.3, 1.0, 3.0) for _ in range(starts // 3)),
+    ]
     for v in begin:
         try:
             with np.errstate(all="ignore"):
                 answer = minimize(
-                    p, v, jac=p.gradient, method="SLSQP", constraints=constraints, options={"ftol": 1e-14, "maxiter": 200}
+                    p,
+                    v,
+                    jac=p.gradient,
+                    method="SLSQP",
+                    constraints=constraints,
+                    options={"ftol": 1e-14, "maxiter": 200},
                 )
         except (ValueError, FloatingPointError):
             continue
@@ -141,18 +152,47 @@ def _constrained(statement: Statement, hints, starts: int) -> Iterator[list[floa
             yield answer.x.tolist()
 
 
-def negative_point(statement: Statement, candidates: Sequence[Sequence[float]], scale: Sequence[Fraction]) -> Point | None:
+def negative_point(
+    statement: Statement, candidates: Sequence[Sequence[float]], scale: Sequence[Fraction]
+) -> Point | None:
     """Point of the set where the polynomial is negative, with small fractions; None if no candidate leads to one."""
     import numpy as np
 
     p = Arrays(statement.polynomial, len(statement.variables))
-    ranked = sorted(candidates, key=lambda x: p(x) / (1 + float(np.abs(x).max())) ** max(degree(statement.polynomial), 1))
+    ranked = sorted(
+        candidates, key=lambda x: p(x) / (1 + float(np.abs(x).max())) ** max(degree(statement.polynomial), 1)
+    )
     for x in ranked[:12]:
-        for tolerance in (0.3, 0.1, 1e-2, 1e-4, 1e-7, 1e-10, 1e-14):
-            point = Point(coordinates=rationalised(x, scale, tolerance))
+        for coordinates in _near(statement, x, scale):
+            point = Point(coordinates=coordinates)
             if holds(statement, point):
                 return point
     return None
+
+
+def _near(statement: Statement, x: Sequence[float], scale: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
+    """Rational points near a point, simple ones first; on the set as far as that can be had."""
+    for tolerance in (0.3, 0.1, 1e-2, 1e-4, 1e-7, 1e-10, 1e-14):
+        near = rationalised(x, scale, tolerance)
+        yield near
+        if len(statement.equalities) == 1 and degree(statement.equalities[0]) <= 2:
+            yield from on_quadric(statement.equalities[0], near)
+        for factor in (1 - tolerance, 1 + tolerance) if statement.inequalities and tolerance < 0.1 else ():
+            yield rationalised([factor * v for v in x], scale, tolerance / 10)
+
+
+def on_quadric(equality: Polynomial, near: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
+    """Rational points of a quadric near a given one: second intersections of lines through a rational point of it."""
+    from itertools import islice, product
+
+    size = len(near)
+    seeds = (p for p in product(_SIMPLE, repeat=size) if evaluate(equality, p) == 0)
+    for seed in islice(seeds, 3):
+        step = [b - a for a, b in zip(seed, near, strict=True)]
+        at = [evaluate(equality, [a + k * d for a, d in zip(seed, step, strict=True)]) for k in (1, -1)]
+        slope, bend = (at[0] - at[1]) / 2, (at[0] + at[1]) / 2
+        if bend and slope:
+            yield tuple(a - slope / bend * d for a, d in zip(seed, step, strict=True))
 
 
 def rational_zeros(

@@ -148,4 +148,8 @@ class _System:
         _, _, order = qr(dense[:, chosen].T, mode="economic", pivoting=True)
         rows = [keys[i] for i in order[:rank]]
         exact = [[self.columns[j].get(e, Fraction(0)) for j in chosen] for e in rows]
-        return rows, chosen, fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in exact]) if rank else None
+        return (
+            rows,
+            chosen,
+            fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in exact]) if rank else None,
+        )

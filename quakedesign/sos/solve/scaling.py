@@ -51,9 +51,7 @@ class Scaled:
         elements = [_restored(b, inverse) for b in square.basis]
         size = len(elements)
         pairs = ((i, j) for i in range(size) for j in range(i, size))
-        gram = tuple(
-            q * outer * elements[i][1] * elements[j][1] for q, (i, j) in zip(square.gram, pairs, strict=True)
-        )
+        gram = tuple(q * outer * elements[i][1] * elements[j][1] for q, (i, j) in zip(square.gram, pairs, strict=True))
         return Square(product=square.product, basis=tuple(b for b, _ in elements), gram=gram)
 
 

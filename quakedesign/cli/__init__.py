@@ -1,0 +1,44 @@
+"""The command line. Every command returns its exit code; heavy libraries load inside the commands."""
+
+import io
+import os
+import sys
+
+from cyclopts import CycloptsError
+
+from quakedesign.cli import design, loop, plant, polynomial, proof
+from quakedesign.cli.shared import app
+from quakedesign.errors import QuakedesignError
+
+__all__ = ["app", "design", "loop", "main", "plant", "polynomial", "proof"]
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with its code; every refusal is one line on stderr and exit code 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.exit(code if isinstance(code, int) else 0)
+    except QuakedesignError as error:
+        _refuse(str(error))
+    except CycloptsError as error:
+        _refuse(str(error))
+    except KeyboardInterrupt:
+        print("quakedesign: interrupted; nothing was written.", file=sys.stderr)
+        sys.exit(130)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(1)
+    except Exception as error:
+        if "QUAKEDESIGN_TRACEBACK" in os.environ:
+            raise
+        defect = " ".join(f"{type(error).__name__}: {error}".split())
+        print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the place.", file=sys.stderr)
+        sys.exit(3)
+
+
+def _refuse(reason: str) -> None:
+    print("quakedesign: " + " ".join(reason.split()), file=sys.stderr)
+    sys.exit(2)

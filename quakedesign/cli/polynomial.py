@@ -1,0 +1,75 @@
+"""The command about plain polynomials."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from quakedesign.cli.shared import Force, Json, app, new_file, print_json
+
+Text = Annotated[str, Parameter(allow_leading_hyphen=True)]
+
+
+@app.command
+def sos(
+    polynomial: Text,
+    /,
+    *,
+    on: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative="")] = (),
+    multiplier: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    margin: str = "0",
+    degree: int | None = None,
+    products: bool | None = None,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
+    out: Path | None = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Decide whether a polynomial is a sum of squares, with proof either way. Exit code 0 only if it is.
+
+    Parameters
+    ----------
+    polynomial
+        Such as "x^4*y^2 + x^2*y^4 + 1 - 3*x^2*y^2": numbers, names, + - * ^ ** and parentheses.
+    on
+        A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat for more. All of ℝⁿ unless given.
+    multiplier
+        Positive polynomial to multiply with, or auto to try powers of 1 + x² + y² + … (x² + y² + … for forms).
+    margin
+        Decide polynomial − margin·(1 + Σ x_i^degree) instead (without the 1 for forms).
+    degree
+        Largest degree of a summand; the smallest that fits unless given, and the next even one under constraints.
+    products
+        Use all products of constraints, or none; unless given, products of variables only.
+    verbose
+        Show the sizes of the Gram matrices before and after the exact reduction.
+    out
+        File for the proof (proofs/FORMAT.md).
+    force
+        Replace an existing file.
+    json
+        Print JSON.
+    """
+    from quakedesign.sos import prove
+    from quakedesign.sos.exact.files import plain_proof
+    from quakedesign.sos.exact.words import sentences
+
+    new_file(out, "proof file", force=force)
+    answer = prove(polynomial, on=on, multiplier=multiplier, margin=margin, degree_bound=degree, products=products)
+    if out is not None and answer.proof is not None:
+        answer.save(out)
+    found: dict[str, Any] = {
+        "verdict": str(answer.verdict),
+        "variables": list(answer.statement.variables),
+        "degree": answer.statement.degree,
+        "blocks": dict(answer.blocks),
+        "witness": plain_proof(answer.proof) if answer.proof is not None else None,
+        "file": str(out) if out is not None and answer.proof is not None else None,
+        "seconds": answer.seconds,
+        "versions": dict(answer.versions),
+    }
+    if json:
+        print_json(found)
+    else:
+        print("\n".join(sentences(answer, verbose=verbose)))
+    return 0 if found["verdict"] == "sos" else 1

@@ -1,0 +1,172 @@
+"""The file about one polynomial (proofs/FORMAT.md): read strictly, written whole."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from quakedesign.errors import CertificateError, PolynomialError
+from quakedesign.output import write_whole
+from quakedesign.sos.exact.proofs import Element, Functional, Point, Proof, Square, SumOfSquares
+from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.strict import (
+    NAME,
+    common_grid,
+    listed,
+    need,
+    parse,
+    polynomial_text,
+    read_exponents,
+    read_polynomial,
+    read_rational,
+    with_keys,
+)
+
+_STATEMENT = {"format", "variables", "polynomial", "inequalities", "equalities", "products", "degree", "multiplier"}
+_KINDS = ("sos", "not-sos", "negative")
+_TERMS, _VARIABLES, _CONSTRAINTS, _PRODUCTS, _BASIS, _SQUARES = 20_000, 16, 32, 1024, 400, 4096
+
+
+def is_about_polynomial(raw: Any) -> bool:
+    """Whether a parsed file is about a plain polynomial rather than a closed loop."""
+    return isinstance(raw, dict) and "polynomial" in raw
+
+
+def read(raw: Any) -> tuple[Statement, Proof]:
+    """Statement and proof of a parsed file; reading verifies nothing.
+
+    Raises
+    ------
+    CertificateError
+        When it breaks a rule of FORMAT.md.
+    """
+    kind = next((k for k in _KINDS if isinstance(raw, dict) and k in raw), "sos")
+    with_keys(raw, _STATEMENT | {kind})
+    need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
+    names = listed(raw["variables"], "variables", _VARIABLES)
+    need(all(isinstance(n, str) and NAME.fullmatch(n) for n in names) and names != [], "variables must be names")
+    asked = _statement(raw, tuple(names))
+    return asked, _proof(raw[kind], kind, asked)
+
+
+def load(text: str) -> tuple[Statement, Proof]:
+    """Statement and proof of the text of a file. Raises CertificateError as `read`."""
+    return read(parse(text))
+
+
+def _statement(raw: dict[str, Any], names: tuple[str, ...]) -> Statement:
+    size = len(names)
+
+    def polynomials(key: str):
+        return tuple(read_polynomial(p, key, size, _TERMS) for p in listed(raw[key], key, _CONSTRAINTS))
+
+    products = [listed(s, "a product", _CONSTRAINTS) for s in listed(raw["products"], "products", _PRODUCTS)]
+    need(all(type(i) is int for s in products for i in s), "products must be lists of integers")
+    need(type(raw["degree"]) is int and raw["degree"] >= 0, "degree must be a non-negative integer")
+    inequalities, equalities = polynomials("inequalities"), polynomials("equalities")
+    need(len(inequalities) + len(equalities) <= _CONSTRAINTS, f"there are more than {_CONSTRAINTS} constraints")
+    try:
+        return Statement(
+            variables=names,
+            polynomial=read_polynomial(raw["polynomial"], "polynomial", size, _TERMS),
+            inequalities=inequalities,
+            equalities=equalities,
+            products=tuple(tuple(s) for s in products),
+            degree=raw["degree"],
+            multiplier=read_polynomial(raw["multiplier"], "multiplier", size, _TERMS),
+        )
+    except PolynomialError as error:
+        raise CertificateError(str(error)) from None
+
+
+def _proof(raw: Any, kind: str, asked: Statement) -> Proof:
+    size = len(asked.variables)
+    if kind == "negative":
+        entries = listed(with_keys(raw, {"point"})["point"], "point", length=size)
+        return Point(coordinates=tuple(read_rational(v) for v in entries))
+    if kind == "not-sos":
+        values = with_keys(raw, {"functional"})["functional"]
+        return Functional(values=read_polynomial(values, "functional", size, _TERMS))
+    with_keys(raw, {"squares", "cofactors", "multiplier"})
+    cofactors = listed(raw["cofactors"], "cofactors", length=len(asked.equalities))
+    return SumOfSquares(
+        squares=_squares(raw["squares"], asked),
+        cofactors=tuple(read_polynomial(q, "a cofactor", size, _TERMS) for q in cofactors),
+        multiplier=_squares(raw["multiplier"], asked),
+    )
+
+
+def _squares(raw: Any, asked: Statement) -> tuple[Square, ...]:
+    return tuple(_square(entry, asked) for entry in listed(raw, "squares", _SQUARES))
+
+
+def _square(raw: Any, asked: Statement) -> Square:
+    with_keys(raw, {"product", "basis", "gram"})
+    chosen = tuple(listed(raw["product"], "a product", _CONSTRAINTS))
+    need(all(type(i) is int for i in chosen) and chosen in asked.products, "a square has a product that is not listed")
+    basis = tuple(_element(b, len(asked.variables)) for b in listed(raw["basis"], "basis", _BASIS))
+    need(basis != (), "a basis must not be empty")
+    size = len(basis)
+    gram = tuple(read_rational(v) for v in listed(raw["gram"], "gram", length=size * (size + 1) // 2))
+    common_grid(list(gram))
+    monomials = [b for b in basis if isinstance(b, tuple)]
+    need(len(set(monomials)) == len(monomials), "a monomial occurs twice in a basis")
+    return Square(product=chosen, basis=basis, gram=gram)
+
+
+def _element(raw: Any, variables: int) -> Element:
+    if isinstance(raw, list):
+        return read_exponents(raw, variables, 999)
+    polynomial = read_polynomial(raw, "a basis element", variables, _TERMS)
+    need(polynomial != {} and (len(polynomial) > 1 or 1 not in polynomial.values()), "a basis element is not canonical")
+    return polynomial
+
+
+def text(asked: Statement, proof: Proof) -> str:
+    """Text of the file, the same for the same proof."""
+    plain = {
+        "format": 1,
+        "variables": list(asked.variables),
+        "polynomial": polynomial_text(asked.polynomial),
+        "inequalities": [polynomial_text(g) for g in asked.inequalities],
+        "equalities": [polynomial_text(h) for h in asked.equalities],
+        "products": [list(s) for s in asked.products],
+        "degree": asked.degree,
+        "multiplier": polynomial_text(asked.multiplier),
+    }
+    return json.dumps(plain | plain_proof(proof), ensure_ascii=True, separators=(",", ":")) + "\n"
+
+
+def plain_proof(proof: Proof) -> dict[str, Any]:
+    """Proof in the words of the format, under its kind."""
+    if isinstance(proof, Point):
+        return {"negative": {"point": [str(v) for v in proof.coordinates]}}
+    if isinstance(proof, Functional):
+        return {"not-sos": {"functional": polynomial_text(proof.values)}}
+    parts = {
+        "squares": [_plain_square(s) for s in proof.squares],
+        "cofactors": [polynomial_text(q) for q in proof.cofactors],
+        "multiplier": [_plain_square(s) for s in proof.multiplier],
+    }
+    return {"sos": parts}
+
+
+def _plain_square(square: Square) -> dict[str, Any]:
+    basis = [list(b) if isinstance(b, tuple) else polynomial_text(b) for b in square.basis]
+    return {"product": list(square.product), "basis": basis, "gram": [str(v) for v in square.gram]}
+
+
+def save(asked: Statement, proof: Proof | None, path: str | Path) -> None:
+    """Write the file whole or not at all, and only if it can be read again.
+
+    Raises
+    ------
+    CertificateError
+        When there is no proof, or it is beyond the limits of the format.
+    OutputError
+        When the folder cannot be written.
+    """
+    if proof is None:
+        raise CertificateError("only a proof can be saved. Received an undecided answer.")
+    written = text(asked, proof)
+    load(written)
+    write_whole(Path(path), written)

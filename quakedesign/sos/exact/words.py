@@ -1,0 +1,79 @@
+"""An answer in sentences."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from quakedesign.sos.exact.answer import Answer
+from quakedesign.sos.exact.polynomial import Polynomial
+from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares
+
+_LONGEST = 200
+
+
+def polynomial_words(polynomial: Polynomial, variables: Sequence[str]) -> str:
+    """Polynomial as text that `quakedesign.sos.exact.text.parse` reads back."""
+    parts = []
+    for e, c in sorted(polynomial.items(), key=lambda item: (sum(item[0]), item[0]), reverse=True):
+        powers = [n if x == 1 else f"{n}^{x}" for n, x in zip(variables, e, strict=True) if x]
+        number = str(abs(c)) if abs(c) != 1 or not powers else ""
+        parts.append((" - " if c < 0 else " + ") + "*".join(filter(None, [number, *powers])))
+    text = "".join(parts) or "0"
+    return text[3:] if text.startswith(" + ") else text.replace(" - ", "-", 1) if text.startswith(" - ") else text
+
+
+def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
+    """What was decided, on which set, and why it holds.
+
+    Parameters
+    ----------
+    answer : Answer
+    verbose : bool
+        With the sizes of the Gram matrices before and after the reduction.
+    """
+    asked = answer.statement
+    lines = [f"{answer.verdict}: {_short(polynomial_words(asked.polynomial, asked.variables))}"]
+    conditions = [f"{polynomial_words(g, asked.variables)} >= 0" for g in asked.inequalities]
+    conditions += [f"{polynomial_words(h, asked.variables)} == 0" for h in asked.equalities]
+    if conditions:
+        lines.append(f"on {', '.join(conditions)}")
+    multiplier = polynomial_words(asked.multiplier, asked.variables)
+    if multiplier != "1":
+        lines.append(f"multiplied by {multiplier}")
+    lines += _reason(answer)
+    if verbose:
+        lines += [f"Gram matrices {when} reduction: {_sizes(sizes)}" for when, sizes in answer.blocks.items()]
+    lines.append(f"{answer.seconds:.2f} s; checked in exact arithmetic")
+    return lines if answer.proof is not None else [*lines[:-1], f"{answer.seconds:.2f} s"]
+
+
+def _reason(answer: Answer) -> list[str]:
+    proof, asked = answer.proof, answer.statement
+    if isinstance(proof, SumOfSquares):
+        digits = max((len(str(q)) for s in proof.squares for q in s.gram), default=1)
+        count = sum(len(s.basis) for s in proof.squares)
+        return [
+            f"a sum of {count} square{'s' * (count != 1)} with rational coefficients of at most {digits} characters"
+        ]
+    if isinstance(proof, Functional):
+        return [
+            f"no such sum of squares with summands of degree up to {asked.degree}: a rational functional with "
+            f"{len(proof.values)} values is non-negative on all of them and negative here"
+        ]
+    if isinstance(proof, Point):
+        point = ", ".join(f"{n} = {v}" for n, v in zip(asked.variables, proof.coordinates, strict=True))
+        return [f"negative at {point}", f"value {_short(str(_value(answer, proof)))}"]
+    return ["neither a rational proof nor a rational refutation was found; this says nothing about the polynomial"]
+
+
+def _value(answer: Answer, point: Point) -> Fraction:
+    from quakedesign.sos.exact.polynomial import evaluate
+
+    return evaluate(answer.statement.polynomial, point.coordinates)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
+def _sizes(sizes: Sequence[int]) -> str:
+    return " + ".join(map(str, sizes)) or "none"
