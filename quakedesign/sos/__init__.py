@@ -5,9 +5,9 @@ from typing import Any
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.witness import Block, Polynomial, Witness, proves
 
-_SEARCH = {"prove": "engine", "decide": "engine", "Program": "program"}
+_SEARCH = {"prove": "engine", "decide": "engine", "Program": "program", "largest": "program"}
 
-__all__ = ["Answer", "Block", "Polynomial", "Positivity", "Program", "Witness", "decide", "prove", "proves"]
+__all__ = ["Answer", "Block", "Polynomial", "Positivity", "Program", "Witness", "decide", "largest", "prove", "proves"]
 
 
 def __getattr__(name: str) -> Any:

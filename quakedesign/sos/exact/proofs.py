@@ -161,6 +161,8 @@ def _definite(square: Square) -> bool:
 def _expanded(statement: Statement, square: Square):
     """(Π g_i)·bᵀQb in the ring."""
     size = len(statement.variables)
+    if square.product not in statement.products:
+        raise ValueError("the product of a square is not one of the statement.")
     weight = element(statement.weight(square.product), size)
     return weight * element(expand(square.basis, square.gram), size)
 

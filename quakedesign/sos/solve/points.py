@@ -186,7 +186,7 @@ def on_quadric(equality: Polynomial, near: Sequence[Fraction]) -> Iterator[tuple
     from itertools import islice, product
 
     size = len(near)
-    seeds = (p for p in product(_SIMPLE, repeat=size) if evaluate(equality, p) == 0)
+    seeds = (p for p in islice(product(_SIMPLE, repeat=size), 5000) if evaluate(equality, p) == 0)
     for seed in islice(seeds, 3):
         step = [b - a for a, b in zip(seed, near, strict=True)]
         at = [evaluate(equality, [a + k * d for a, d in zip(seed, step, strict=True)]) for k in (1, -1)]

@@ -1,0 +1,353 @@
+"""Positivity with decision variables: solved by cvxpy and Clarabel, rounded, and proved polynomial by polynomial."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.errors import PolynomialError
+from quakedesign.rationals import nearest, rational
+from quakedesign.sos.exact.answer import Answer, Positivity
+from quakedesign.sos.exact.definiteness import positive_definite
+from quakedesign.sos.exact.polynomial import Exponents, combination, degree
+from quakedesign.sos.exact.reading import read
+from quakedesign.sos.exact.statement import Statement, statement
+from quakedesign.sos.solve.decide import initial_blocks
+from quakedesign.sos.solve.engine import decide
+from quakedesign.sos.solve.faces import Block
+from quakedesign.sos.solve.rounding_exact import relations
+
+_ROOM = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+_BITS = (4, 8, 12, 18, 24, 32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """Exact decision with a proof of every requirement.
+
+    Attributes
+    ----------
+    values : mapping of str to Fraction
+        Decision variables.
+    answers : tuple of Answer
+        One for every required polynomial, in order; each is ``sos``.
+    objective : Fraction
+        Exact value of the objective; a bound on the optimum from the feasible side.
+    bound : float
+        The solver's optimum, in floating point: no proof.
+    """
+
+    values: Mapping[str, Fraction]
+    answers: tuple[Answer, ...]
+    objective: Fraction
+    bound: float
+
+
+class Program:
+    """Polynomials, affine in decision variables, that must be sums of squares on their sets.
+
+    Parameters
+    ----------
+    variables, decisions : sequence of str
+    """
+
+    def __init__(self, variables: Sequence[str], decisions: Sequence[str]) -> None:
+        import cvxpy as cp
+
+        self.variables, self.decisions = tuple(variables), tuple(decisions)
+        self._vector = cp.Variable(len(self.decisions), name="decisions")
+        self.constraints: list[Any] = []
+        self._required: list[tuple[list[dict], Statement]] = []
+        self._definite: list[list[list[dict[Exponents, Fraction]]]] = []
+        self._objective: dict[Exponents, Fraction] = {}
+
+    def __getitem__(self, decision: str) -> Any:
+        """Decision as a cvxpy expression, for further constraints; these steer the search and are not proved."""
+        return self._vector[self.decisions.index(decision)]
+
+    def require(
+        self, polynomial: Any, *, on: Sequence[Any] = (), degree_bound: int | None = None, products: bool | None = None
+    ) -> None:
+        """Demand a proof that a polynomial in variables and decisions is non-negative on a set.
+
+        Parameters
+        ----------
+        polynomial : str, SymPy expression or mapping
+            Affine in the decisions. Without variables it is a linear constraint.
+        on, degree_bound, products
+            As in `quakedesign.sos.prove`; constraints without decisions.
+
+        Raises
+        ------
+        PolynomialError
+            When it is not affine in the decisions.
+        """
+        names = self.variables + self.decisions
+        _, exact, _, _, _ = read(polynomial, (), None, names)
+        _, _, inequalities, equalities, _ = read("0", on, None, self.variables)
+        parts = self._parts(exact)
+        support = {e for p in parts for e in p}
+        template = statement(
+            self.variables,
+            dict.fromkeys(support, Fraction(1)),
+            inequalities=inequalities,
+            equalities=equalities,
+            products=products,
+            degree_bound=degree_bound,
+        )
+        self._required.append((parts, template))
+
+    def require_definite(self, matrix: Sequence[Sequence[Any]]) -> None:
+        """Demand that a symmetric matrix of affine functions of the decisions is positive definite; proved exactly.
+
+        Parameters
+        ----------
+        matrix : n sequences of n str, SymPy expressions or numbers
+
+        Raises
+        ------
+        PolynomialError
+            When it is not symmetric or not affine.
+        """
+        rows = [[self._affine(entry) for entry in row] for row in matrix]
+        size = len(rows)
+        if any(len(row) != size for row in rows) or any(
+            rows[i][j] != rows[j][i] for i in range(size) for j in range(i)
+        ):
+            raise PolynomialError(
+                f"a matrix inequality needs a symmetric {size} x {size} matrix. Received another one."
+            )
+        self._definite.append(rows)
+
+    def maximize(self, objective: Any) -> None:
+        """Set an affine function of the decisions to maximise."""
+        self._objective = self._affine(objective)
+
+    def minimize(self, objective: Any) -> None:
+        """Set an affine function of the decisions to minimise."""
+        self._objective = {e: -c for e, c in self._affine(objective).items()}
+
+    def problem(self) -> Any:
+        """The cvxpy problem as it is first solved."""
+        import cvxpy as cp
+
+        return cp.Problem(cp.Maximize(self._value(self._objective)), self._constraints(0.0))
+
+    def solve(self) -> Solution | None:
+        """Exact decision with proofs, as near to the optimum as can be proved; None if none was found.
+
+        Returns
+        -------
+        Solution or None
+            None says nothing about feasibility.
+        """
+        problem = self.problem()
+        if not _solved(problem):
+            return None
+        best = float(problem.value)
+        for room in _ROOM:
+            found = self._inside(best, room * max(1.0, abs(best)))
+            if found is not None:
+                return found
+        return None
+
+    def _inside(self, best: float, room: float) -> Solution | None:
+        """Proved decision after giving up some of the optimum for the largest margin."""
+        import cvxpy as cp
+        import numpy as np
+
+        margin = cp.Variable()
+        constraints = [*self._constraints(margin), margin <= 1]
+        if self._objective:
+            constraints.append(self._value(self._objective) >= best - room)
+        solved = _solved(cp.Problem(cp.Maximize(margin), constraints))
+        if not solved or margin.value is None or margin.value < 1e-11:
+            return None
+        for bits in _BITS:
+            values = [nearest(float(v), 2**bits) for v in np.asarray(self._vector.value).tolist()]
+            close = not self._objective or _at(self._objective, values) >= Fraction(best) - 2 * Fraction(room)
+            answers = self._proved(values) if close else None
+            if answers is not None:
+                objective = _at(self._objective, values)
+                return Solution(
+                    values=dict(zip(self.decisions, values, strict=True)),
+                    answers=answers,
+                    objective=objective,
+                    bound=best,
+                )
+        return None
+
+    def _proved(self, values: Sequence[Fraction]) -> tuple[Answer, ...] | None:
+        for rows in self._definite:
+            if not positive_definite([[_at(entry, values) for entry in row] for row in rows]):
+                return None
+        answers = []
+        for parts, template in self._required:
+            polynomial = combination(zip((Fraction(1), *values), parts, strict=True))
+            found = decide(_with_polynomial(template, polynomial))
+            if found.verdict is not Positivity.SOS:
+                return None
+            answers.append(found)
+        return tuple(answers)
+
+    def _constraints(self, margin: Any) -> list[Any]:
+        constraints = list(self.constraints)
+        for parts, template in self._required:
+            constraints += _membership(self._vector, parts, template, margin)
+        for rows in self._definite:
+            constraints.append(_definite(self._vector, rows, margin))
+        return constraints
+
+    def _value(self, affine: Mapping[Exponents, Fraction]) -> Any:
+        import numpy as np
+
+        zero = (0,) * len(self.decisions)
+        units = [tuple(int(i == j) for j in range(len(zero))) for i in range(len(zero))]
+        return np.array([float(affine.get(u, 0)) for u in units]) @ self._vector + float(affine.get(zero, 0))
+
+    def _affine(self, given: Any) -> dict[Exponents, Fraction]:
+        if not isinstance(given, str) and not hasattr(given, "free_symbols"):
+            return {(0,) * len(self.decisions): rational(given, "entry")}
+        _, exact, _, _, _ = read(given, (), None, self.decisions)
+        if degree(exact) > 1:
+            raise PolynomialError(f"an affine function of {', '.join(self.decisions)} is needed. Received {given}.")
+        return exact
+
+    def _parts(self, exact: Mapping[Exponents, Fraction]) -> list[dict[Exponents, Fraction]]:
+        """Constant part and the part of every decision."""
+        count = len(self.variables)
+        parts: list[dict[Exponents, Fraction]] = [{} for _ in range(1 + len(self.decisions))]
+        for e, c in exact.items():
+            if sum(e[count:]) > 1:
+                raise PolynomialError(
+                    f"a polynomial must be affine in {', '.join(self.decisions)}. Received a product."
+                )
+            parts[1 + e[count:].index(1) if any(e[count:]) else 0][e[:count]] = c
+        return parts
+
+
+def largest(
+    question: Callable[[Fraction], Answer], low: Any, high: Any, *, relative: float = 1e-4
+) -> tuple[Fraction, Answer] | None:
+    """Largest level of a bisection whose statement is proved, with its proof; None if the lowest one is not.
+
+    Parameters
+    ----------
+    question : callable
+        Answer for a rational level.
+    low, high : rational
+    relative : float
+        The bisection ends when the bracket is this small against its upper end.
+    """
+    below, above = rational(low, "low"), rational(high, "high")
+    answer = question(below)
+    if answer.verdict is not Positivity.SOS:
+        return None
+    best = below, answer
+    while above - below > Fraction(relative) * abs(above):
+        middle = nearest(float((below + above) / 2), _grid(above - below))
+        answer = question(middle)
+        if answer.verdict is Positivity.SOS:
+            below, best = middle, (middle, answer)
+        else:
+            above = middle
+    return best
+
+
+def _grid(width: Fraction) -> int:
+    """Power of ten that resolves an eighth of a width."""
+    grid = 1
+    while Fraction(8, grid) > width:
+        grid *= 10
+    return grid
+
+
+def _with_polynomial(template: Statement, polynomial: Mapping[Exponents, Fraction]) -> Statement:
+    from dataclasses import replace
+
+    return replace(template, polynomial=polynomial)
+
+
+def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fraction:
+    return sum(
+        (c * (values[e.index(1)] if any(e) else 1) for e, c in affine.items()),
+        start=Fraction(0),
+    )
+
+
+def _membership(vector: Any, parts: Sequence[Mapping], template: Statement, margin: Any) -> list[Any]:
+    """Equation between the coefficients of the polynomial and of a sum of squares with margin."""
+    import cvxpy as cp
+    import numpy as np
+
+    blocks = initial_blocks(template)
+    rows = [r for _, _, r in relations(template)]
+    maps = [_map(block) for block in blocks]
+    keys = sorted({e for p in parts for e in p} | {e for m in maps for e, _, _, _ in m} | {e for r in rows for e in r})
+    index = {e: i for i, e in enumerate(keys)}
+    left = np.zeros((len(keys), len(parts)))
+    for j, part in enumerate(parts):
+        for e, c in part.items():
+            left[index[e], j] = float(c)
+    total: Any = left[:, 0] + left[:, 1:] @ vector
+    constraints = []
+    for block, entries in zip(blocks, maps, strict=True):
+        size = len(block.monomials)
+        gram = cp.Variable((size, size), symmetric=True)
+        constraints.append(gram >> 0)
+        matrix = _sparse(entries, index, size)
+        unit = matrix @ np.eye(size).flatten(order="F")
+        total = total - matrix @ cp.vec(gram, order="F") - margin * unit
+    if rows:
+        table = np.zeros((len(keys), len(rows)))
+        for j, r in enumerate(rows):
+            for e, c in r.items():
+                table[index[e], j] = float(c)
+        total = total - table @ cp.Variable(len(rows))
+    return [*constraints, total == 0]
+
+
+def _map(block: Block) -> list[tuple[Exponents, int, int, float]]:
+    from quakedesign.sos.exact.polynomial import times
+
+    found = []
+    for i, left in enumerate(block.monomials):
+        for j, right in enumerate(block.monomials):
+            for e, c in block.weight.items():
+                found.append((times(times(left, right), e), i, j, float(c)))
+    return found
+
+
+def _sparse(entries, index: Mapping[Exponents, int], size: int) -> Any:
+    from scipy.sparse import coo_array
+
+    rows = [index[e] for e, _, _, _ in entries]
+    columns = [i + j * size for _, i, j, _ in entries]
+    return coo_array(([c for *_, c in entries], (rows, columns)), shape=(len(index), size * size)).tocsr()
+
+
+def _definite(vector: Any, rows: list[list[dict]], margin: Any) -> Any:
+    import numpy as np
+
+    size = len(rows)
+    zero = (0,) * vector.shape[0]
+    total: Any = np.array([[float(entry.get(zero, 0)) for entry in row] for row in rows])
+    for k in range(vector.shape[0]):
+        unit = tuple(int(i == k) for i in range(len(zero)))
+        total = total + vector[k] * np.array([[float(entry.get(unit, 0)) for entry in row] for row in rows])
+    return total - margin * np.eye(size) >> 0
+
+
+def _solved(problem: Any) -> bool:
+    """Run Clarabel; whether there is an answer worth looking at. Its status is no verdict."""
+    import warnings
+
+    import cvxpy as cp
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            problem.solve(solver=cp.CLARABEL)
+        except (cp.SolverError, ValueError, ArithmeticError):
+            return False
+    return problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)

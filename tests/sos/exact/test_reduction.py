@@ -1,0 +1,86 @@
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from quakedesign.errors import PolynomialError
+from quakedesign.sos.exact import text
+from quakedesign.sos.exact.reduction import full_bases, invariant, parity_classes, reduced_bases
+from quakedesign.sos.exact.statement import statement
+
+
+def asked(polynomial, *, on=(), **options):
+    names = text.names(polynomial, *on)
+    g = tuple(text.parse_constraint(c, names)[2] for c in on)
+    return statement(names, text.parse(polynomial, names)[1], inequalities=g, **options)
+
+
+def in_hull(point, vertices):
+    """Membership in a convex hull by linear programming: another algorithm than the reduction's."""
+    A = np.vstack([np.array(vertices, dtype=float).T, np.ones(len(vertices))])
+    return linprog(np.zeros(len(vertices)), A_eq=A, b_eq=[*point, 1.0], method="highs").status == 0
+
+
+def test_motzkin_keeps_the_four_monomials_of_the_literature():
+    found = reduced_bases(asked("x^4*y^2 + x^2*y^4 + z^6 - 3*x^2*y^2*z^2"))
+    assert set(found[0]) == {(2, 1, 0), (1, 2, 0), (0, 0, 3), (1, 1, 1)}  # Reznick 1989
+
+
+supports = st.sets(st.tuples(st.integers(0, 3), st.integers(0, 3)), min_size=1, max_size=6)
+
+
+@settings(max_examples=40)
+@given(supports)
+def test_basis_lies_in_half_the_newton_polytope(support):
+    even = {(2 * a, 2 * b) for a, b in support}
+    found = reduced_bases(statement(("x", "y"), dict.fromkeys(even, Fraction(1))))[0]
+    assert all(in_hull((2 * a, 2 * b), sorted(even)) for a, b in found)
+    assert {(a, b) for a, b in support} <= set(found)
+
+
+@settings(max_examples=25)
+@given(
+    st.lists(
+        st.dictionaries(st.tuples(st.integers(0, 2), st.integers(0, 2)), st.integers(1, 5), min_size=1),
+        min_size=1,
+        max_size=3,
+    )
+)
+def test_monomials_of_known_squares_survive(squares):
+    total = {}
+    for square in squares:
+        for a, c in square.items():
+            for b, d in square.items():
+                key = (a[0] + b[0], a[1] + b[1])
+                total[key] = total.get(key, Fraction(0)) + c * d
+    found = reduced_bases(statement(("x", "y"), total))[0]
+    assert {e for square in squares for e in square} <= set(found)
+
+
+def test_on_the_orthant_parity_of_the_degree_is_kept():
+    found = asked("x^2 + y^2 - x*y", on=("x >= 0", "y >= 0"))
+    sizes = dict(zip(found.products, map(len, reduced_bases(found)), strict=True))
+    assert sizes == {(): 2, (0,): 0, (1,): 0, (0, 1): 1}
+
+
+def test_an_equality_keeps_what_it_may_feed():
+    free = statement(("x",), {(0,): Fraction(1)}, degree_bound=2)
+    tied = statement(("x",), {(0,): Fraction(1)}, equalities=({(2,): Fraction(1), (0,): Fraction(-1)},))
+    assert reduced_bases(free)[0] == ((0,),)
+    assert reduced_bases(tied)[0] == ((0,), (1,))
+
+
+def test_sign_symmetry_splits_even_polynomials_completely():
+    motzkin = asked("x^4*y^2 + x^2*y^4 + 1 - 3*x^2*y^2")
+    classes = parity_classes(motzkin, reduced_bases(motzkin)[0])
+    assert sorted(map(len, classes)) == [1, 1, 1, 1]
+    assert not invariant(motzkin, (1, 0))
+    assert invariant(motzkin, (2, 4))
+
+
+def test_too_large_a_basis_is_refused_before_it_is_built():
+    with pytest.raises(PolynomialError, match="at most 2000 monomials"):
+        full_bases(statement(tuple(f"x{i}" for i in range(14)), {(8,) + (0,) * 13: Fraction(1)}))
