@@ -9,9 +9,9 @@ from quakedesign.sos.exact.polynomial import Exponents, Polynomial
 from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds
 from quakedesign.sos.exact.reduction import full_bases, parity_classes, reduced_bases
 from quakedesign.sos.exact.statement import Statement
-from quakedesign.sos.solve.faces import Block, at_kernels, at_zeros, modulo
+from quakedesign.sos.solve.faces import Block, at_kernels, at_real_zeros, at_zeros, modulo
 from quakedesign.sos.solve.moment import MomentProgram, Solution
-from quakedesign.sos.solve.points import local_minima, negative_point, rational_zeros
+from quakedesign.sos.solve.points import local_minima, negative_point, polished_zeros, rational_zeros
 from quakedesign.sos.solve.rounding_exact import relations, rounded
 from quakedesign.sos.solve.scaling import Scaled, scaled
 
@@ -127,7 +127,8 @@ class Search:
             found = self._descend(blocks, threshold, tolerance)
             if found is not None:
                 return found
-        return None
+        smaller = at_real_zeros(blocks, polished_zeros(self.statement, candidates), self.moved.scale)
+        return self._descend(smaller, *_KERNELS[0]) if smaller != blocks else None
 
     def _descend(self, blocks: list[Block], threshold: float, tolerance: float) -> Proof | None:
         for _ in range(_ROUNDS):

@@ -3,6 +3,7 @@
 A wrong guess costs time, never truth: the proof is checked against the full statement in the end.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -12,6 +13,7 @@ from quakedesign.sos.exact.proofs import Element
 from quakedesign.sos.solve.moment import Shape
 
 Row = tuple[Fraction, ...]
+_SIMPLE = 20_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,6 +113,38 @@ def at_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[Fraction]]) -> li
     return kept
 
 
+def at_real_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[float]], scale: Sequence[Fraction]) -> list[Block]:
+    """Blocks whose squares vanish at real zeros, as far as the basis is there proportional to a rational vector.
+
+    A zero such as (√2, 1) need not be rational itself: within a class of equal parity its square roots cancel.
+    """
+    kept = []
+    for block in blocks:
+        rows = [_proportional(block, z, scale) for z in zeros if _float_value(block.weight, z) > 1e-7]
+        smaller = block.restricted([row for row in rows if row is not None])
+        if smaller is not None:
+            kept.append(smaller)
+    return kept
+
+
+def _proportional(block: Block, zero: Sequence[float], scale: Sequence[Fraction]) -> Row | None:
+    """Simple rational vector proportional to the basis at a zero; None if there is none."""
+    values = [math.prod(v**x for v, x in zip(zero, e, strict=True)) for e in block.monomials]
+    if block.face is not None:
+        values = [sum(float(a) * v for a, v in zip(row, values, strict=True)) for row in block.face]
+    lead = max(range(len(values)), key=lambda i: abs(values[i]))
+    if abs(values[lead]) < 1e-6:
+        return None
+    units = _units(block, scale)
+    row = [_entry(v / values[lead], units[j] / units[lead], 1e-9) for j, v in enumerate(values)]
+    plain = [v * units[j] / units[lead] for j, v in enumerate(row)]
+    return tuple(row) if all(min(v.denominator, abs(v.numerator)) < _SIMPLE for v in plain) else None
+
+
+def _float_value(polynomial: Polynomial, point: Sequence[float]) -> float:
+    return sum(float(c) * math.prod(v**x for v, x in zip(point, e, strict=True)) for e, c in polynomial.items())
+
+
 def modulo(blocks: Sequence[Block], relations: Sequence[Polynomial]) -> list[Block]:
     """Blocks without the monomials that multiples of the equalities express by lower ones."""
     return [b for b in (_modulo(block, relations) for block in blocks) if b is not None]
@@ -177,7 +211,7 @@ def _units(block: Block, scale: Sequence[Fraction]) -> list[Fraction]:
 
 def _entry(value: float, unit: Fraction, tolerance: float) -> Fraction:
     """Simplest fraction near value·unit, over unit."""
-    if abs(value) < tolerance:
+    if abs(value) < max(tolerance, 1e-7):
         return Fraction(0)
     return simplest(value * float(unit), tolerance) / unit
 

@@ -1,6 +1,6 @@
 """Membership in a cone as a semidefinite programme over functionals L, handed to Clarabel without a modelling layer.
 
-    minimise L(target)  subject to  L(g_S·b bᵀ) ⪰ 0 for every block,  Σ traces = 1,  L(m·h) = 0.
+    minimise L(target) + 4y  subject to  L(g_S·b bᵀ) ⪰ 0 for every block,  Σ traces + y = 1,  y ≥ 0,  L(m·h) = 0.
 
 Its value t is the largest margin: target = Σ g_S·bᵀ(Z + t·I)b + Σ q·h with the dual Z ⪰ 0. One solve gives the Gram
 matrices when t > 0 and a functional that refutes when t < 0. There are as many unknowns as monomials, far fewer than
@@ -14,6 +14,7 @@ from typing import Any
 from quakedesign.sos.exact.polynomial import Exponents
 
 SOLVER = "Clarabel"
+_LARGEST_MARGIN = 4.0  # keeps the programme bounded where every polynomial is in the cone, as on an empty set
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,14 +116,22 @@ class MomentProgram:
         import numpy as np
         from scipy import sparse
 
-        cost = self._vector(target)
+        cost = np.append(self._vector(target), _LARGEST_MARGIN)
         fresh = self._solver is None or self._accuracy != accuracy
         if fresh:
             top = sparse.vstack([sparse.csr_matrix(self._trace), self._relations])
-            A = sparse.vstack([top, *(-m for m in self._rows)]).tocsc()
+            slack = sparse.csr_matrix(([1.0], ([0], [0])), shape=(top.shape[0], 1))
+            last = sparse.csr_matrix(([-1.0], ([0], [len(self.keys)])), shape=(1, len(self.keys) + 1))
+            A = sparse.vstack(
+                [sparse.hstack([top, slack]), last, sparse.hstack([self._below(), self._column()])]
+            ).tocsc()
             b = np.zeros(A.shape[0])
             b[0] = 1.0
-            cones = [clarabel.ZeroConeT(top.shape[0]), *(clarabel.PSDTriangleConeT(s.size) for s in self.blocks)]
+            cones = [
+                clarabel.ZeroConeT(top.shape[0]),
+                clarabel.NonnegativeConeT(1),
+                *(clarabel.PSDTriangleConeT(s.size) for s in self.blocks),
+            ]
             P = sparse.csc_matrix((len(cost), len(cost)))
             self._solver, self._accuracy = clarabel.DefaultSolver(P, cost, A, b, cones, _settings(accuracy)), accuracy
         else:
@@ -133,7 +142,7 @@ class MomentProgram:
             return None
         count = 1 + self._relations.shape[0]
         margin = -z[0]
-        grams, moments, start = [], [], count
+        grams, moments, start = [], [], count + 1
         for block in self.blocks:
             stop = start + block.size * (block.size + 1) // 2
             grams.append(_full(z[start:stop], block.size) + margin * np.eye(block.size))
@@ -143,9 +152,19 @@ class MomentProgram:
             margin=float(margin),
             grams=grams,
             moments=moments,
-            functional=dict(zip(self.index, x.tolist(), strict=True)),
+            functional=dict(zip(self.index, x.tolist()[:-1], strict=True)),
             cofactors=-z[1:count],
         )
+
+    def _below(self):
+        from scipy import sparse
+
+        return sparse.vstack([-m for m in self._rows])
+
+    def _column(self):
+        from scipy import sparse
+
+        return sparse.csr_matrix((sum(m.shape[0] for m in self._rows), 1))
 
     def interior(self, target: Mapping[Exponents, float], value: float) -> Mapping[Exponents, float] | None:
         """Functional with L(target) = value < 0 and the largest smallest eigenvalue; None if none is found."""

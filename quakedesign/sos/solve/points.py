@@ -40,6 +40,38 @@ class Arrays:
             result[i] = factor @ np.prod(x[None, :] ** lower, axis=1)
         return result
 
+    def hessian(self, x):
+        """Matrix of second derivatives at a point."""
+        import numpy as np
+
+        x, size = np.asarray(x), len(x)
+        result = np.zeros((size, size))
+        for i in range(size):
+            for j in range(i, size):
+                factor = self.exponents[:, i] * (self.exponents[:, j] - (i == j)) * self.coefficients
+                lower = self.exponents.copy()
+                lower[:, i] -= 1
+                lower[:, j] -= 1
+                result[i, j] = result[j, i] = factor @ np.prod(x[None, :] ** np.maximum(lower, 0), axis=1)
+        return result
+
+
+def polished_zeros(statement: Statement, candidates: Sequence[Sequence[float]]) -> list[list[float]]:
+    """Candidates where the polynomial nearly vanishes, after Newton steps on its gradient; different ones only."""
+    import numpy as np
+
+    p = Arrays(statement.polynomial, len(statement.variables))
+    found: list[list[float]] = []
+    for x in candidates:
+        near = np.asarray(x, dtype=float)
+        if abs(p(near)) > 1e-9 * (1 + np.abs(near).max()) ** degree(statement.polynomial):
+            continue
+        for _ in range(6):
+            near = near - np.linalg.lstsq(p.hessian(near), p.gradient(near), rcond=1e-7)[0]
+        if np.all(np.isfinite(near)) and all(np.abs(near - z).max() > 1e-6 for z in found):
+            found.append(near.tolist())
+    return found
+
 
 def local_minima(
     statement: Statement, hints: Sequence[Sequence[float]] = (), starts: int = 24
