@@ -13,10 +13,11 @@ from quakedesign.sos.solve.faces import Block, at_kernels, at_real_zeros, at_zer
 from quakedesign.sos.solve.moment import MomentProgram, Solution
 from quakedesign.sos.solve.points import local_minima, negative_point, polished_zeros, rational_zeros
 from quakedesign.sos.solve.rounding_exact import relations, rounded
-from quakedesign.sos.solve.scaling import Scaled, scaled
+from quakedesign.sos.solve.scaling import Scaled, decimal_units, scaled
 
 _STRICT = 1e-7
 _ROUNDS = 4
+_ACCURACIES = (1e-9, 1e-12)
 _KERNELS = ((1e-6, 1e-5), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
 
 
@@ -32,12 +33,14 @@ class Search:
     original: Statement
     moved: Scaled = field(init=False)
     statement: Statement = field(init=False)
+    units: tuple[Fraction, ...] = field(init=False)
     relations: list[Polynomial] = field(init=False)
     blocks: list[Block] = field(init=False)
 
     def __post_init__(self) -> None:
         self.moved = scaled(self.original)
         self.statement = self.moved.statement
+        self.units = decimal_units(self.moved.scale)
         self.relations = [r for _, _, r in relations(self.statement)]
         self.blocks = modulo(initial_blocks(self.statement), self.relations)
 
@@ -49,7 +52,7 @@ class Search:
             if found is not None:
                 return found
         candidates = list(local_minima(self.statement, self._hints(solution)))
-        point = negative_point(self.statement, candidates, self.moved.scale)
+        point = negative_point(self.statement, candidates, self.units)
         if point is not None:
             return self._finish(point)
         found = self._outside(program)
@@ -64,14 +67,17 @@ class Search:
             found = self._refute(program, solution)
         return found
 
-    def _solve(self, blocks: list[Block]) -> tuple[Solution | None, MomentProgram | None]:
+    def _solve(
+        self, blocks: list[Block], accuracy: float = _ACCURACIES[0]
+    ) -> tuple[Solution | None, MomentProgram | None]:
         if not blocks:
             return None, None
         rows = [{e: float(c) for e, c in r.items()} for r in self.relations]
         program = MomentProgram([b.shape() for b in blocks], rows)
         if not program.covers(self.statement.target):
             return None, program
-        return program.solve({e: float(c) for e, c in self.statement.target.items()}), program
+        target = {e: float(c) for e, c in self.statement.target.items()}
+        return program.solve(target, accuracy), program
 
     def _hints(self, solution: Solution | None) -> list[list[float]]:
         """First moments of the functional, where it has a mass."""
@@ -121,25 +127,26 @@ class Search:
         return {e: v for e, v in exact.items() if v}
 
     def _on_faces(self, candidates, solution: Solution | None) -> Proof | None:
-        zeros = rational_zeros(self.statement, candidates, self.moved.scale)
+        zeros = rational_zeros(self.statement, candidates, self.units)
         blocks = at_zeros(self.blocks, zeros) if zeros else self.blocks
-        for threshold, tolerance in _KERNELS:
-            found = self._descend(blocks, threshold, tolerance)
-            if found is not None:
-                return found
-        smaller = at_real_zeros(blocks, polished_zeros(self.statement, candidates), self.moved.scale)
-        return self._descend(smaller, *_KERNELS[0]) if smaller != blocks else None
+        for accuracy in _ACCURACIES:
+            for threshold, tolerance in _KERNELS:
+                found = self._descend(blocks, threshold, tolerance, accuracy)
+                if found is not None:
+                    return found
+        smaller = at_real_zeros(blocks, polished_zeros(self.statement, candidates), self.units)
+        return self._descend(smaller, *_KERNELS[0], _ACCURACIES[0]) if smaller != blocks else None
 
-    def _descend(self, blocks: list[Block], threshold: float, tolerance: float) -> Proof | None:
+    def _descend(self, blocks: list[Block], threshold: float, tolerance: float, accuracy: float) -> Proof | None:
         for _ in range(_ROUNDS):
-            solution = self._solve(blocks)[0] if blocks else self._nothing()
+            solution = self._solve(blocks, accuracy)[0] if blocks else self._nothing()
             if solution is None:
                 return None
             if solution.margin > 1e-9:
                 found = self._finish(rounded(self.statement, blocks, solution))
                 if found is not None:
                     return found
-            smaller = at_kernels(blocks, solution.grams, threshold, tolerance, self.moved.scale)
+            smaller = at_kernels(blocks, solution.grams, threshold, tolerance, self.units)
             if smaller is None:
                 return None
             blocks = smaller

@@ -264,7 +264,7 @@ def _leads(statement: Statement, x: Sequence[float]) -> list[float]:
 
 def rationalised(x: Sequence[float], scale: Sequence[Fraction], tolerance: float) -> tuple[Fraction, ...]:
     """Simplest fractions, in the unscaled variables, within a tolerance relative to the largest coordinate."""
-    size = max((abs(v) for v in x), default=0.0)
+    size = max(1e-2, *map(abs, x))  # scaled variables are about one
     return tuple(
         Fraction(0) if abs(v) <= tolerance * size else simplest(v * float(s), tolerance * min(1.0, size / abs(v))) / s
         for v, s in zip(x, scale, strict=True)

@@ -92,6 +92,11 @@ def scaled(statement: Statement) -> Scaled:
     )
 
 
+def decimal_units(scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """Scaled variables in units of a power of ten near their scale, where simple numbers are looked for."""
+    return tuple(s / Fraction(10) ** round(_log2(s) / math.log2(10)) for s in scale)
+
+
 def power_of_two(value: Fraction) -> Fraction:
     """Power of two near a positive number."""
     return Fraction(2) ** round(_log2(value))
