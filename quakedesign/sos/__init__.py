@@ -5,9 +5,27 @@ from typing import Any
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.witness import Block, Polynomial, Witness, proves
 
-_SEARCH = {"prove": "engine", "decide": "engine", "Program": "program", "largest": "program"}
+_SEARCH = {
+    "prove": "engine",
+    "decide": "engine",
+    "Program": "program",
+    "largest": "program",
+    "Membership": "membership",
+}
 
-__all__ = ["Answer", "Block", "Polynomial", "Positivity", "Program", "Witness", "decide", "largest", "prove", "proves"]
+__all__ = [
+    "Answer",
+    "Block",
+    "Membership",
+    "Polynomial",
+    "Positivity",
+    "Program",
+    "Witness",
+    "decide",
+    "largest",
+    "prove",
+    "proves",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -34,6 +34,11 @@ def mapping(polynomial: Any) -> dict[Exponents, Fraction]:
 
 def product(variables: int, factors: Iterable[Polynomial]) -> dict[Exponents, Fraction]:
     """Product of polynomials; one for none."""
+    factors, one = list(factors), constant(variables)
+    others = [f for f in factors if f != one]
+    if len(others) < 2:
+        return dict(others[0]) if others else one
+    factors = others
     return mapping(reduce(lambda left, right: left * element(right, variables), factors, ring(variables).constant(1)))
 
 

@@ -73,7 +73,6 @@ class MomentProgram:
 
     def __init__(self, blocks: Sequence[Shape], relations: Sequence[Mapping[Exponents, float]] = ()) -> None:
         import numpy as np
-        from scipy import sparse
 
         self.blocks = tuple(blocks)
         entries = [_entries(b) for b in blocks]
@@ -81,30 +80,16 @@ class MomentProgram:
         stacked = [e.reshape(-1, e.shape[-1]) for e, _ in entries]
         self.keys, where = _unique([*stacked, extra] if extra.size else stacked)
         self.index = {tuple(e): i for i, e in enumerate(self.keys.tolist())}
-        rows, start = [], 0
-        for block, (exponents, values) in zip(blocks, entries, strict=True):
-            count = exponents.shape[0] * exponents.shape[1]
-            columns = where[start : start + count]
-            start += count
-            numbers = np.repeat(np.arange(exponents.shape[1])[None, :], exponents.shape[0], axis=0).ravel()
-            matrix = sparse.coo_matrix((values.ravel(), (numbers, columns)), shape=(exponents.shape[1], len(self.keys)))
-            rows.append(matrix.tocsr() if block.face is None else _congruence(block.face) @ matrix.tocsr())
-        self._rows = rows
-        self._relations = sparse.csr_matrix(
-            (
-                [float(c) for r in relations for c in r.values()],
-                (
-                    [i for i, r in enumerate(relations) for _ in r],
-                    [self.index[e] for r in relations for e in r],
-                ),
-            ),
-            shape=(len(relations), len(self.keys)),
+        self._triplets = _localizing(self.blocks, entries, where, len(self.keys))
+        self._relations = (
+            np.array([i for i, r in enumerate(relations) for _ in r], dtype=np.int64),
+            np.array([self.index[e] for r in relations for e in r], dtype=np.int64),
+            np.array([float(c) for r in relations for c in r.values()]),
         )
-        self._trace = np.asarray(
-            sum((m[_diagonal(b.size)].sum(axis=0) for m, b in zip(rows, self.blocks, strict=True)), start=0.0)
-        ).reshape(1, -1)
+        self._count = len(relations)
         self._solver: Any = None
         self._accuracy = 0.0
+        self.solver_seconds = 0.0
 
     def covers(self, target: Mapping[Exponents, Any]) -> bool:
         """Whether every monomial of a target can be produced at all."""
@@ -114,33 +99,22 @@ class MomentProgram:
         """Largest margin for a target whose coefficients are about one; None if the solver fails."""
         import clarabel
         import numpy as np
-        from scipy import sparse
 
         cost = np.append(self._vector(target), _LARGEST_MARGIN)
-        fresh = self._solver is None or self._accuracy != accuracy
-        if fresh:
-            top = sparse.vstack([sparse.csr_matrix(self._trace), self._relations])
-            slack = sparse.csr_matrix(([1.0], ([0], [0])), shape=(top.shape[0], 1))
-            last = sparse.csr_matrix(([-1.0], ([0], [len(self.keys)])), shape=(1, len(self.keys) + 1))
-            A = sparse.vstack(
-                [sparse.hstack([top, slack]), last, sparse.hstack([self._below(), self._column()])]
-            ).tocsc()
-            b = np.zeros(A.shape[0])
-            b[0] = 1.0
-            cones = [
-                clarabel.ZeroConeT(top.shape[0]),
-                clarabel.NonnegativeConeT(1),
-                *(clarabel.PSDTriangleConeT(s.size) for s in self.blocks),
-            ]
-            P = sparse.csc_matrix((len(cost), len(cost)))
-            self._solver, self._accuracy = clarabel.DefaultSolver(P, cost, A, b, cones, _settings(accuracy)), accuracy
+        if self._solver is None or self._accuracy != accuracy:
+            slack = [(0, len(self.keys), 1.0), (1 + self._count, len(self.keys), -1.0)]
+            A, b = self._matrix(slack, equations=1 + self._count, limits=1)
+            cones = [clarabel.ZeroConeT(1 + self._count), clarabel.NonnegativeConeT(1), *self._cones()]
+            self._solver = clarabel.DefaultSolver(_zero(len(cost)), cost, A, b, cones, _settings(accuracy))
+            self._accuracy = accuracy
         else:
             self._solver.update(q=cost)
         answer = self._solver.solve()
+        self.solver_seconds = answer.solve_time
         x, z, s = (np.array(v) for v in (answer.x, answer.z, answer.s))
         if str(answer.status) not in _USEFUL or not np.all(np.isfinite(x)) or not np.all(np.isfinite(z)):
             return None
-        count = 1 + self._relations.shape[0]
+        count = 1 + self._count
         margin = -z[0]
         grams, moments, start = [], [], count + 1
         for block in self.blocks:
@@ -156,33 +130,49 @@ class MomentProgram:
             cofactors=-z[1:count],
         )
 
-    def _below(self):
+    def _cones(self) -> list[Any]:
+        import clarabel
+
+        return [clarabel.PSDTriangleConeT(s.size) for s in self.blocks]
+
+    def _matrix(self, more: Sequence[tuple[int, int, float]], *, equations: int, limits: int):
+        """Sparse matrix and right side: trace, relations, further rows, then minus the localizing matrices.
+
+        The unknowns are the values of L and one more; `more` has further entries.
+        """
+        import numpy as np
         from scipy import sparse
 
-        return sparse.vstack([-m for m in self._rows])
-
-    def _column(self):
-        from scipy import sparse
-
-        return sparse.csr_matrix((sum(m.shape[0] for m in self._rows), 1))
+        rows, columns, values, diagonal = self._triplets
+        first = equations + limits
+        size = sum(s.size * (s.size + 1) // 2 for s in self.blocks)
+        extra = np.array(more, dtype=float).reshape(-1, 3)
+        on = np.isin(rows, diagonal)
+        where = (
+            np.concatenate([np.zeros(on.sum()), 1 + self._relations[0], rows + first, extra[:, 0]]),
+            np.concatenate([columns[on], self._relations[1], columns, extra[:, 1]]),
+        )
+        entries = np.concatenate([values[on], self._relations[2], -values, extra[:, 2]])
+        A = sparse.csc_matrix((entries, where), shape=(first + size, len(self.keys) + 1))
+        b = np.zeros(first + size)
+        b[0] = 1.0
+        return A, b
 
     def interior(self, target: Mapping[Exponents, float], value: float) -> Mapping[Exponents, float] | None:
         """Functional with L(target) = value < 0 and the largest smallest eigenvalue; None if none is found."""
         import clarabel
         import numpy as np
-        from scipy import sparse
 
         cost = self._vector(target)
-        top = sparse.vstack([sparse.csr_matrix(self._trace), sparse.csr_matrix(cost[None, :]), self._relations])
+        count = 1 + self._count
         unit = np.concatenate([_unit_vector(s.size) for s in self.blocks])
-        column = np.concatenate([np.zeros(top.shape[0]), unit])[:, None]
-        A = sparse.hstack([sparse.vstack([top, *(-m for m in self._rows)]), sparse.csc_matrix(column)]).tocsc()
-        b = np.zeros(A.shape[0])
-        b[:2] = 1.0, value
-        q = np.zeros(len(cost) + 1)
-        q[-1] = -1.0
-        cones = [clarabel.ZeroConeT(top.shape[0]), *(clarabel.PSDTriangleConeT(s.size) for s in self.blocks)]
-        solver = clarabel.DefaultSolver(sparse.csc_matrix((len(q), len(q))), q, A, b, cones, _settings(1e-8))
+        floor = [(1 + count + int(i), len(cost), 1.0) for i in np.flatnonzero(unit)]
+        aim = [(count, int(i), float(cost[i])) for i in np.flatnonzero(cost)]
+        A, b = self._matrix([*floor, *aim], equations=1 + count, limits=0)
+        b[count] = value
+        q = np.append(np.zeros(len(cost)), -1.0)
+        cones = [clarabel.ZeroConeT(1 + count), *self._cones()]
+        solver = clarabel.DefaultSolver(_zero(len(q)), q, A, b, cones, _settings(1e-8))
         answer = solver.solve()
         if str(answer.status) not in _USEFUL or not answer.x[-1] > 0:
             return None
@@ -198,6 +188,37 @@ class MomentProgram:
 
 
 _USEFUL = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
+
+
+def _zero(size: int):
+    from scipy import sparse
+
+    return sparse.csc_matrix((size, size))
+
+
+def _localizing(blocks: Sequence[Shape], entries: list, where, width: int):
+    """Rows, columns and values of all localizing matrices below each other, and the rows of their diagonals."""
+    import numpy as np
+    from scipy import sparse
+
+    rows, columns, values, diagonal = [], [], [], []
+    start = first = 0
+    for block, (exponents, factors) in zip(blocks, entries, strict=True):
+        terms, pairs = exponents.shape[:2]
+        chosen = where[start : start + terms * pairs]
+        start += terms * pairs
+        numbers = np.tile(np.arange(pairs), terms)
+        flat = factors.ravel()
+        if block.face is not None:
+            whole = sparse.csr_matrix((flat, (numbers, chosen)), shape=(pairs, width))
+            moved = (_congruence(block.face) @ whole).tocoo()
+            numbers, chosen, flat = moved.row, moved.col, moved.data
+        rows.append(numbers + first)
+        columns.append(chosen)
+        values.append(flat)
+        diagonal.append(_diagonal(block.size) + first)
+        first += block.size * (block.size + 1) // 2
+    return tuple(np.concatenate(part) for part in (rows, columns, values, diagonal))
 
 
 def _settings(accuracy: float):
