@@ -46,7 +46,7 @@ class Membership:
         size = max((abs(float(c)) for c in asked.values()), default=0.0)
         if size == 0 or not self._program.covers(asked):
             return 0.0 if size == 0 else float("-inf")
-        found = self._program.solve({e: float(c) / size for e, c in asked.items()})
+        found = self._program.solve({e: float(c) / size for e, c in asked.items()}, accuracy=1e-8)
         self.solver_seconds = self._program.solver_seconds
         return float("nan") if found is None else found.margin * size
 

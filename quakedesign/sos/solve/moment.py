@@ -80,13 +80,13 @@ class MomentProgram:
         stacked = [e.reshape(-1, e.shape[-1]) for e, _ in entries]
         self.keys, where = _unique([*stacked, extra] if extra.size else stacked)
         self.index = {tuple(e): i for i, e in enumerate(self.keys.tolist())}
-        self._triplets = _localizing(self.blocks, entries, where, len(self.keys))
-        self._relations = (
+        self.localizing = _localizing(self.blocks, entries, where, len(self.keys))
+        self.relation_entries = (
             np.array([i for i, r in enumerate(relations) for _ in r], dtype=np.int64),
             np.array([self.index[e] for r in relations for e in r], dtype=np.int64),
             np.array([float(c) for r in relations for c in r.values()]),
         )
-        self._count = len(relations)
+        self.relation_count = len(relations)
         self._solver: Any = None
         self._accuracy = 0.0
         self.solver_seconds = 0.0
@@ -100,21 +100,21 @@ class MomentProgram:
         import clarabel
         import numpy as np
 
-        cost = np.append(self._vector(target), _LARGEST_MARGIN)
+        cost = np.append(self.vector(target), _LARGEST_MARGIN)
         if self._solver is None or self._accuracy != accuracy:
-            slack = [(0, len(self.keys), 1.0), (1 + self._count, len(self.keys), -1.0)]
-            A, b = self._matrix(slack, equations=1 + self._count, limits=1)
-            cones = [clarabel.ZeroConeT(1 + self._count), clarabel.NonnegativeConeT(1), *self._cones()]
-            self._solver = clarabel.DefaultSolver(_zero(len(cost)), cost, A, b, cones, _settings(accuracy))
+            slack = [(0, len(self.keys), 1.0), (1 + self.relation_count, len(self.keys), -1.0)]
+            A, b = self._matrix(slack, equations=1 + self.relation_count, limits=1)
+            cones = [clarabel.ZeroConeT(1 + self.relation_count), clarabel.NonnegativeConeT(1), *self._cones()]
+            self._solver = clarabel.DefaultSolver(_zero(len(cost)), cost, A, b, cones, settings(accuracy))
             self._accuracy = accuracy
         else:
             self._solver.update(q=cost)
         answer = self._solver.solve()
         self.solver_seconds = answer.solve_time
         x, z, s = (np.array(v) for v in (answer.x, answer.z, answer.s))
-        if str(answer.status) not in _USEFUL or not np.all(np.isfinite(x)) or not np.all(np.isfinite(z)):
+        if not useful(answer):
             return None
-        count = 1 + self._count
+        count = 1 + self.relation_count
         margin = -z[0]
         grams, moments, start = [], [], count + 1
         for block in self.blocks:
@@ -143,16 +143,16 @@ class MomentProgram:
         import numpy as np
         from scipy import sparse
 
-        rows, columns, values, diagonal = self._triplets
+        rows, columns, values, diagonal = self.localizing
         first = equations + limits
         size = sum(s.size * (s.size + 1) // 2 for s in self.blocks)
         extra = np.array(more, dtype=float).reshape(-1, 3)
         on = np.isin(rows, diagonal)
         where = (
-            np.concatenate([np.zeros(on.sum()), 1 + self._relations[0], rows + first, extra[:, 0]]),
-            np.concatenate([columns[on], self._relations[1], columns, extra[:, 1]]),
+            np.concatenate([np.zeros(on.sum()), 1 + self.relation_entries[0], rows + first, extra[:, 0]]),
+            np.concatenate([columns[on], self.relation_entries[1], columns, extra[:, 1]]),
         )
-        entries = np.concatenate([values[on], self._relations[2], -values, extra[:, 2]])
+        entries = np.concatenate([values[on], self.relation_entries[2], -values, extra[:, 2]])
         A = sparse.csc_matrix((entries, where), shape=(first + size, len(self.keys) + 1))
         b = np.zeros(first + size)
         b[0] = 1.0
@@ -163,8 +163,8 @@ class MomentProgram:
         import clarabel
         import numpy as np
 
-        cost = self._vector(target)
-        count = 1 + self._count
+        cost = self.vector(target)
+        count = 1 + self.relation_count
         unit = np.concatenate([_unit_vector(s.size) for s in self.blocks])
         floor = [(1 + count + int(i), len(cost), 1.0) for i in np.flatnonzero(unit)]
         aim = [(count, int(i), float(cost[i])) for i in np.flatnonzero(cost)]
@@ -172,19 +172,36 @@ class MomentProgram:
         b[count] = value
         q = np.append(np.zeros(len(cost)), -1.0)
         cones = [clarabel.ZeroConeT(1 + count), *self._cones()]
-        solver = clarabel.DefaultSolver(_zero(len(q)), q, A, b, cones, _settings(1e-8))
+        solver = clarabel.DefaultSolver(_zero(len(q)), q, A, b, cones, settings(1e-8))
         answer = solver.solve()
-        if str(answer.status) not in _USEFUL or not answer.x[-1] > 0:
+        if not useful(answer) or not answer.x[-1] > 0:
             return None
         return dict(zip(self.index, answer.x[:-1], strict=True))
 
-    def _vector(self, target: Mapping[Exponents, float]):
+    def vector(self, target: Mapping[Exponents, Any]):
+        """Coefficients in the order of the monomials, as floats.
+
+        Raises
+        ------
+        ValueError
+            When a monomial cannot be produced.
+        """
         import numpy as np
 
         vector = np.zeros(len(self.keys))
         for e, c in target.items():
+            if e not in self.index:
+                raise ValueError(f"the monomial {e} is none of this structure.")
             vector[self.index[e]] = float(c)
         return vector
+
+
+def useful(answer: Any) -> bool:
+    """Whether an answer of the solver is worth looking at; its status is no verdict."""
+    import numpy as np
+
+    finite = np.all(np.isfinite(answer.x)) and np.all(np.isfinite(answer.z))
+    return str(answer.status) in _USEFUL and bool(finite)
 
 
 _USEFUL = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
@@ -221,7 +238,8 @@ def _localizing(blocks: Sequence[Shape], entries: list, where, width: int):
     return tuple(np.concatenate(part) for part in (rows, columns, values, diagonal))
 
 
-def _settings(accuracy: float):
+def settings(accuracy: float):
+    """Settings of Clarabel for one accuracy."""
     import clarabel
 
     settings = clarabel.DefaultSettings()
