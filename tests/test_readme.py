@@ -39,8 +39,10 @@ def test_links_lead_somewhere(document):
 def test_python_in_it_compiles_and_uses_public_names():
     import quakedesign
 
-    (block,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
-    compile(block, "README.md", "exec")
+    blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    assert blocks
+    for block in blocks:
+        compile(block, "README.md", "exec")
     assert set(re.findall(r"qd\.(\w+)", README)) <= set(quakedesign.__all__)
 
 
@@ -55,3 +57,15 @@ def test_every_command_explains_itself():
         call = [sys.executable, "-m", "quakedesign", name, "--help"]
         done = subprocess.run(call, capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL)
         assert "--json" in done.stdout
+
+
+def test_every_verdict_on_a_polynomial_in_it_is_the_one_given():
+    from quakedesign import sos
+
+    block = next(b for b in re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL) if "motzkin" in b)
+    questions = re.findall(r"^(sos\.prove\(.*\))\.verdict  # ([a-z-]+)", block, flags=re.MULTILINE)
+    setting = {"sos": sos}
+    exec(re.search(r"^motzkin = .*$", block, flags=re.MULTILINE)[0], setting)
+    found = [(str(eval(question, setting).verdict), verdict) for question, verdict in questions]
+    assert len(found) == 3
+    assert all(given == verdict for given, verdict in found)
