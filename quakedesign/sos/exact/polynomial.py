@@ -56,6 +56,19 @@ def combination(parts: Iterable[tuple[Fraction, Polynomial]]) -> dict[Exponents,
     return {e: c for e, c in total.items() if c}
 
 
+def square_factor(
+    polynomial: Polynomial, variables: int
+) -> tuple[dict[Exponents, Fraction], dict[Exponents, Fraction]]:
+    """Polynomials s and r with p = s²·r and r free of square factors."""
+    _, factors = element(polynomial, variables).factor_squarefree()
+    root = ring(variables).constant(1)
+    for factor, power in factors:
+        root *= factor ** (power // 2)
+    rest, remainder = divmod(element(polynomial, variables), root * root)
+    assert not remainder
+    return mapping(root), mapping(rest)
+
+
 def degree(polynomial: Polynomial) -> int:
     """Total degree; 0 for zero."""
     return max((sum(e) for e in polynomial), default=0)

@@ -191,14 +191,21 @@ def _monomial_gram(basis: Sequence[Element], gram: Sequence[Fraction]):
         return list(basis), integers, scale
     from flint import fmpz_mat
 
-    support = sorted({e for b in basis for e in _polynomial(b)})
-    common = lcm(1, *(c.denominator for b in basis for c in _polynomial(b).values()))
-    coefficients = fmpz_mat([[int(_polynomial(b).get(e, Fraction(0)) * common) for e in support] for b in basis])
+    support = sorted({e for b in basis for e in as_polynomial(b)})
+    common = lcm(1, *(c.denominator for b in basis for c in as_polynomial(b).values()))
+    coefficients = fmpz_mat([[int(as_polynomial(b).get(e, Fraction(0)) * common) for e in support] for b in basis])
     whole = coefficients.transpose() * fmpz_mat(integers) * coefficients
     return support, [[int(x) for x in row] for row in whole.tolist()], scale * common * common
 
 
-def _polynomial(basis_element: Element) -> Polynomial:
+def as_element(polynomial: Polynomial) -> Element:
+    """Polynomial as a basis element: by its exponents where it is a monomial with coefficient 1."""
+    kept = {e: c for e, c in polynomial.items() if c}
+    return next(iter(kept)) if list(kept.values()) == [1] else kept
+
+
+def as_polynomial(basis_element: Element) -> Polynomial:
+    """Basis element as a polynomial."""
     return {basis_element: Fraction(1)} if isinstance(basis_element, tuple) else basis_element
 
 

@@ -47,7 +47,7 @@ class Search:
     def run(self) -> Proof | None:
         """Checked proof, or None."""
         solution, program = self._solve(self.blocks)
-        if solution is not None and solution.margin > _STRICT:
+        if solution is not None and (solution.margin > 0 or self._determined()):
             found = self._finish(rounded(self.statement, self.blocks, solution))
             if found is not None:
                 return found
@@ -66,6 +66,17 @@ class Search:
         if found is None and solution is not None and solution.margin < 0 and program is not None:
             found = self._refute(program, solution)
         return found
+
+    def _determined(self) -> bool:
+        """Whether the target fixes the Gram matrices, so that exact arithmetic alone decides."""
+        keys = [
+            tuple(a + b for a, b in zip(left, right, strict=True))
+            for block in self.blocks
+            for i, left in enumerate(block.monomials)
+            for right in block.monomials[i:]
+        ]
+        plain = len(self.statement.products) == 1 and not self.relations
+        return plain and len(set(keys)) == len(keys)
 
     def _solve(
         self, blocks: list[Block], accuracy: float = _ACCURACIES[0]

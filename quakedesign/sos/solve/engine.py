@@ -8,8 +8,8 @@ from typing import Any
 
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.answer import Answer, Positivity
-from quakedesign.sos.exact.polynomial import Polynomial, combination, degree, from_sympy, product
-from quakedesign.sos.exact.proofs import Proof, SumOfSquares
+from quakedesign.sos.exact.polynomial import Polynomial, combination, degree, from_sympy, product, square_factor
+from quakedesign.sos.exact.proofs import Proof, SumOfSquares, as_element, as_polynomial
 from quakedesign.sos.exact.statement import Statement, statement
 
 _GROWTH = (0, 2)
@@ -106,7 +106,7 @@ def decide(asked: Statement) -> Answer:
     if not asked.target:
         proof = SumOfSquares(squares=(), cofactors=tuple({} for _ in asked.equalities))
     else:
-        proof = Search(asked).run()
+        proof = _by_square_factor(asked) or Search(asked).run()
     if isinstance(proof, SumOfSquares):
         proof = replace(proof, multiplier=squares)
     answer = Answer(
@@ -117,6 +117,24 @@ def decide(asked: Statement) -> Answer:
         versions=_versions(),
     )
     return answer if answer.check() else replace(answer, proof=None)
+
+
+def _by_square_factor(asked: Statement) -> SumOfSquares | None:
+    """Proof for s²·r from one for r, where the polynomial has a square factor; None if that leads to none."""
+    root, rest = square_factor(asked.polynomial, len(asked.variables))
+    size = degree(root)
+    if not size or 2 * size > asked.degree:
+        return None
+    inner = decide(replace(asked, polynomial=rest, degree=asked.degree - 2 * size)).proof
+    if not isinstance(inner, SumOfSquares):
+        return None
+    count = len(asked.variables)
+    squares = tuple(
+        replace(s, basis=tuple(as_element(product(count, (root, as_polynomial(b)))) for b in s.basis))
+        for s in inner.squares
+    )
+    cofactors = tuple(product(count, (root, root, q)) for q in inner.cofactors)
+    return SumOfSquares(squares=squares, cofactors=cofactors)
 
 
 def _versions() -> dict[str, str]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, evaluate, monomial
-from quakedesign.sos.exact.proofs import Element
+from quakedesign.sos.exact.proofs import Element, as_element
 from quakedesign.sos.solve.moment import Shape
 
 Row = tuple[Fraction, ...]
@@ -42,7 +42,7 @@ class Block:
         """Entries of b."""
         if self.face is None:
             return self.monomials
-        return tuple(_element(dict(zip(self.monomials, row, strict=True))) for row in self.face)
+        return tuple(as_element(dict(zip(self.monomials, row, strict=True))) for row in self.face)
 
     def shape(self) -> Shape:
         """The block in floats."""
@@ -93,13 +93,6 @@ class Block:
         if self.face is None:
             return tuple(values)
         return tuple(sum((a * v for a, v in zip(row, values, strict=True)), start=Fraction(0)) for row in self.face)
-
-
-def _element(polynomial: Polynomial) -> Element:
-    kept = {e: c for e, c in polynomial.items() if c}
-    if len(kept) == 1 and next(iter(kept.values())) == 1:
-        return next(iter(kept))
-    return kept
 
 
 def at_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[Fraction]]) -> list[Block]:

@@ -208,17 +208,20 @@ def _near(statement: Statement, x: Sequence[float], scale: Sequence[Fraction]) -
         near = rationalised(x, scale, tolerance)
         yield near
         if len(statement.equalities) == 1 and degree(statement.equalities[0]) <= 2:
-            yield from on_quadric(statement.equalities[0], near)
+            yield from on_quadric(statement.equalities[0], near, scale)
         for factor in (1 - tolerance, 1 + tolerance) if statement.inequalities and tolerance < 0.1 else ():
             yield rationalised([factor * v for v in x], scale, tolerance / 10)
 
 
-def on_quadric(equality: Polynomial, near: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
+def on_quadric(
+    equality: Polynomial, near: Sequence[Fraction], scale: Sequence[Fraction]
+) -> Iterator[tuple[Fraction, ...]]:
     """Rational points of a quadric near a given one: second intersections of lines through a rational point of it."""
     from itertools import islice, product
 
     size = len(near)
-    seeds = (p for p in islice(product(_SIMPLE, repeat=size), 5000) if evaluate(equality, p) == 0)
+    simple = (tuple(v / s for v, s in zip(p, scale, strict=True)) for p in product(_SIMPLE, repeat=size))
+    seeds = (p for p in islice(simple, 5000) if evaluate(equality, p) == 0)
     for seed in islice(seeds, 3):
         step = [b - a for a, b in zip(seed, near, strict=True)]
         at = [evaluate(equality, [a + k * d for a, d in zip(seed, step, strict=True)]) for k in (1, -1)]
