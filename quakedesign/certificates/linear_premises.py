@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 
 import sympy as sp
 
@@ -15,10 +16,11 @@ from quakedesign.certificates.premises import (
     plant_ranges,
 )
 from quakedesign.controllers import Controller
+from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.symbolic import plant
-from quakedesign.symbolic.balls import upper_bound
+from quakedesign.symbolic.balls import enclose, upper_bound
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,22 +89,94 @@ def effective_stress(fault: Fault) -> tuple[Fraction, bool]:
     p* balances friction, spring and the disturbance's growth at rest at r0 (ERRATA 8); friction there is anything that
     the box allows.
     """
-    r, value = sp.Symbol("r_0", nonnegative=True), sp.Symbol("mu", positive=True)
-    static = friction_range(fault)[1]
-    ranges = plant_ranges(fault)
-    mu_star, growth = (_sympy(v) for v in (static, rational(fault.disturbance.slip_growth)))
-    balance = plant.shifted_acceleration().replace(plant.disturbance, lambda x, *_: growth * x)
-    balance = balance.replace(plant.mu, lambda *_: value).subs({plant.x1: r, plant.x2: 0, plant.mu_star: mu_star})
-    net = sp.expand(plant.sigma - sp.solve(balance, plant.p)[0])
-    numerator = sp.collect(sp.expand(net * value), r)
+    ranges, start = plant_ranges(fault), _sympy(friction_range(fault)[1])
+    known = {_growth: _sympy(rational(fault.disturbance.slip_growth)), _drift: 0, plant.mu_star: start}
+    numerator = sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r)
     target = rational(fault.reference.target_slip)
-    least = sp.Max(_sympy(friction_range(fault)[0]), mu_star - _sympy(_fraction(fault.friction.exact().slip_slope)) * r)
-    box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)} | {r: (Fraction(0), target)}
+    least = sp.Max(_sympy(friction_range(fault)[0]), start - _sympy(_fraction(fault.friction.exact().slip_slope)) * _r)
+    box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)} | {_r: (Fraction(0), target)}
     stress = upper_bound(numerator / least, box, pieces=400)
-    lowest = numerator.subs(r, _sympy(target)).subs(
+    lowest = numerator.subs(_r, _sympy(target)).subs(
         {plant.k_hat: _sympy(box[plant.k_hat][1]), plant.N_hat: _sympy(box[plant.N_hat][0])}
     )
     return stress, bool(lowest.subs(plant.sigma, _sympy(box[plant.sigma][0])) > 0)
+
+
+def rest_pressure(
+    fault: Fault, slip: Range, *, nominal: bool = False, drift: Fraction = Fraction(0), pieces: int = 64
+) -> Range:
+    """Rigorous enclosure of the pressure p* [Pa] that holds the fault at rest at a constant reference (ERRATA 8).
+
+    Ball arithmetic on pieces of the range of references.
+
+    Parameters
+    ----------
+    fault : Fault
+    slip : (Fraction, Fraction)
+        Range of the reference r0 [m], not negative.
+    nominal : bool
+        The fault's own friction law and parameters; without, any friction and any parameters of the box.
+    drift : Fraction
+        Largest k̂v∞t [m/s²].
+    pieces : int
+        Into which the range is cut.
+
+    Raises
+    ------
+    ParameterError
+        When no finite enclosure is found.
+    """
+    expression, box = _rest(fault, nominal)
+    box = box | {_drift: (Fraction(0), drift)}
+    step, ends = (slip[1] - slip[0]) / pieces, list[Fraction]()
+    for n in range(pieces if step else 1):
+        part = box | {_r: (slip[0] + n * step, slip[0] + (n + 1) * step)}
+        if not nominal:
+            part |= {_mu: _friction_at(fault, part[_r])}
+        found = enclose(expression, part)
+        if not found.is_finite():
+            raise ParameterError("no finite pressure at rest was found. Positive friction is expected. Narrow the box.")
+        ends += [_end(found.lower()), _end(found.upper())]
+    return min(ends), max(ends)
+
+
+_r = sp.Symbol("r_0", nonnegative=True)
+_mu = sp.Symbol("mu", positive=True)
+_growth = sp.Symbol("phi_1", real=True)
+_drift = sp.Symbol("drift", nonnegative=True)
+
+
+@cache
+def _net_stress() -> sp.Expr:
+    """σ' − p* at rest at r0 with friction μ, a disturbance that grows with slip, and a drift k̂v∞t."""
+    balance = plant.shifted_acceleration().replace(plant.disturbance, lambda x, *_: _growth * x + _drift)
+    balance = balance.replace(plant.mu, lambda *_: _mu).subs({plant.x1: _r, plant.x2: 0})
+    return sp.expand(plant.sigma - sp.solve(balance, plant.p)[0])
+
+
+def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]:
+    """p* in symbols, written so that few of them repeat, and their ranges."""
+    known = {
+        _growth: _sympy(rational(fault.disturbance.slip_growth)),
+        plant.mu_star: _sympy(friction_range(fault)[1]),
+    }
+    expression = plant.sigma - sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r) / _mu  # μ once
+    ranges = plant_ranges(fault)
+    if not nominal:
+        return expression, {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)}
+    law = fault.friction.exact()
+    return expression.subs(plant.plant_values(fault)).subs(_mu, law.coefficient(_r, sp.Integer(0))), {}
+
+
+def _friction_at(fault: Fault, slip: Range) -> Range:
+    """Friction at rest at a slip, anywhere between its bounds and its slope bound from the static value."""
+    low, high = friction_range(fault)
+    return max(low, high - _fraction(fault.friction.exact().slip_slope) * slip[1]), high
+
+
+def _end(end) -> Fraction:
+    exact = end.fmpq()
+    return Fraction(int(exact.p), int(exact.q))
 
 
 def linear_premises(fault: Fault, controller: Controller, certificate: Certificate | None) -> list[Premise]:
@@ -158,6 +232,25 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
             unit="m/s^2",
             note="a disturbance that does not vanish leaves a bounded error, not certified",
         ),
+        *_limits_premise(fault, controller),
+    ]
+
+
+def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
+    """Whether the pressure at rest stays inside the limits of the law, for every constant reference and plant."""
+    limits = getattr(controller, "limits", None)
+    if limits is None:
+        return []
+    low, high = rest_pressure(fault, (Fraction(0), rational(fault.reference.target_slip)))
+    worst = max((low, limits.lowest), (high, limits.highest), key=lambda pair: pair[0] / pair[1])
+    return [
+        Premise(
+            name="pressure_at_rest",
+            required=float(worst[0]),
+            certified=float(worst[1]),
+            unit="Pa",
+            note="inside the limits of the law; the proof is about deviations that do not reach them",
+        )
     ]
 
 

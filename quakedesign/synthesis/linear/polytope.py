@@ -1,0 +1,212 @@
+"""The e-LQR's loop as a polytope of exact matrices, about constant references and in error coordinates."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+from quakedesign.certificates import Loop
+from quakedesign.certificates.linear_premises import Sectors
+from quakedesign.errors import ParameterError
+from quakedesign.symbolic.terms import value
+
+Row = tuple[Fraction, ...]
+Matrix = tuple[Row, ...]
+Range = tuple[Fraction, Fraction]
+
+ERROR_STATES = ("e1", "e2", "zeta", "chi")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Polytope:
+    """x' = A(t)x with A(t) anywhere in the convex hull of some matrices.
+
+    Attributes
+    ----------
+    states : tuple of str
+    vertices : mapping of str to Matrix
+        Exact, by the name of the vertex.
+    """
+
+    states: tuple[str, ...]
+    vertices: Mapping[str, Matrix]
+
+    def floats(self) -> list[Any]:
+        """Vertices as arrays (n × n)."""
+        import numpy as np
+
+        return [np.array([[float(v) for v in row] for row in matrix]) for matrix in self.vertices.values()]
+
+    def slowest(self) -> float:
+        """Largest real part of an eigenvalue of a vertex [1/s]; no V decays faster than its negative."""
+        import numpy as np
+
+        return max(float(np.linalg.eigvals(A).real.max()) for A in self.floats())
+
+
+def polytope_of(loop: Loop) -> Polytope:
+    """Polytope of a loop on the reals whose field is linear in the states.
+
+    Raises
+    ------
+    ParameterError
+        For a field that is not linear.
+    """
+    linear = all(len(t.factors) == 1 and t.factors[0][1:] == (1, "s") for terms in loop.field.values() for t in terms)
+    if loop.domain != "reals" or not linear:
+        raise ParameterError(f"a polytope needs a linear field. Received the one of {loop.law}.")
+    names = tuple(loop.uncertain)
+    vertices = {}
+    for ends in product(*(sorted(set(loop.uncertain[n])) for n in names)):
+        chosen = dict(zip(names, ends, strict=True))
+        label = " ".join(f"{n}={v}" for n, v in chosen.items())
+        vertices[label] = tuple(_row(loop, state, {**loop.parameters, **chosen}) for state in loop.states)
+    return Polytope(states=tuple(loop.states), vertices=vertices)
+
+
+def _row(loop: Loop, state: str, parameters: Mapping[str, Fraction]) -> Row:
+    entries = dict.fromkeys(loop.states, Fraction(0))
+    for term in loop.field[state]:
+        entries[term.factors[0][0]] += value(term, parameters)
+    return tuple(entries.values())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorLoop:
+    """The loop about a moving reference: e1' = e2, e2' = s·e1 − w·e2 − βb(k1e1 + k2e2 + ζ) + force.
+
+    ζ' = k3e1 + χ + drift and χ' = k4e1 + drift_rate, where ζ = k3ξ1 + k4ξ2 + p*(r) and χ = k4ξ1, each plus what the
+    law feeds forward of the reference. The substitution removes every large term: the loop sees only
+    force = φ_e − r″ − w·r′, drift = dp*(r)/dt and, for feedback on the state, drift_rate = k1r″ + k2r‴.
+
+    Attributes
+    ----------
+    gains : (Fraction, Fraction, Fraction, Fraction)
+        k1 … k4 in SI.
+    authority : Fraction
+        b = μ_res·N̂_min [m²/kg].
+    beta, slip, rate : (Fraction, Fraction)
+        Ranges of β [-], s [1/s²] and w [1/s], which may change at any time.
+    """
+
+    gains: tuple[Fraction, Fraction, Fraction, Fraction]
+    authority: Fraction
+    beta: Range
+    slip: Range
+    rate: Range
+
+    def __post_init__(self) -> None:
+        if not all(low <= high for low, high in (self.beta, self.slip, self.rate)):
+            raise ParameterError(f"ranges must be ordered. Received {self.beta}, {self.slip}, {self.rate}.")
+
+    def matrix(self, beta: Fraction, slip: Fraction, rate: Fraction) -> Matrix:
+        """Matrix of the states e1, e2, ζ, χ for given parameters."""
+        k1, k2, k3, k4 = self.gains
+        zero, one, strength = Fraction(0), Fraction(1), beta * self.authority
+        return (
+            (zero, one, zero, zero),
+            (slip - strength * k1, -rate - strength * k2, -strength, zero),
+            (k3, zero, zero, one),
+            (k4, zero, zero, zero),
+        )
+
+    def corners(self) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
+        """β, s and w at every vertex, each once."""
+        yield from product(*(sorted(set(ends)) for ends in (self.beta, self.slip, self.rate)))
+
+    def polytope(self) -> Polytope:
+        """All vertices."""
+        named = {f"beta={b} s={s} w={w}": self.matrix(b, s, w) for b, s, w in self.corners()}
+        return Polytope(states=ERROR_STATES, vertices=named)
+
+    def outputs(self) -> dict[str, Row]:
+        """Row of every bounded output: e1 [m], e2 [m/s], and p − p*(r) [Pa]."""
+        k1, k2, *_ = self.gains
+        zero, one = Fraction(0), Fraction(1)
+        return {
+            "slip_error": (one, zero, zero, zero),
+            "slip_rate_error": (zero, one, zero, zero),
+            "pressure_offset": (-k1, -k2, -one, zero),
+        }
+
+
+def error_loop(gains: Sequence[Fraction], sectors: Sectors) -> ErrorLoop:
+    """Error loop of four gains in SI over the sectors of a fault."""
+    k1, k2, k3, k4 = gains
+    return ErrorLoop(
+        gains=(k1, k2, k3, k4),
+        authority=sectors.authority,
+        beta=sectors.beta,
+        slip=sectors.slip,
+        rate=sectors.rate,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ModalScaling:
+    """Real coordinates x = T·z in which the mean of a polytope is block diagonal and its input as large as its poles.
+
+    They do not depend on the units of x; time is counted in 1/pace.
+
+    Attributes
+    ----------
+    transform : ndarray, shape (n, n)
+        T.
+    inverse : ndarray, shape (n, n)
+    poles : ndarray, shape (n,)
+        Moduli of the mean's eigenvalues over `pace` [-].
+    pace : float
+        Largest modulus [rad/s].
+    """
+
+    transform: Any
+    inverse: Any
+    poles: Any
+    pace: float
+
+    def matrices(self, polytope: Polytope) -> list[Any]:
+        """Vertices in z and scaled time."""
+        return [self.inverse @ A @ self.transform / self.pace for A in polytope.floats()]
+
+    def back(self, form: Any) -> Any:
+        """Matrix of the quadratic form zᵀFz in x."""
+        return self.inverse.T @ form @ self.inverse
+
+
+def modal_scaling(polytope: Polytope, entries: Sequence[Sequence[float]]) -> ModalScaling:
+    """Modal coordinates of the mean of the vertices, balanced so that the modes couple as weakly as they can.
+
+    Parameters
+    ----------
+    polytope : Polytope
+    entries : sequence of sequence of float
+        Columns through which the disturbances, or the uncertainty, enter.
+    """
+    import numpy as np
+    from scipy.linalg import matrix_balance
+
+    modes, moduli = _modes(np.mean(polytope.floats(), axis=0))
+    pace, poles = float(moduli.max()), moduli / moduli.max()
+    modes = modes / np.linalg.norm(np.linalg.solve(modes, np.asarray(entries, dtype=float).T), axis=1).max()
+    inverse = np.linalg.inv(modes)
+    coupling = np.max([np.abs(inverse @ A @ modes) for A in polytope.floats()], axis=0) / pace
+    roots = np.sqrt(np.maximum(poles, 1e-12))
+    _, (factors, _) = matrix_balance(coupling / roots[:, None] / roots[None, :], permute=False, separate=True)
+    T = modes * factors
+    pushed = np.abs(np.linalg.solve(T, np.asarray(entries, dtype=float).T)) / pace
+    T = T * (float((pushed / poles[:, None]).max()) or 1.0)
+    return ModalScaling(transform=T, inverse=np.linalg.inv(T), poles=poles, pace=pace)
+
+
+def _modes(mean: Any) -> tuple[Any, Any]:
+    """Real eigenvectors as columns (real and imaginary part of a pair) and the moduli of their eigenvalues."""
+    import numpy as np
+
+    values, vectors = np.linalg.eig(mean)
+    columns, moduli = [], []
+    for pole, vector in zip(values, vectors.T, strict=True):
+        if pole.imag >= 0:
+            columns += [vector.real] if pole.imag == 0 else [vector.real, vector.imag]
+            moduli += [abs(pole)] * (1 if pole.imag == 0 else 2)
+    return np.array(columns).T, np.array(moduli)

@@ -1,0 +1,54 @@
+"""Designs for a given sampling period."""
+
+import numpy as np
+import pytest
+
+import quakedesign as qd
+from quakedesign.certificates import Verdict
+from quakedesign.errors import ParameterError
+from quakedesign.synthesis.linear.problem import LinearProblem
+from quakedesign.synthesis.linear.redesign import discrete_design, open_loop_growth, sampled_design
+from quakedesign.synthesis.linear.sampled import hold_verdict, largest_radius
+
+LAB = qd.load_fault("lab-fault")
+
+
+def proved(design):
+    problem, gains = LinearProblem.of(LAB), tuple(design.controller.gains.values())
+    return (
+        hold_verdict(problem, gains, design.step).verdict is Verdict.PROVED
+        and largest_radius(problem, gains, float(design.step)) < 1
+    )
+
+
+def test_a_short_period_keeps_the_continuous_design():
+    design = sampled_design(LAB)
+    assert design.method == "continuous"
+    assert proved(design)
+    assert design.varying.verdict is Verdict.PROVED
+    assert float(design.step) == LAB.sampling_time
+
+
+def test_a_long_period_is_designed_in_discrete_time():
+    design = sampled_design(LAB, "7e-3", feedback="state")
+    assert design.method == "discrete"
+    assert design.controller.feedback == "state"
+    assert proved(design)
+    # the continuous design of any bandwidth that it tried fails there
+    assert design.constant.radius < 1
+
+
+def test_where_the_weights_alone_fail_a_direct_search_goes_on():
+    assert proved(discrete_design(LAB, "9e-3"))
+
+
+def test_a_period_that_is_too_long_is_refused_with_its_reason():
+    with pytest.raises(ParameterError, match=r"held for 0\.03 s: in that time the plant alone moves away 31\.\d+-fold"):
+        sampled_design(LAB, 0.03)
+
+
+def test_the_growth_of_the_plant_alone_is_that_of_its_unstable_pole():
+    problem = LinearProblem.of(LAB)
+    s, w = float(problem.sectors.slip[1]), float(problem.sectors.rate[0])
+    pole = np.roots([1, w, -s]).max()
+    assert open_loop_growth(problem, 0.01) == pytest.approx(np.exp(pole * 0.01), rel=1e-12)
