@@ -56,7 +56,7 @@ def prepare(step: Any, compiled: bool | None) -> Backend:
     if compiled is False:
         return Backend(functions, "virtual-machine", "asked for")
     try:
-        command = _compiler()
+        command = compiler()
         return Backend(_compile(_source(functions), command), "compiled", " ".join((*command, *FLAGS)))
     except (OSError, subprocess.SubprocessError, RuntimeError) as error:
         reason = _reason(error)
@@ -90,7 +90,14 @@ def _source(functions: tuple[Any, ...]) -> tuple[str, tuple[str, ...]]:
     return generator.dump(), tuple(function.name() for function in functions)
 
 
-def _compiler() -> tuple[str, ...]:
+def compiler() -> tuple[str, ...]:
+    """Command of the C compiler: CC, or the first of cc, gcc and clang.
+
+    Raises
+    ------
+    FileNotFoundError
+        When there is none.
+    """
     wanted = shlex.split(os.environ.get("CC", ""))
     for command in [wanted] if wanted else [["cc"], ["gcc"], ["clang"]]:
         path = shutil.which(command[0])
@@ -106,11 +113,23 @@ def _compile(source: tuple[str, tuple[str, ...]], command: tuple[str, ...]) -> t
 
     text, names = source
     with TemporaryDirectory(prefix="quakedesign-", ignore_cleanup_errors=True) as folder:
-        written, library = Path(folder) / "steps.c", Path(folder) / "steps.so"
-        written.write_text(text, encoding="utf-8")
-        call = [*command, *FLAGS, str(written), "-o", str(library), "-lm"]
-        subprocess.run(call, check=True, capture_output=True, timeout=_LONGEST_COMPILATION)
+        library = shared_library(text, Path(folder), command)
         return tuple(ca.external(name, str(library)) for name in names)
+
+
+def shared_library(text: str, folder: Path, command: tuple[str, ...]) -> Path:
+    """Compile a C source into a shared library in a folder.
+
+    Raises
+    ------
+    OSError, SubprocessError
+        When the compiler does not work.
+    """
+    written, library = folder / "steps.c", folder / "steps.so"
+    written.write_text(text, encoding="utf-8")
+    call = [*command, *FLAGS, str(written), "-o", str(library), "-lm"]
+    subprocess.run(call, check=True, capture_output=True, timeout=_LONGEST_COMPILATION)
+    return library
 
 
 def _reason(error: Exception) -> str:

@@ -1,16 +1,26 @@
 """Plant, law and reference of one closed loop, from SymPy to CasADi functions."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import sympy as sp
 
 from quakedesign.controllers import Controller, Signals, SlidingMode
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
+from quakedesign.simulation.energy import WORKS, powers
 from quakedesign.simulation.integrators import Integrator
+from quakedesign.simulation.loading import NOTHING, Load
+from quakedesign.simulation.variation import (
+    WeakenedFriction,
+    complete,
+    symbol,
+    symbols,
+    varied_disturbance,
+    varied_values,
+)
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_casadi
 
@@ -27,13 +37,14 @@ def integral_symbols(controller: Controller | None) -> tuple[sp.Symbol, ...]:
 
 
 def law_expressions(controller: Controller) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
-    """Pressure [Pa] and ξ' of a law, in x1, x2, r, r' and ξ."""
+    """Pressure [Pa] and ξ' of a law, in x1, x2, r, r', r'' and ξ."""
     signals = Signals(
         slip=plant.x1,
         slip_rate=plant.x2,
         slip_error=plant.x1 - r,
         slip_rate_error=plant.x2 - r_rate,
         integrals=integral_symbols(controller),
+        reference_acceleration=r_acceleration,
     )
     return controller.pressure(signals), controller.integral_rates(signals)
 
@@ -47,34 +58,40 @@ def reference_expressions(fault: Fault) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
     return slip.subs(plant.t, sp.Min(plant.t, end)), rate, acceleration
 
 
-def acceleration_expression(fault: Fault) -> sp.Expr:
-    """x2' [m/s²] of eq. shift in x1, x2, p and the disturbance φ, with friction continued to slip < 0 (ERRATA 12)."""
-    return _with_numbers(plant.shifted_acceleration(), fault)
+def acceleration_expression(fault: Fault, varied: bool = False) -> sp.Expr:
+    """x2' [m/s²] of eq. shift in x1, x2, p and the disturbance φ, with friction continued to slip < 0 (ERRATA 12).
+
+    With `varied` also in the factors of `quakedesign.simulation.variation.symbols`, here and below.
+    """
+    return _with_numbers(plant.shifted_acceleration(), fault, varied)
 
 
-def friction_expression(fault: Fault) -> sp.Expr:
+def friction_expression(fault: Fault, varied: bool = False) -> sp.Expr:
     """Friction coefficient [-] in x1 and x2, continued to slip < 0."""
-    return _with_numbers(plant.mu(plant.x1, plant.x2), fault)
+    return _with_numbers(plant.mu(plant.x1, plant.x2), fault, varied)
 
 
-def matched_perturbation(fault: Fault, divisor: sp.Rational) -> sp.Expr:
+def matched_perturbation(fault: Fault, divisor: sp.Rational, varied: bool = False) -> sp.Expr:
     """h of eq. esystem3 [unit of ν] along a run, in x1, x2, φ, r, r' and r''."""
     moving, derived = plant.reference(plant.t), plant.error_dynamics()
     position = {plant.e1: plant.x1 - moving, plant.e2: plant.x2 - moving.diff(plant.t)}
     named = ((moving.diff(plant.t, 2), r_acceleration), (moving.diff(plant.t), r_rate), (moving, r))
     unmatched, beta = (
-        _with_numbers(part.subs(position, simultaneous=True).subs(named), fault).subs(plant.divisor, divisor)
+        _with_numbers(part.subs(position, simultaneous=True).subs(named), fault, varied).subs(plant.divisor, divisor)
         for part in (derived.h * derived.beta, derived.beta)
     )
     return unmatched / beta
 
 
-def _with_numbers(expression: sp.Expr, fault: Fault) -> sp.Expr:
+def _with_numbers(expression: sp.Expr, fault: Fault, varied: bool) -> sp.Expr:
     """Insert the law and exact numbers; e^u becomes 1 + (e^u − 1), so that small slips do not drown in rounding."""
     from sympy.codegen.cfunctions import expm1
 
-    lawful = plant.with_law(expression, fault.friction.exact(), extended=True)
-    numbers = lawful.replace(plant.disturbance, lambda *_: phi).subs(plant.plant_values(fault))
+    law: Any = fault.friction.exact()
+    values: dict[Any, Any] = varied_values(fault) if varied else plant.plant_values(fault)
+    law = WeakenedFriction(law, symbol("weakening")) if varied else law
+    lawful = plant.with_law(expression, law, extended=True)
+    numbers = lawful.replace(plant.disturbance, lambda *_: phi).subs(values)
     return sp.expand_mul(numbers.replace(sp.exp, lambda u: 1 + expm1(u)))
 
 
@@ -88,6 +105,12 @@ class ClosedLoop:
     controller : Controller or None
     constant_pressure : float
         p [Pa] where there is no controller.
+    load : Load
+        What acts on the fault beside its own disturbance.
+    factors : tuple of float or SX
+        True over nominal parameters as in `Variation.values`; empty for the nominal fault.
+    meter : list of SX or None
+        Where `advance` puts the works (`quakedesign.simulation.energy.WORKS`) of every piece of a step.
     """
 
     plant_name: ClassVar[str] = "smooth"
@@ -97,6 +120,13 @@ class ClosedLoop:
     fault: Fault
     controller: Controller | None = None
     constant_pressure: float = 0.0
+    load: Load = NOTHING
+    factors: tuple[Any, ...] = ()
+    meter: list[Any] | None = field(default=None, compare=False)
+
+    def with_factors(self, factors: tuple[Any, ...]) -> Self:
+        """Return the same loop with other true parameters, which may be symbols of CasADi (SX)."""
+        return replace(self, factors=factors) if factors else self
 
     def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
         """State [x1, x2, ξ] (SX) after one step.
@@ -111,6 +141,26 @@ class ClosedLoop:
         step : float
             [s].
         """
+        import casadi as ca
+
+        if self.meter is None:
+            return self._advance(method, motion, state, step)
+        size = state.shape[0]
+
+        def with_powers(plant: Any, passed: Any, now: Any) -> Any:
+            seen: list[Any] = []
+
+            def watched(time: Any, x: Any, pressure: Any) -> Any:
+                seen[:] = [powers(self, time, x, pressure, getattr(plant, "direction", 1))]
+                return plant(time, x, pressure)
+
+            return ca.vertcat(motion(watched, passed, now[:size]), seen[0])
+
+        end = self._advance(method, with_powers, ca.vertcat(state, ca.SX.zeros(len(WORKS))), step)
+        self.meter.append(end[size:])
+        return end[:size]
+
+    def _advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
         return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)
 
     @property
@@ -129,9 +179,9 @@ class ClosedLoop:
     @cached_property
     def plant(self) -> Any:
         """CasADi Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²]."""
-        rates = [plant.x2, acceleration_expression(self.fault)]
+        rates = [plant.x2, acceleration_expression(self.fault, bool(self.factors))]
         inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p]}
-        return casadi_function("plant", inputs, {"dx": rates}, self.shaking)
+        return self.function("plant", inputs, {"dx": rates})
 
     @cached_property
     def reference(self) -> Any:
@@ -151,24 +201,73 @@ class ClosedLoop:
         pressure, rates = law_expressions(self.controller)
         return casadi_function("law", inputs, {"p": [pressure], "dxi": list(rates)})
 
+    @property
+    def known(self) -> sp.Expr:
+        """What the law adds to ν, and so to h, from what is known of the plant [unit of ν]."""
+        if not isinstance(self.controller, SlidingMode):
+            return sp.Integer(0)
+        return self.controller.feedforward.acceleration(plant.x1, plant.x2, r_acceleration)
+
     @cached_property
     def perturbation(self) -> Any:
-        """CasADi Function (t, x, reference) → h [unit of ν], mu [-]."""
+        """CasADi Function (t, x, reference) → h [unit of ν], the law's feed-forward included, and mu [-]."""
         inputs = {
             "t": [plant.t],
             "x": [plant.x1, plant.x2],
             "reference": [r, r_rate, r_acceleration],
         }
         outputs = {
-            "h": [matched_perturbation(self.fault, self.divisor)],
-            "mu": [friction_expression(self.fault)],
+            "h": [matched_perturbation(self.fault, self.divisor, bool(self.factors)) + self.known],
+            "mu": [friction_expression(self.fault, bool(self.factors))],
         }
-        return casadi_function("perturbation", inputs, outputs, self.shaking)
+        return self.function("perturbation", inputs, outputs)
+
+    @cached_property
+    def friction(self) -> Any:
+        """CasADi Function x [m, m/s] → friction coefficient [-]."""
+        law = friction_expression(self.fault, bool(self.factors))
+        return self.function("friction", {"x": [plant.x1, plant.x2]}, {"mu": [law]})
+
+    @property
+    def static_friction(self) -> Any:
+        """Friction coefficient [-] on the verge of slip; an SX with symbolic factors, else a float."""
+        value = self.friction([0, 0])
+        return value if type(value).__name__ == "SX" else float(value)
+
+    @cached_property
+    def shaken(self) -> Any:
+        """CasADi Function (t [s], x [m, m/s]) → φ̂_e [m/s²], without the push of the far end."""
+        return self.function("shaken", {"t": [plant.t], "x": [plant.x1, plant.x2]}, {"phi": [self.disturbance]})
+
+    def shear_stress(self, time: Any, state: Any, pressure: Any, friction: Any) -> Any:
+        """Shear stress τ = μ(σ' − p) [Pa] that friction sets against slip (SX)."""
+        return friction * (self.fault.effective_normal_stress - pressure)
+
+    def function(self, name: str, inputs: dict[str, list[sp.Symbol]], outputs: dict[str, list[sp.Expr]]) -> Any:
+        """CasADi Function with the disturbance inserted; with factors, a callable that has inserted those too."""
+        shaking = self.shaking if plant.t in inputs.get("t", ()) else None
+        if not self.factors:
+            return casadi_function(name, inputs, outputs, shaking)
+        whole = casadi_function(name, inputs | {"factors": list(symbols())}, outputs, shaking)
+        return lambda *arguments: whole(*arguments, _column(complete(self.factors)))
 
     @property
     def shaking(self) -> dict[sp.Symbol, sp.Expr]:
-        """φ̂_e [m/s²] in x1, x2 and t; kept apart, since a tiny constant would drown in SymPy's sum of floats."""
-        return {phi: plant.with_disturbance(plant.disturbance(plant.x1, plant.x2, plant.t), self.fault)}
+        """φ̂_e and the far end's push [m/s²] in x1, x2 and t; kept apart, since a tiny constant would drown in a sum."""
+        push = self.load.push(self.fault) * (symbol("stiffness") if self.factors else 1)
+        return {phi: self.disturbance + push}
+
+    @property
+    def disturbance(self) -> sp.Expr:
+        """φ̂_e [m/s²] of the fault and of the user, in x1, x2 and t."""
+        own = plant.with_disturbance(plant.disturbance(plant.x1, plant.x2, plant.t), self.fault)
+        return (varied_disturbance(own) if self.factors else own) + self.load.acceleration
+
+
+def _column(values: tuple[Any, ...]) -> Any:
+    import casadi as ca
+
+    return ca.vertcat(*values)
 
 
 def casadi_function(

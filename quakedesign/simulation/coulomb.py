@@ -10,7 +10,6 @@ from quakedesign.simulation.closed_loop import (
     ClosedLoop,
     Motion,
     acceleration_expression,
-    casadi_function,
     friction_expression,
 )
 from quakedesign.simulation.integrators import Integrator
@@ -44,22 +43,41 @@ class CoulombLoop(ClosedLoop):
         """CasADi Function (t [s], x [m, m/s], p [Pa], direction 1, 0 or −1) → dx [m/s, m/s²]."""
         import casadi as ca
 
-        law, numbers = friction_expression(self.fault), plant.plant_values(self.fault)
-        parts = casadi_function(
+        varied, numbers = bool(self.factors), plant.plant_values(self.fault)
+        law = friction_expression(self.fault, varied)
+        authority = float(numbers[plant.N_hat]) * (self.factors[2] if varied else 1)
+        parts = self.function(
             "parts",
             {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p]},
-            {"smooth": [acceleration_expression(self.fault)], "mu": [law, law.subs(plant.x2, sp.Abs(plant.x2))]},
-            self.shaking,
+            {
+                "smooth": [acceleration_expression(self.fault, varied)],
+                "mu": [law, law.subs(plant.x2, sp.Abs(plant.x2))],
+            },
         )
-        time, x, pressure, direction = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p"), ca.SX.sym("direction")
-        smooth, mu = parts(time, x, pressure)
-        stress = float(numbers[plant.sigma]) - pressure
-        correction = stress * mu[0] - direction * ca.fmax(stress, 0) * mu[1]
-        rates = ca.vertcat(x[1], smooth + float(numbers[plant.N_hat]) * correction)
-        signature = (["t", "x", "p", "direction"], ["dx"])
-        return ca.Function("directed", [time, x, pressure, direction], [ca.fabs(direction) * rates], *signature)
 
-    def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
+        def rates(time: Any, x: Any, pressure: Any, direction: Any) -> Any:
+            smooth, mu = parts(time, x, pressure)
+            stress = float(numbers[plant.sigma]) - pressure
+            correction = stress * mu[0] - direction * ca.fmax(stress, 0) * mu[1]
+            return ca.fabs(direction) * ca.vertcat(x[1], smooth + authority * correction)
+
+        if varied:
+            return rates
+        inputs = [ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p"), ca.SX.sym("direction")]
+        return ca.Function("directed", inputs, [rates(*inputs)], ["t", "x", "p", "direction"], ["dx"])
+
+    def shear_stress(self, time: Any, state: Any, pressure: Any, friction: Any) -> Any:
+        """Shear stress [Pa]: μ max(σ' − p, 0) against slip, or what carries the load at rest (SX)."""
+        import casadi as ca
+
+        strength = friction * ca.fmax(self.fault.effective_normal_stress - pressure, 0)
+        numbers = plant.plant_values(self.fault)
+        authority = float(numbers[plant.N_hat]) * (self.factors[2] if self.factors else 1)
+        load = self.directed(time, state[:2], pressure, 1)[1] / authority + strength
+        carried = ca.fmin(ca.fmax(load, -strength), strength)
+        return ca.if_else(state[1] == 0, carried, ca.sign(state[1]) * strength)
+
+    def _advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
         """State after one step, with at most one change between slip forward, slip backward and rest."""
         import casadi as ca
 
@@ -73,9 +91,21 @@ class CoulombLoop(ClosedLoop):
         onward = ca.if_else(rests, leaving, course.start(share, turning))
         end = course.move(onward, share, 1 - share, turning)
         recoils = onward * end[1] < 0
-        end[0] = ca.if_else(recoils, turning[0], end[0])
+        for index in (0, *range(2 + len(self.integrals), state.shape[0])):  # slip, and works where they are metered
+            end[index] = ca.if_else(recoils, turning[index], end[index])
         end[1] = ca.if_else(recoils, 0, end[1])
         return ca.if_else(changes, end, ahead)
+
+
+@dataclass(frozen=True)
+class _Field:
+    """The plant while it keeps a direction."""
+
+    directed: Any
+    direction: Any
+
+    def __call__(self, time: Any, x: Any, pressure: Any) -> Any:
+        return self.directed(time, x, pressure, self.direction)
 
 
 @dataclass(frozen=True)
@@ -89,11 +119,7 @@ class _Course:
 
     def rates(self, direction: Any, passed: Any, state: Any) -> Any:
         """Time derivative of the state while it keeps a direction."""
-
-        def field(time: Any, x: Any, pressure: Any) -> Any:
-            return self.directed(time, x, pressure, direction)
-
-        return self.motion(field, passed, state)
+        return self.motion(_Field(self.directed, direction), passed, state)
 
     def move(self, direction: Any, passed: Any, share: Any, state: Any) -> Any:
         """State after a share of the step in one direction."""

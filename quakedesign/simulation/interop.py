@@ -5,7 +5,7 @@ from typing import Any
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.simulation.closed_loop import ClosedLoop, integral_symbols, law_expressions, r, r_rate
+from quakedesign.simulation.closed_loop import ClosedLoop, integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_numpy
 
@@ -50,7 +50,8 @@ def to_iosystem(subject: Fault | Controller) -> Any:
     ----------
     subject : Fault or Controller
         A fault has the input ``p`` [Pa] and the outputs ``slip`` [m] and ``slip_rate`` [m/s]. A controller has the
-        inputs ``slip``, ``slip_rate``, ``r`` [m] and ``r_rate`` [m/s], and the output ``p``.
+        inputs ``slip``, ``slip_rate``, ``r`` [m] and ``r_rate`` [m/s], with feed-forward of it also ``r_acceleration``
+        [m/s²], and the output ``p``.
 
     Returns
     -------
@@ -88,16 +89,19 @@ def _controller_system(controller: Controller) -> Any:
 
     symbols = integral_symbols(controller)
     pressure, rates = law_expressions(controller)
+    inputs = {"slip": plant.x1, "slip_rate": plant.x2, "r": r, "r_rate": r_rate}
+    if pressure.has(r_acceleration):
+        inputs["r_acceleration"] = r_acceleration
 
     def values(expressions: Any, x: Any, u: Any) -> Any:
-        inputs = dict(zip((plant.x1, plant.x2, r, r_rate, *symbols), (*u, *x), strict=True))
-        return np.array([float(value) for value in to_numpy(expressions, inputs)])
+        given = dict(zip((*inputs.values(), *symbols), (*u, *x), strict=True))
+        return np.array([float(value) for value in to_numpy(expressions, given)])
 
     return control.NonlinearIOSystem(
         lambda t, x, u, _: values(rates, x, u),
         lambda t, x, u, _: values([pressure], x, u),
         name=controller.name,
-        inputs=["slip", "slip_rate", "r", "r_rate"],
+        inputs=list(inputs),
         outputs=["p"],
         states=[symbol.name for symbol in symbols],
     )

@@ -103,8 +103,9 @@ _UNITS = {
 
 
 def events(watched: dict[str, float]) -> dict[str, float]:
-    """Time of the first occurrence [s] of everything that happened."""
-    return {name: watched[name] for name in EVENTS if watched[name] >= 0}
+    """Time of the first occurrence [s] of everything that happened; what came after divergence means nothing."""
+    end = watched["diverged"] if watched["diverged"] >= 0 else math.inf
+    return {name: watched[name] for name in EVENTS if 0 <= watched[name] <= end}
 
 
 def metrics(

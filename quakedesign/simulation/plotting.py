@@ -35,6 +35,24 @@ def figure(run: "Trajectory") -> Any:
     return drawing
 
 
+def stress_figure(run: "Trajectory") -> Any:
+    """Return a Figure of shear stress against slip (the area under it is the work per area), and of the moment rate."""
+    from matplotlib.figure import Figure
+
+    drawing = Figure(figsize=(7, 4.5), layout="constrained")
+    above, below = drawing.subplots(2, 1)
+    slip, slip_prefix = _prefix(float(abs(run.slip).max()))
+    _panel(above, run.slip / slip, "shear stress", "Pa", run.shear_stress, None)
+    above.set_xlabel(f"slip [{slip_prefix}m]")
+    divisor, unit = next((size, name) for least, size, name in _TIMES if run.time[-1] >= least)
+    below.plot(run.time / divisor, run.moment_rate, linewidth=1)
+    below.set_ylabel("moment rate [N m/s]")
+    below.set_xlabel(f"time [{unit}]")
+    below.grid(visible=True, alpha=0.3)
+    drawing.suptitle(run.name)
+    return drawing
+
+
 def _panel(axis: Any, time: "np.ndarray", title: str, unit: str, values: Any, followed: Any) -> None:
     size, prefix = _prefix(float(abs(values).max()))
     axis.plot(time, values / size, linewidth=1, label="run")

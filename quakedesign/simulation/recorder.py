@@ -1,15 +1,18 @@
 """What is watched at every step, inside the compiled loop."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.simulation.energy import WORKS, EnergyBudget, budget
+from quakedesign.simulation.integrators import Integrator
 from quakedesign.simulation.schemes import Scheme
 
 NEVER = -1.0
 LARGEST_MOTION = 1e9
-LARGEST_STATE = 1e100
+LARGEST_STATE = 1e100  # of ξ, p and h: their squares can be summed
 
 START = {
     "max_slip_error": 0.0,
@@ -31,42 +34,57 @@ START = {
     "opening": NEVER,
     "reverse_slip": NEVER,
     "stick": NEVER,
-}
+} | dict.fromkeys(WORKS, 0.0)
 
 
 @dataclass(frozen=True)
 class Recorder:
-    """The vector [counter, settled_from, x1, x2, ξ, watched…] that one step maps onto itself.
+    """The vector [counter, settled_from, x1, x2, ξ, memory…, watched…, factors…] that one step maps onto itself.
 
     Attributes
     ----------
     loop : ClosedLoop
-    scheme : type of Scheme
+    scheme : Scheme
     step : float
         T_s [s].
     """
 
     loop: ClosedLoop
-    scheme: type[Scheme]
+    scheme: Scheme
     step: float
+
+    @cached_property
+    def memory(self) -> dict[str, float]:
+        """Memory of the scheme at the start, by name."""
+        return self.scheme.memory(self.loop, self.step)
 
     @property
     def state_size(self) -> int:
-        """Number of states of plant and law."""
-        return 2 + len(self.loop.integrals)
+        """Number of states of plant and law, and of entries of the scheme's memory."""
+        return 2 + len(self.loop.integrals) + len(self.memory)
 
     @property
     def size(self) -> int:
         """Length of the vector."""
+        return self._constants + len(self.loop.factors)
+
+    @property
+    def _constants(self) -> int:
+        """Index of the first factor: numbers of the plant that a run carries along unchanged."""
         return 2 + self.state_size + len(START)
+
+    def loop_of(self, vector: Any) -> ClosedLoop:
+        """Loop whose plant has the factors that the vector carries."""
+        return self.loop.with_factors(tuple(vector[i] for i in range(self._constants, self.size)))
 
     def start(self, settled_from: float) -> list[float]:
         """Vector at rest at time zero; `settled_from` is a time [s]."""
-        return [0.0, settled_from, *[0.0] * self.state_size, *START.values()]
+        state = [*[0.0] * (self.state_size - len(self.memory)), *self.memory.values()]
+        return [0.0, settled_from, *state, *START.values(), *self.loop.factors]
 
     def watched(self, vector: Any) -> dict[str, float]:
         """Accumulated values by name."""
-        return dict(zip(START, (float(v) for v in vector[2 + self.state_size :]), strict=True))
+        return dict(zip(START, (float(v) for v in vector[2 + self.state_size : self._constants]), strict=True))
 
     def observe(self, vector: Any) -> Any:
         """Vector (SX) after its own instant has been watched."""
@@ -74,15 +92,45 @@ class Recorder:
 
         parts = [vector[2 + self.state_size + i] for i in range(len(START))]
         before = dict(zip(START, parts, strict=True))
-        return ca.vertcat(vector[: 2 + self.state_size], *(self._after(before, vector)[name] for name in START))
+        after = self._after(before, vector)
+        return ca.vertcat(vector[: 2 + self.state_size], *(after[name] for name in START), vector[self._constants :])
+
+    def energy(self, end: Any) -> EnergyBudget:
+        """Energy budget of a run from its last vector."""
+        return budget(self.loop, self.watched(end), float(end[0]) * self.step, float(end[2]), float(end[3]))
+
+    def advance(self, vector: Any, method: type[Integrator]) -> Any:
+        """Vector (SX) after its own instant has been watched and one step has been taken."""
+        import casadi as ca
+
+        meter: list[Any] = []
+        loop = replace(self.loop_of(vector), meter=meter)
+        moved = self.scheme.advance(loop, method, vector[0], vector[2 : 2 + self.state_size], self.step)
+        first = self.index(WORKS[0])
+        done = sum(meter, start=vector[first : first + len(WORKS)])
+        return ca.cse([self.moved(vector, moved, done)])[0]
+
+    def moved(self, vector: Any, state: Any, done: Any) -> Any:
+        """Vector (SX) after its own instant has been watched, with the state and works of the next instant."""
+        import casadi as ca
+
+        watched, first = self.observe(vector), self.index(WORKS[0])
+        rest = watched[2 + self.state_size : first], done, watched[first + len(WORKS) :]
+        return ca.vertcat(vector[0] + 1, vector[1], state, *rest)
+
+    def index(self, name: str) -> int:
+        """Place of a watched value in the vector."""
+        return 2 + self.state_size + list(START).index(name)
 
     def signals(self, vector: Any) -> dict[str, Any]:
         """Every signal of the loop (SX) at the instant of the vector."""
+        loop = self.loop_of(vector)
         time, state = vector[0] * self.step, vector[2 : 2 + self.state_size]
-        reference = self.loop.reference(time)
-        h, mu = self.loop.perturbation(time, state[:2], reference)
-        pressure = self.scheme.pressure(self.loop, vector[0], state, self.step)
-        return {
+        reference = loop.reference(time)
+        h, mu = loop.perturbation(time, state[:2], reference)
+        placed = loop, vector[0], state, self.step
+        pressure = self.scheme.pressure(*placed)
+        return self.scheme.outputs(*placed) | {
             "time": time,
             "slip": state[0],
             "slip_rate": state[1],
@@ -91,6 +139,7 @@ class Recorder:
             "reference_rate": reference[1],
             "matched_perturbation": h,
             "friction": mu,
+            "shear_stress": loop.shear_stress(time, state, pressure, mu),
         }
 
     def _after(self, before: dict[str, Any], vector: Any) -> dict[str, Any]:
@@ -104,6 +153,7 @@ class Recorder:
             "rest_count": before["rest_count"] + ca.logic_and(settled, self._rests(now)),
             **_pressures(before, now, settled, later),
             **_extremes(before, now, later),
+            **{name: before[name] for name in WORKS},
             **self._events(before, now, vector),
         }
 
@@ -111,8 +161,9 @@ class Recorder:
         import casadi as ca
 
         fine = ca.logic_and(ca.fabs(now["slip"]) <= LARGEST_MOTION, ca.fabs(now["slip_rate"]) <= LARGEST_MOTION)
-        for index in range(4, 2 + self.state_size):
-            fine = ca.logic_and(fine, ca.fabs(vector[index]) <= LARGEST_STATE)
+        bounded = [vector[index] for index in range(4, 2 + self.state_size)]
+        for value in (*bounded, now["pressure"], now["matched_perturbation"]):
+            fine = ca.logic_and(fine, ca.fabs(value) <= LARGEST_STATE)
         happening = {
             "diverged": ca.logic_not(fine),
             "opening": now["pressure"] >= self.loop.fault.effective_normal_stress,

@@ -4,23 +4,33 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from quakedesign.controllers import Controller
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.simulation.backend import Backend, prepare
+from quakedesign.simulation.actuators import Actuator
+from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
+from quakedesign.simulation.backend import prepare
+from quakedesign.simulation.checkpoint import Checkpoint
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.coulomb import CoulombLoop
-from quakedesign.simulation.integrators import Integrator, integrator
+from quakedesign.simulation.integrators import AdaptiveIntegrator, Integrator, any_integrator
+from quakedesign.simulation.integrators.adaptive import FLOOR
+from quakedesign.simulation.loading import Load
+from quakedesign.simulation.measurement import Measurement
 from quakedesign.simulation.metrics import events, metrics
-from quakedesign.simulation.recorder import START, Recorder
-from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.simulation.recorder import Recorder
+from quakedesign.simulation.sampled_trajectory import SampledTrajectory
+from quakedesign.simulation.schemes import Scheme, simulation_scheme
 from quakedesign.simulation.stepping import Advancer, instants, march
 from quakedesign.simulation.trajectory import Trajectory
+from quakedesign.simulation.variation import Variation, names
 
 MOST_STEPS = 10**10
 _ALMOST_A_STEP = Fraction(1, 10**6)
@@ -31,7 +41,7 @@ def simulate(
     controller: Controller | None = None,
     *,
     step: float | None = None,
-    scheme: str = "continuous",
+    scheme: str | Scheme = "continuous",
     method: str = "dormand-prince",
     duration: float | None = None,
     samples: int = 2000,
@@ -39,6 +49,13 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
     plant: str = "smooth",
+    load: Load | None = None,
+    variation: Variation | None = None,
+    rtol: float = 1e-9,
+    checkpoint: str | Path | None = None,
+    substeps: int = 1,
+    actuator: Actuator | None = None,
+    measurement: Measurement | None = None,
 ) -> Trajectory:
     """Simulate a fault under a controller, from rest, with the fault's own disturbance and reference.
 
@@ -49,10 +66,13 @@ def simulate(
         None: no fluid is injected.
     step : float, optional
         Length of one step [s]; the fault's sampling time unless given.
-    scheme : str
-        How the law is carried out over a step; see `quakedesign.simulation.schemes`.
+    scheme : str or Scheme
+        How the law is carried out over a step, by name, or set as wanted; see `quakedesign.simulation.schemes`. All but
+        ``"continuous"`` measure and decide once per step and hold the pressure in between.
     method : str
-        Fixed-step integrator; see `quakedesign.simulation.integrators`.
+        Integrator with a fixed step, or, for smooth loops, ``"cvodes"`` or ``"idas"`` with a step of its own choice;
+        see `quakedesign.simulation.integrators`. The latter answer at every multiple of `step`, where the run is
+        watched.
     duration : float, optional
         [s]; the operation time unless given. Whole steps are taken, as many as fit.
     samples : int
@@ -67,24 +87,62 @@ def simulate(
     plant : str
         ``"smooth"``: eq. shift, which holds for slip rates that are not negative. ``"coulomb"``: friction opposes slip
         in both directions and holds the fault at rest (ERRATA 14).
+    load : Load, optional
+        Drift of the far end and a perturbation, beside the fault's own disturbance.
+    variation : Variation, optional
+        True parameters other than the nominal ones, within the fault's box. One machine code serves all variations.
+    rtol : float
+        Tolerance of ``"cvodes"`` and ``"idas"``, 1e-13 … 1e-3; a fixed step has none.
+    checkpoint : str or Path, optional
+        File that keeps the progress of a long run with a fixed step: an interrupted run goes on from it and ends with
+        the digits of an uninterrupted one, which removes it.
+    substeps : int
+        Steps of the integrator per `step`, for a named scheme that samples.
+    actuator : Actuator, optional
+        What lies between the pressure that is asked for and that in the fault, for a named scheme that samples.
+    measurement : Measurement, optional
+        Noise of what the controller sees, for a named scheme that samples.
 
     Returns
     -------
     Trajectory
+        A `SampledTrajectory`, which has the signals of the actuator too, where there is one.
         One that diverges ends there, says so in `events`, and has no metrics.
 
     Raises
     ------
     ParameterError
-        For a step, duration or number of samples that is not positive and finite, or an unknown scheme, method or
-        plant.
+        For a step, duration or number of samples that is not positive and finite, an unknown scheme, method or plant,
+        a variation outside the box, or a loop that is not smooth with a method that needs one.
     SimulationError
-        When `compiled` is True and no compiler works.
+        When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
+        cannot go on, or when the checkpoint is that of another run.
     """
     fault.require_memoryless("a controlled run")
     setting = Setting.of(fault, step, duration, samples, settled_from)
-    recorder = Recorder(loop_class(plant)(fault, controller), simulation_scheme(scheme), setting.step)
-    return run(recorder, setting, integrator(method), progress=progress, compiled=compiled)
+    if variation:
+        variation.require_within(fault)
+    factors = variation.values if variation else ()
+    loop = loop_class(plant)(fault, controller, load=load or Load(), factors=factors)
+    recorder = Recorder(loop, _scheme(scheme, substeps, actuator, measurement), setting.step)
+    chosen = any_integrator(method)
+    if issubclass(chosen, AdaptiveIntegrator):
+        return run_adaptive(recorder, setting, chosen, rtol=rtol, progress=progress, checkpoint=checkpoint)
+    return run(recorder, setting, chosen, progress=progress, compiled=compiled, checkpoint=checkpoint)
+
+
+def _scheme(scheme: str | Scheme, substeps: int, actuator: Actuator | None, measurement: Measurement | None) -> Scheme:
+    """Scheme from what `simulate` was given."""
+    settings: dict[str, Any] = {"substeps": substeps} if substeps != 1 else {}
+    settings |= {"actuator": actuator} if actuator is not None else {}
+    settings |= {"measurement": measurement} if measurement is not None else {}
+    if isinstance(scheme, str):
+        return simulation_scheme(scheme, **settings)
+    if settings:
+        raise ParameterError(
+            f"a scheme that is no name has its own {', '.join(settings)}. Received both. Set them in the scheme."
+        )
+    return scheme
 
 
 def loop_class(plant: str) -> type[ClosedLoop]:
@@ -147,39 +205,77 @@ def run(
     *,
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Trajectory:
-    """Trajectory of a recorder's loop; see `simulate`."""
+    """Trajectory of a recorder's loop with a fixed step; see `simulate`."""
     began = perf_counter()
-    step, observe, signals = _functions(recorder, method)
+    step, start = _step(recorder, method), recorder.start(setting.settled_from)
     backend = prepare(step, compiled)
     ready = perf_counter()
-    advancer = Advancer.of(backend, recorder.start(setting.settled_from))
-    diverged_at = 2 + recorder.state_size + list(START).index("diverged")
-    kept = march(advancer, instants(setting.steps, setting.samples), diverged_at, progress)
-    watched = recorder.watched(observe(kept[:, -1]).full().ravel())
-    ended = perf_counter()
+    wanted = instants(setting.steps, setting.samples)
+    file = Checkpoint.of(checkpoint, step, start, wanted) if checkpoint else None
+    kept = march(Advancer.of(backend, start), wanted, recorder.index("diverged"), progress, file)
+    told = {"backend": backend.name, "backend_reason": backend.reason}
+    return _trajectory(recorder, setting, kept, _provenance(recorder, method) | told, (began, ready))
+
+
+def run_adaptive(
+    recorder: Recorder,
+    setting: Setting,
+    method: type[AdaptiveIntegrator],
+    *,
+    rtol: float,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: str | Path | None = None,
+) -> Trajectory:
+    """Trajectory of a recorder's loop to a tolerance; see `simulate`."""
+    if checkpoint:
+        raise ParameterError(f"a checkpoint needs a fixed step. Received method {method.name}. Use dormand-prince.")
+    require_smooth(recorder, method.name)
+    began = perf_counter()
+    smooth = SmoothMarch(recorder, method, rtol)
+    kept = smooth.run(recorder.start(setting.settled_from), instants(setting.steps, setting.samples), progress)
+    told = {"backend": "sundials", "rtol": rtol, "floor": FLOOR}
+    return _trajectory(recorder, setting, kept, _provenance(recorder, method) | told, (began, began))
+
+
+def _trajectory(
+    recorder: Recorder, setting: Setting, kept: Any, provenance: dict[str, Any], began: tuple[float, float]
+) -> Trajectory:
+    """Trajectory from the kept vectors, of which those before a divergence are shown."""
+    observe, signals = _watchers(recorder)
+    end = observe(kept[:, -1]).full().ravel()
+    watched, ended = recorder.watched(end), perf_counter()
     if watched["diverged"] >= 0:
         kept = kept[:, kept[0] * setting.step < watched["diverged"]]
-    provenance = _provenance(recorder, method, backend) | {
-        "preparation_seconds": ready - began,
-        "stepping_seconds": ended - ready,
-    }
+    if not kept.size:
+        raise SimulationError(
+            "the loop must have finite values at the start. Received values that are not. Check gains and disturbance."
+        )
+    took = {"preparation_seconds": began[1] - began[0], "stepping_seconds": ended - began[1]}
+    loop = recorder.loop
     found = metrics(
         watched,
-        controlled=recorder.loop.controller is not None,
+        controlled=loop.controller is not None,
         step=setting.step,
         steps=setting.steps,
         settled_from=setting.settled_from,
-        seconds=ended - began,
-        sticks=recorder.loop.sticks,
+        seconds=ended - began[0],
+        sticks=loop.sticks,
     )
-    return Trajectory(
-        **_columns(recorder, kept, signals),
+    columns = _columns(recorder, kept, signals)
+    described = recorder.scheme.described
+    further = {name: (columns.pop(name), *said) for name, said in described.items()}
+    kind = partial(SampledTrajectory, actuation=further) if further else Trajectory
+    return kind(
+        **columns,
+        moment_per_slip=loop.fault.shear_modulus * loop.fault.area,
         metrics=found,
+        energy=None if watched["diverged"] >= 0 else recorder.energy(end),
         events=events(watched),
-        provenance=provenance,
-        integral_units=recorder.loop.controller.integral_units if recorder.loop.controller else (),
-        name=f"{recorder.loop.fault.name}, {_law_title(recorder.loop.controller)}{recorder.loop.plant_title}",
+        provenance=provenance | took,
+        integral_units=loop.controller.integral_units if loop.controller else (),
+        name=f"{loop.fault.name}, {_law_title(loop.controller)}{loop.plant_title}",
     )
 
 
@@ -187,20 +283,23 @@ def _law_title(controller: Controller | None) -> str:
     return controller.title if controller else "no control"
 
 
-def _functions(recorder: Recorder, method: type[Integrator]) -> tuple[Any, Any, Any]:
-    """CasADi functions of the vector: one step, the watching of one instant, and all signals."""
+def _step(recorder: Recorder, method: type[Integrator]) -> Any:
+    """CasADi Function of the vector: one step."""
     import casadi as ca
 
     before = ca.SX.sym("z", recorder.size)
-    watched = recorder.observe(before)
-    counter, state = before[0], before[2 : 2 + recorder.state_size]
-    moved = recorder.scheme.advance(recorder.loop, method, counter, state, recorder.step)
-    after = ca.cse([ca.vertcat(counter + 1, before[1], moved, watched[2 + recorder.state_size :])])
-    signals = recorder.signals(before)
+    return ca.Function("step", [before], [recorder.advance(before, method)])
+
+
+def _watchers(recorder: Recorder) -> tuple[Any, Any]:
+    """CasADi Functions of the vector: the watching of one instant, and all signals."""
+    import casadi as ca
+
+    vector = ca.SX.sym("z", recorder.size)
+    signals = recorder.signals(vector)
     return (
-        ca.Function("step", [before], after),
-        ca.Function("observe", [before], [watched]),
-        ca.Function("signals", [before], list(signals.values()), ["z"], list(signals)),
+        ca.Function("observe", [vector], [recorder.observe(vector)]),
+        ca.Function("signals", [vector], list(signals.values()), ["z"], list(signals)),
     )
 
 
@@ -210,21 +309,28 @@ def _columns(recorder: Recorder, kept: Any, signals: Any) -> dict[str, Any]:
     columns = {name: value.full().ravel() for name, value in zip(signals.name_out(), values, strict=True)}
     if recorder.loop.controller is None:
         columns |= dict.fromkeys(("reference", "reference_rate", "matched_perturbation"))
-    return columns | {"integrals": kept[4 : 2 + recorder.state_size]}
+    return columns | {"integrals": kept[4 : 4 + len(recorder.loop.integrals)]}
 
 
-def _provenance(recorder: Recorder, method: type[Integrator], backend: Backend) -> dict[str, Any]:
-    controller = recorder.loop.controller
-    return {
-        "fault": recorder.loop.fault.name,
-        "controller": controller.name if controller else "none",
-        "method": method.name,
-        "step": recorder.step,
-        "scheme": recorder.scheme.name,
-        "plant": recorder.loop.plant_name,
-        "backend": backend.name,
-        "backend_reason": backend.reason,
-    } | library_versions("casadi", "numpy", "quakedesign")
+def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveIntegrator]) -> dict[str, Any]:
+    controller, load = recorder.loop.controller, recorder.loop.load
+    varied = {f"variation_{name}": value for name, value in zip(names(), recorder.loop.factors, strict=False)}
+    pushed: dict[str, Any] = {"drift": load.drift} if load.drift else {}
+    pushed |= {} if load.perturbation is None else {"perturbation": str(load.perturbation)}
+    return (
+        {
+            "fault": recorder.loop.fault.name,
+            "controller": controller.name if controller else "none",
+            "method": method.name,
+            "step": recorder.step,
+            "scheme": recorder.scheme.name,
+            "plant": recorder.loop.plant_name,
+        }
+        | recorder.scheme.settings
+        | varied
+        | pushed
+        | library_versions("casadi", "numpy", "quakedesign")
+    )
 
 
 def library_versions(*packages: str) -> dict[str, str]:

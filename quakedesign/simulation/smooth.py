@@ -4,13 +4,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.simulation.integrators import adaptive_integrators
+from quakedesign.simulation.integrators.adaptive import require_tolerance
+from quakedesign.simulation.resolution import Resolution
 
 if TYPE_CHECKING:
     import numpy as np
 
 METHODS = {"dop853": "DOP853", "radau": "Radau"}
-TIGHTEST = 1e-13
-LOOSEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ class Problem:
             Return the accepted steps of the method; otherwise the values at `times`.
         method : str
             ``"dop853"`` (explicit, order 8; its interpolant of order 7 serves the instants) or ``"radau"`` (implicit,
-            order 5, for stiff problems; it stops at each instant).
+            order 5, for stiff problems; it stops at each instant), or ``"cvodes"`` or ``"idas"`` (implicit, orders 1 to
+            5; points as close as a cubic needs take the place of accepted steps).
         rtol : float
             Tolerance of one step, relative beyond `scales`.
 
@@ -71,6 +73,8 @@ class Problem:
         import numpy as np
 
         _check(method, rtol)
+        if method in adaptive_integrators():
+            return self._resolved(start, load, times, every_step=every_step, method=method, rtol=rtol)
         field, jacobian = self._bound(load)
         crossing = self._crossing()
         spans = [times] if every_step or method == "dop853" else [times[i : i + 2] for i in range(len(times) - 1)]
@@ -95,6 +99,24 @@ class Problem:
             y = part.y[:, -1]
         values = np.concatenate([v for _, v in found], axis=1)
         return Solution(np.concatenate([t for t, _ in found]), values, np.concatenate(crossed), evaluations)
+
+    def _resolved(
+        self, start: "np.ndarray", load: float, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
+    ) -> Solution:
+        import casadi as ca
+        import numpy as np
+
+        time, y, pushed = ca.SX.sym("t"), ca.SX.sym("y", self.rates.size1_in(0)), ca.SX.sym("load")
+        rates = ca.Function("rates", [time, y, pushed], [ca.densify(self.rates(y, pushed)[0])])
+        resolution = Resolution.of(adaptive_integrators()[method], rates, self.scales, (load,), rtol)
+        points, wanted = [(float(times[0]), np.array(start))], [0]
+        for end in times[1:]:
+            points += resolution.points(points[-1], float(end))
+            wanted.append(len(points) - 1)
+        crossed = np.array(resolution.crossings(points, self.watched, self.level))
+        kept = points if every_step else [points[i] for i in wanted]
+        values = np.array([value for _, value in kept]).T
+        return Solution(np.array([t for t, _ in kept]), values, crossed, len(points))
 
     def _bound(self, load: float) -> tuple[Any, Any]:
         """Field and Jacobian as functions of (t, y)."""
@@ -159,7 +181,7 @@ def _solve(*arguments: Any, **options: Any) -> Any:
 
 
 def _check(method: str, rtol: float) -> None:
-    if method not in METHODS:
-        raise ParameterError(f"method must be one of {', '.join(METHODS)}. Received {method!r}.")
-    if not TIGHTEST <= rtol <= LOOSEST:
-        raise ParameterError(f"rtol must be between {TIGHTEST} and {LOOSEST}. Received {rtol!r}.")
+    known = (*METHODS, *adaptive_integrators())
+    if method not in known:
+        raise ParameterError(f"method must be one of {', '.join(known)}. Received {method!r}.")
+    require_tolerance(rtol)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault, FrictionLaw
+from quakedesign.simulation.energy import EnergyBudget
 from quakedesign.simulation.run import library_versions
 from quakedesign.simulation.smooth import Problem, Solution
 from quakedesign.simulation.state_plants import SpringSlider
@@ -59,7 +60,8 @@ def simulate_state(
     onset_rate : float, optional
         Slip rate whose upward crossings are events [m/s]; ten times the fastest loading rate unless given.
     method : str
-        ``"radau"`` (stiff: inertia) or ``"dop853"`` (usually faster without inertia).
+        ``"radau"`` (stiff: inertia), ``"dop853"`` (usually faster without inertia), ``"cvodes"`` or ``"idas"`` (both
+        for stiff problems, as independent codes).
     rtol : float
         Tolerance of one step, for logarithms of rate and state absolute, 1e-13 … 1e-3.
 
@@ -86,7 +88,8 @@ def simulate_state(
     problem = Problem(slider.rates, _scales(slider, start), 2, math.log(level) if level > 0 else math.inf)
     history = _History(problem, pieces, _wanted(times, pieces), method, rtol)
     name = f"{subject.name if isinstance(subject, Fault) else slider.law.name}, loaded from afar"
-    return _trajectory(name, slider, history, history.run(start), level)
+    area = subject.area if isinstance(subject, Fault) else 1.0
+    return _trajectory(name, slider, history, history.run(start), level, area)
 
 
 def velocity_step(
@@ -220,15 +223,16 @@ class _History:
 
 
 def _trajectory(
-    name: str, slider: SpringSlider, history: _History, solution: Solution, level: float
+    name: str, slider: SpringSlider, history: _History, solution: Solution, level: float, area: float
 ) -> StateTrajectory:
     import numpy as np
 
+    loaded = history.load_point(solution.time)
     friction, excess = (row.full().ravel() for row in slider.readings.map(len(solution.time))(solution.values))
     return StateTrajectory(
         name=name,
         time=solution.time,
-        load_point=history.load_point(solution.time),
+        load_point=loaded,
         slip=solution.values[0],
         slip_rate=np.exp(solution.values[2]),
         stretch=solution.values[1],
@@ -239,6 +243,7 @@ def _trajectory(
         imbalance=excess / slider.normal_stress,
         onsets=solution.crossings,
         onset_rate=level,
+        energy=_energy(slider, area, loaded, solution.values, friction),
         provenance={
             "friction": slider.law.name,
             "inertia": str(slider.mass > 0),
@@ -247,4 +252,29 @@ def _trajectory(
             "evaluations": solution.evaluations,
         }
         | library_versions("scipy", "casadi", "numpy", "quakedesign"),
+    )
+
+
+def _energy(
+    slider: SpringSlider, area: float, loaded: "np.ndarray", values: "np.ndarray", friction: "np.ndarray"
+) -> EnergyBudget:
+    """Budget of an area [m²] from forces along the paths of block and load point, both resolved by the instants."""
+    import numpy as np
+
+    slip, stretch, rate = values[0], values[1], np.exp(values[2])
+
+    def gained(energy: "np.ndarray") -> float:
+        return float(area * (energy[-1] - energy[0]))
+
+    def work(force: "np.ndarray", path: "np.ndarray") -> float:
+        return float(area * np.trapezoid(force, path))
+
+    return EnergyBudget.of(
+        kinetic=gained(0.5 * slider.mass * rate**2),
+        elastic=gained(0.5 * slider.stiffness * stretch**2),
+        frictional=work(slider.normal_stress * friction, slip),
+        injection=0.0,
+        viscous=work(slider.damping * rate, slip),
+        far_field=work(slider.stiffness * stretch, loaded),
+        disturbance=0.0,
     )

@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from quakedesign.simulation.energy import EnergyBudget
+from quakedesign.simulation.recording import Recording
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -17,7 +20,7 @@ SIGNALS = {
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StateTrajectory:
+class StateTrajectory(Recording):
     """One run of a spring-slider without control.
 
     Attributes
@@ -41,6 +44,9 @@ class StateTrajectory:
         Times [s] at which the slip rate rises through `onset_rate`.
     onset_rate : float
         [m/s].
+    energy : EnergyBudget
+        [J], of the fault, or of 1 m² of a `SpringSlider`. Works are forces along the path through the instants of
+        `time`; without mass the residual is the work of `imbalance`.
     provenance : mapping
         Method, tolerance, evaluations and versions.
     """
@@ -58,6 +64,7 @@ class StateTrajectory:
     imbalance: "np.ndarray" = field(repr=False)
     onsets: "np.ndarray" = field(repr=False)
     onset_rate: float
+    energy: EnergyBudget = field(repr=False)
     provenance: Mapping[str, Any] = field(repr=False)
 
     @property
@@ -74,20 +81,6 @@ class StateTrajectory:
             found[name] = (values, f"state of friction {name}", unit)
         return found
 
-    def to_xarray(self) -> Any:
-        """Return an xarray Dataset over ``time``, with units and long names."""
-        import xarray as xr
-
-        variables = {
-            name: ("time", values, {"long_name": title, "units": unit or "1"})
-            for name, (values, title, unit) in self.signals().items()
-        }
-        time = ("time", self.time, {"long_name": "time", "units": "s"})
-        return xr.Dataset(variables, coords={"time": time}, attrs={"title": self.name, **self.provenance})
-
-    def to_pandas(self) -> Any:
-        """Return a pandas DataFrame over the time [s]; the columns carry their units."""
-        import pandas as pd
-
-        columns = {f"{name} [{unit or '-'}]": values for name, (values, _, unit) in self.signals().items()}
-        return pd.DataFrame(columns, index=pd.Index(self.time, name="time [s]"))
+    def attributes(self) -> Mapping[str, Any]:
+        """Provenance."""
+        return self.provenance

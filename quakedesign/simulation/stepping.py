@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.simulation.backend import RADIX, Backend
+from quakedesign.simulation.checkpoint import Checkpoint
 
 if TYPE_CHECKING:
     import numpy as np
@@ -69,19 +70,36 @@ def instants(steps: int, samples: int) -> list[int]:
     return [*kept, steps]
 
 
-def march(advancer: Advancer, kept: list[int], diverged_at: int, progress: ProgressReport | None) -> "np.ndarray":
+def march(
+    advancer: Advancer,
+    kept: list[int],
+    diverged_at: int,
+    progress: ProgressReport | None,
+    checkpoint: Checkpoint | None = None,
+) -> "np.ndarray":
     """Vectors at the kept instants, one a column; ends early once the entry `diverged_at` is set.
 
-    Python runs between two calls, so that the user can interrupt and sees the progress.
+    Python runs between two calls, so that the user can interrupt and sees the progress; what was kept until then is in
+    the checkpoint, if there is one, and the next march goes on from there.
     """
     import numpy as np
 
-    found = [advancer.vector.copy()]
-    for before, after in pairwise(kept):
-        advancer.advance(after - before)
-        found.append(advancer.vector.copy())
-        if progress:
-            progress(after / kept[-1])
-        if advancer.vector[diverged_at] >= 0:
-            break
+    found = (checkpoint.read() if checkpoint else []) or [advancer.vector.copy()]
+    advancer.vector[:] = found[-1]
+    try:
+        for before, after in pairwise(kept[len(found) - 1 :]):
+            if advancer.vector[diverged_at] >= 0:
+                break
+            advancer.advance(after - before)
+            found.append(advancer.vector.copy())
+            if progress:
+                progress(after / kept[-1])
+            if checkpoint:
+                checkpoint.write(found)
+    except BaseException:
+        if checkpoint:
+            checkpoint.write(found, now=True)
+        raise
+    if checkpoint:
+        checkpoint.remove()
     return np.array(found).T

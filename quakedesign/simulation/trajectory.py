@@ -1,15 +1,13 @@
 """What a simulation returns."""
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.errors import OutputError
+from quakedesign.simulation.energy import EnergyBudget
 from quakedesign.simulation.metrics import Metrics
+from quakedesign.simulation.recording import Recording
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,11 +20,13 @@ SIGNALS = {
     "reference_rate": ("reference slip rate r'", "m/s"),
     "matched_perturbation": ("matched perturbation h", "m^3 Pa/(kg s^2)"),
     "friction": ("friction coefficient", ""),
+    "shear_stress": ("shear stress that resists slip", "Pa"),
+    "moment_rate": ("seismic moment rate", "N m/s"),
 }
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Trajectory:
+class Trajectory(Recording):
     """One run, at some of its instants, with metrics from all of them.
 
     Attributes
@@ -40,10 +40,16 @@ class Trajectory:
         r [m], r' [m/s], h [unit of ν], shape (n,); None without a controller.
     friction : ndarray
         Friction coefficient [-], shape (n,).
+    shear_stress : ndarray
+        What friction sets against the load, μ(σ' − p) where the fault slips forward [Pa], shape (n,).
+    moment_per_slip : float
+        G·A [N], the seismic moment of one metre of slip.
     integrals : ndarray
         The law's own states ξ, shape (number of them, n), in `integral_units`.
     integral_units : tuple of str
     metrics : Metrics
+    energy : EnergyBudget or None
+        From all of its steps; None for a run that diverged.
     events : mapping of str to float
         Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'_n), ``reverse_slip`` (x2 < 0), ``stick``
         (friction holds the fault at rest after the start; not watched on the smooth plant).
@@ -60,9 +66,12 @@ class Trajectory:
     reference_rate: "np.ndarray | None" = field(repr=False)
     matched_perturbation: "np.ndarray | None" = field(repr=False)
     friction: "np.ndarray" = field(repr=False)
+    shear_stress: "np.ndarray" = field(repr=False)
+    moment_per_slip: float = field(repr=False)
     integrals: "np.ndarray" = field(repr=False)
     integral_units: tuple[str, ...]
     metrics: Metrics
+    energy: EnergyBudget | None = field(repr=False)
     events: Mapping[str, float]
     provenance: Mapping[str, Any] = field(repr=False)
 
@@ -76,6 +85,11 @@ class Trajectory:
         """x2 − r' [m/s]."""
         return None if self.reference_rate is None else self.slip_rate - self.reference_rate
 
+    @property
+    def moment_rate(self) -> "np.ndarray":
+        """Seismic moment rate G·A·x2 [N m/s], shape (n,)."""
+        return self.moment_per_slip * self.slip_rate
+
     def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
         """Values, long name and SI unit of every signal that this run has, by name."""
         found = {
@@ -87,25 +101,11 @@ class Trajectory:
             found[f"xi_{number}"] = (values, f"integral state xi{number}", unit)
         return found
 
-    def to_xarray(self) -> Any:
-        """Return an xarray Dataset over ``time``, with units and long names; metrics and events as JSON text."""
-        import xarray as xr
-
-        variables = {
-            name: ("time", values, {"long_name": title, "units": unit or "1"})
-            for name, (values, title, unit) in self.signals().items()
-        }
-        time = ("time", self.time, {"long_name": "time", "units": "s"})
-        attributes = {"title": self.name, **self.provenance}
-        attributes |= {"metrics": json.dumps(self.metrics.to_dict()), "events": json.dumps(dict(self.events))}
-        return xr.Dataset(variables, coords={"time": time}, attrs=attributes)
-
-    def to_pandas(self) -> Any:
-        """Return a pandas DataFrame over the time [s]; the columns carry their units."""
-        import pandas as pd
-
-        columns = {f"{name} [{unit or '-'}]": values for name, (values, _, unit) in self.signals().items()}
-        return pd.DataFrame(columns, index=pd.Index(self.time, name="time [s]"))
+    def attributes(self) -> dict[str, Any]:
+        """Provenance, and metrics, events and energy as JSON text."""
+        energy = self.energy and self.energy.to_dict()
+        told = {"metrics": self.metrics.to_dict(), "events": dict(self.events), "energy": energy}
+        return dict(self.provenance) | {name: json.dumps(value, allow_nan=False) for name, value in told.items()}
 
     @property
     def response(self) -> Any:
@@ -134,24 +134,8 @@ class Trajectory:
 
         return figure(self)
 
-    def save(self, path: str | Path) -> Path:
-        """Write the run as NetCDF, wholly or not at all.
+    def plot_stress(self) -> Any:
+        """Return a matplotlib Figure of the shear stress against slip, and of the moment rate over time."""
+        from quakedesign.simulation.plotting import stress_figure
 
-        Raises
-        ------
-        OutputError
-            When the file cannot be written.
-        """
-        target = Path(path)
-        temporary = None
-        try:
-            with NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}-", delete=False) as handle:
-                temporary = Path(handle.name)
-            self.to_xarray().to_netcdf(temporary, engine="h5netcdf")
-            os.replace(temporary, target)
-        except OSError as error:
-            raise OutputError(f"run cannot be written to {target}: {error.strerror or error}.") from None
-        finally:
-            if temporary:
-                temporary.unlink(missing_ok=True)
-        return target
+        return stress_figure(self)

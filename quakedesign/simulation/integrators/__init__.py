@@ -1,28 +1,35 @@
-"""Fixed-step integrators, one a file, found by looking into this folder."""
+"""Integrators, one a file, found by looking into this folder: with a fixed step, or with one of their own choice."""
 
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
 from quakedesign.errors import ParameterError
+from quakedesign.simulation.integrators.adaptive import AdaptiveIntegrator
 from quakedesign.simulation.integrators.base import Integrator
 
-__all__ = ["Integrator", "integrator", "integrators"]
+__all__ = ["AdaptiveIntegrator", "Integrator", "adaptive_integrators", "any_integrator", "integrator", "integrators"]
+
+
+def _found() -> list[type]:
+    modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
+    return [item for module in modules for item in vars(module).values() if isinstance(item, type)]
 
 
 @cache
 def integrators() -> dict[str, type[Integrator]]:
-    """Every integrator of the package, by name."""
-    found: dict[str, type[Integrator]] = {}
-    for info in iter_modules(__path__):
-        for item in vars(import_module(f"{__name__}.{info.name}")).values():
-            if isinstance(item, type) and issubclass(item, Integrator) and hasattr(item, "name"):
-                found[item.name] = item
-    return found
+    """Every integrator with a fixed step, by name."""
+    return {item.name: item for item in _found() if issubclass(item, Integrator) and hasattr(item, "name")}
+
+
+@cache
+def adaptive_integrators() -> dict[str, type[AdaptiveIntegrator]]:
+    """Every integrator with a step of its own choice, by name."""
+    return {item.name: item for item in _found() if issubclass(item, AdaptiveIntegrator) and hasattr(item, "name")}
 
 
 def integrator(name: str) -> type[Integrator]:
-    """Integrator of a given name.
+    """Integrator with a fixed step of a given name.
 
     Raises
     ------
@@ -32,3 +39,20 @@ def integrator(name: str) -> type[Integrator]:
     if name not in integrators():
         raise ParameterError(f"method must be one of {', '.join(sorted(integrators()))}. Received {name!r}.")
     return integrators()[name]
+
+
+def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
+    """Integrator of a given name, of either kind.
+
+    Raises
+    ------
+    ParameterError
+        When there is none.
+    """
+    known = integrators() | adaptive_integrators()
+    if name not in known:
+        raise ParameterError(
+            f"method must be one of {', '.join(sorted(integrators()))} (fixed step) or "
+            f"{', '.join(sorted(adaptive_integrators()))} (to a tolerance, smooth loops). Received {name!r}."
+        )
+    return known[name]

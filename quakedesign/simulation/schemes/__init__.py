@@ -1,8 +1,10 @@
 """Ways to carry a law out over a step, one a file, found by looking into this folder."""
 
+from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any
 
 from quakedesign.errors import ParameterError
 from quakedesign.simulation.schemes.base import Scheme
@@ -21,14 +23,21 @@ def schemes() -> dict[str, type[Scheme]]:
     return found
 
 
-def simulation_scheme(name: str) -> type[Scheme]:
-    """Scheme of a given name.
+def simulation_scheme(name: str, **settings: Any) -> Scheme:
+    """Scheme of a given name, with settings other than its own defaults.
 
     Raises
     ------
     ParameterError
-        When there is none.
+        When there is none, or it does not have one of the settings.
     """
     if name not in schemes():
         raise ParameterError(f"scheme must be one of {', '.join(sorted(schemes()))}. Received {name!r}.")
-    return schemes()[name]
+    kind = schemes()[name]
+    known: set[str] = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
+    for setting in settings.keys() - known:
+        raise ParameterError(
+            f"the scheme {name} has {', '.join(sorted(known)) or 'no settings'}. Received {setting}. "
+            "Use another scheme, or leave it out."
+        )
+    return kind(**settings)

@@ -15,19 +15,25 @@ class Continuous(Scheme):
 
     name: ClassVar[str] = "continuous"
 
-    @classmethod
-    def pressure(cls, loop: ClosedLoop, counter: Any, state: Any, step: float) -> Any:
+    def pressure(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> Any:
         """Pressure [Pa] that the law asks for now."""
         return loop.law(state[:2], state[2:], loop.reference(counter * step))[0]
 
-    @classmethod
-    def advance(cls, loop: ClosedLoop, method: type[Integrator], counter: Any, state: Any, step: float) -> Any:
+    def advance(self, loop: ClosedLoop, method: type[Integrator], counter: Any, state: Any, step: float) -> Any:
         """State after one step of the integrator on plant and law together."""
-        import casadi as ca
 
         def motion(plant: Any, passed: Any, now: Any) -> Any:
-            time = (counter + passed) * step
-            pressure, integral_rates = loop.law(now[:2], now[2:], loop.reference(time))
-            return ca.vertcat(plant(time, now[:2], pressure), integral_rates)
+            return self._motion(loop, plant, (counter + passed) * step, now)
 
         return loop.advance(method, motion, state, step)
+
+    def rates(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> Any:
+        """Time derivative of the state; None where friction is set-valued."""
+        return None if loop.sticks else self._motion(loop, loop.plant, counter * step, state)
+
+    @staticmethod
+    def _motion(loop: ClosedLoop, plant: Any, time: Any, now: Any) -> Any:
+        import casadi as ca
+
+        pressure, integral_rates = loop.law(now[:2], now[2:], loop.reference(time))
+        return ca.vertcat(plant(time, now[:2], pressure), integral_rates)

@@ -1,0 +1,104 @@
+"""Text of the C files of an exported controller."""
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from quakedesign.simulation.export import ControllerStep
+
+_WIDTH = 110
+_USE = """
+Call controller_reset once, and controller_step every CONTROLLER_STEP seconds: it reads CONTROLLER_MEASUREMENTS
+numbers, updates CONTROLLER_MEMORY numbers, and writes the fluid pressure [Pa] to hold until the next call (zero-order
+hold). The reference of the fault is computed from the number of calls. The functions keep nothing between calls but the
+memory they are given, allocate nothing, and may be called from several threads with different memories. Numbers that
+are not finite are not caught: check measurement and pressure.
+"""
+_COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and link with -lm."
+_BODY = """
+#include "{header}"
+
+void controller_reset(double* memory) {{
+  static const double start[CONTROLLER_MEMORY] = {{
+{start}
+  }};
+  int i;
+  for (i = 0; i < CONTROLLER_MEMORY; ++i) memory[i] = start[i];
+}}
+
+void controller_step(const double* measurement, double* memory, double* pressure) {{
+  const double* arguments[{arguments}] = {{measurement, memory}};
+  double after[CONTROLLER_MEMORY];
+  double* results[{results}] = {{after, pressure}};
+  casadi_int integers[{integers}];
+  double work[{work}];
+  int i;
+  sampled_step(arguments, results, integers, work, 0);
+  for (i = 0; i < CONTROLLER_MEMORY; ++i) memory[i] = after[i];
+}}
+"""
+_HEADER = """#ifndef CONTROLLER_H
+#define CONTROLLER_H
+
+#define CONTROLLER_STEP {step!r} /* s */
+#define CONTROLLER_MEASUREMENTS {measurements}
+#define CONTROLLER_MEMORY {memory}
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+/* Memory before the first call. */
+void controller_reset(double* memory);
+
+/* One sample: measurement in, memory updated, pressure [Pa] out. */
+void controller_step(const double* measurement, double* memory, double* pressure);
+
+#ifdef __cplusplus
+}}
+#endif
+
+#endif
+"""
+
+
+def header_text(found: "ControllerStep") -> str:
+    """Header with the meaning of every number."""
+    measured = (f"measurement[{i}]: {name} [{unit}]" for i, (name, unit) in enumerate(found.measurement.items()))
+    kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(found.start.items()))
+    facts = (f"{name}: {value}" for name, value in found.facts.items())
+    lines = ["A sampled controller for a fault, in SI units.", "", *_wrapped(_USE), "", _COMPILE, "", *measured, *kept]
+    comment = _comment([*lines, "", "Where it comes from:", *facts])
+    sizes = {"step": found.step, "measurements": len(found.measurement), "memory": len(found.start)}
+    return comment + _HEADER.format(**sizes)
+
+
+def source_text(found: "ControllerStep", header: str) -> str:
+    """CasADi's C for the step, followed by the two functions of the header."""
+    import casadi as ca
+
+    generator = ca.CodeGenerator("sampled_step.c", {"with_export": False})
+    generator.add(found.function)
+    start = ",\n".join(f"    {value!r}" for value in found.start.values())
+    return generator.dump() + _BODY.format(header=header, start=start, **_sizes(found.function))
+
+
+def _sizes(function: Any) -> dict[str, int]:
+    sizes = {
+        "arguments": function.sz_arg(),
+        "results": function.sz_res(),
+        "integers": function.sz_iw(),
+        "work": function.sz_w(),
+    }
+    return {name: max(1, size) for name, size in sizes.items()}
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(" ".join(text.split()), _WIDTH)
+
+
+def _comment(lines: list[str]) -> str:
+    """Lines in one comment of C, which no text of the user can end."""
+    wrapped = [part for line in lines for part in (textwrap.wrap(" ".join(line.split()), _WIDTH) or [""])]
+    safe = "\n".join(f" * {line}".rstrip() for line in wrapped).replace("*/", "* /")
+    return "/*\n" + safe + "\n */\n"

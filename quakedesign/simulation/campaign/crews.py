@@ -1,0 +1,178 @@
+"""Who computes the batches: processes on this machine, a cluster, or any executor of `concurrent.futures`."""
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from multiprocessing import get_context
+from types import TracebackType
+from typing import Any, Self
+
+from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.simulation.campaign.worker import enlist
+
+_PATIENCE = "10s"
+
+
+class SerialExecutor(Executor):
+    """Runs everything at once in the calling process."""
+
+    def submit(self, task: Callable[..., Any], /, *arguments: Any, **named: Any) -> "Future[Any]":
+        """Future that is done already."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(task(*arguments, **named))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+class Crew(ABC):
+    """Workers behind an executor, which a context opens and closes."""
+
+    @property
+    @abstractmethod
+    def width(self) -> int:
+        """Number of batches that are worth having under way at once."""
+
+    @abstractmethod
+    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Start a task."""
+
+    @abstractmethod
+    def renew(self) -> None:
+        """Replace workers that are dead.
+
+        Raises
+        ------
+        SimulationError
+            When that is not possible.
+        """
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        return None
+
+
+class Processes(Crew):
+    """A pool of processes on this machine, each started afresh; it is filled again after a death.
+
+    Parameters
+    ----------
+    count : int or None
+        One process per core that this process may use, unless given.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    def __init__(self, count: int | None = None) -> None:
+        if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
+            raise ParameterError(f"workers must be a whole number of at least 1. Received {count!r}.")
+        self._count = count or cores()
+        self._context = get_context("spawn")
+        self._stop = self._context.Event()
+        self._pool: Executor = self._filled()
+
+    def _filled(self) -> Executor:
+        return ProcessPoolExecutor(self._count, self._context, enlist, (self._stop,))
+
+    @property
+    def width(self) -> int:
+        """See `Crew.width`."""
+        return self._count
+
+    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """See `Crew.submit`."""
+        return self._pool.submit(task, *arguments)
+
+    def renew(self) -> None:
+        """See `Crew.renew`."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._pool = self._filled()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is not None:
+            self._stop.set()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+class Given(Crew):
+    """An executor of the user's, who opens and closes it.
+
+    Parameters
+    ----------
+    executor : Executor
+    width : int or None
+        One batch per core, unless given.
+    """
+
+    def __init__(self, executor: Executor, width: int | None = None) -> None:
+        self._executor = executor
+        self._width = width or cores()
+
+    @property
+    def width(self) -> int:
+        """See `Crew.width`."""
+        return self._width
+
+    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """See `Crew.submit`."""
+        return self._executor.submit(task, *arguments)
+
+    def renew(self) -> None:
+        """See `Crew.renew`."""
+        raise SimulationError(
+            "the executor must keep its workers. Received a broken one. Run the campaign again, with a new executor: "
+            "it goes on from the files."
+        )
+
+
+class Cluster(Given):
+    """A dask.distributed cluster, whose scheduler replaces dead workers by itself.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, such as ``tcp://host:8786``. Its workers need quakedesign, in the same version.
+
+    Raises
+    ------
+    SimulationError
+        When dask.distributed is not installed or the scheduler cannot be reached.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            from distributed import Client
+
+            self._client = Client(address, timeout=_PATIENCE, set_as_default=False)
+        except (ImportError, OSError, ValueError) as error:
+            said = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise SimulationError(
+                f"a scheduler must answer at {address!r}. {said}. Start one with 'dask scheduler', or leave it out."
+            ) from None
+        super().__init__(self._client.get_executor(pure=False))
+
+    @property
+    def width(self) -> int:
+        """Twice the number of threads that the cluster has now, so that none waits for the next batch."""
+        return 2 * max(1, sum(self._client.nthreads().values()))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._executor.shutdown(wait=False)
+        self._client.close()
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,166 @@
+"""Folder of a campaign: what it is about, and one file for each batch that is done, written whole."""
+
+import hashlib
+import json
+import math
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
+
+from quakedesign.errors import OutputError, SimulationError
+from quakedesign.output import write_whole
+
+if TYPE_CHECKING:
+    import numpy as np
+
+MANIFEST, BATCHES = "campaign.json", "batches"
+
+
+def plain(value: Any) -> Any:
+    """Value as JSON can hold it, types of dataclasses included; texts for what JSON does not know."""
+    if is_dataclass(value) and not isinstance(value, type):
+        named = {field.name: plain(getattr(value, field.name)) for field in fields(value) if field.compare}
+        return {"type": type(value).__name__} | named
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, bool | int | float | str) else _text(value)
+
+
+def _text(value: Any) -> str:
+    """Text of a value that has one, else the name of its type: never an address in memory."""
+    kind = value if isinstance(value, type) else type(value)
+    speaks = kind.__str__ is not object.__str__ or kind.__repr__ is not object.__repr__
+    return str(value) if speaks and not isinstance(value, type) else kind.__name__
+
+
+def differences(one: Any, other: Any, name: str = "") -> list[str]:
+    """Names of the entries in which two plain values differ, nested ones with dots."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        keys = [*one, *(key for key in other if key not in one)]
+        found = (differences(one.get(key), other.get(key), f"{name}.{key}".strip(".")) for key in keys)
+        return [entry for part in found for entry in part]
+    return [] if one == other else [name]
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Answers of a campaign on disk: the vector at the end of a sample, by the vector at its start.
+
+    Attributes
+    ----------
+    folder : Path
+    fingerprint : str
+        Of everything that the campaign is about.
+    """
+
+    folder: Path
+    fingerprint: str
+
+    @classmethod
+    def open(cls, folder: Path, inputs: Mapping[str, Any], *, renew: bool = False) -> "Ledger":
+        """Folder of a new campaign, or of this one if it was begun before.
+
+        Parameters
+        ----------
+        folder : Path
+        inputs : mapping
+            Everything that determines the digits of every sample, as `plain` gives it.
+        renew : bool
+            Delete another campaign that the folder holds.
+
+        Raises
+        ------
+        OutputError
+            When the folder holds something else, or cannot be written.
+        SimulationError
+            When it holds another campaign.
+        """
+        text = json.dumps(inputs, indent=1, sort_keys=True, allow_nan=False)
+        ledger = cls(folder, hashlib.sha256(text.encode()).hexdigest())
+        if renew and (folder / MANIFEST).is_file():
+            ledger._clear()
+        if (folder / MANIFEST).exists():
+            ledger._require_same(json.loads(text))
+        elif folder.exists() and any(folder.iterdir()):
+            raise OutputError(
+                f"the folder of a campaign must be new, empty, or that of this campaign. Received {folder}, "
+                "which holds something else. Choose another one."
+            )
+        ledger._create()
+        write_whole(folder / MANIFEST, text + "\n")
+        return ledger
+
+    def _create(self) -> None:
+        try:
+            (self.folder / BATCHES).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{self.folder} cannot be written: {error.strerror}. Choose another folder.") from None
+
+    def _clear(self) -> None:
+        shutil.rmtree(self.folder / BATCHES, ignore_errors=True)
+        for path in self.folder.glob("steps-*.so"):
+            path.unlink(missing_ok=True)
+        (self.folder / MANIFEST).unlink()
+
+    def _require_same(self, inputs: Any) -> None:
+        try:
+            held = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            held = None
+        changed = differences(held, inputs)
+        if changed:
+            raise SimulationError(
+                f"the campaign in {self.folder} must be this one to go on. Received one that differs in "
+                f"{', '.join(filter(None, changed)) or 'everything'}. Choose another folder, or replace it by force."
+            )
+
+    def read(self) -> "dict[bytes, np.ndarray]":
+        """Vectors at the end by the bytes of those at the start; files that are not whole are passed over.
+
+        Raises
+        ------
+        SimulationError
+            When there is a file of another campaign.
+        """
+        found: dict[bytes, np.ndarray] = {}
+        for path in sorted((self.folder / BATCHES).glob("[!.]*.npz")):
+            for start, end in self._pairs(path):
+                found[start.tobytes()] = end
+        return found
+
+    def _pairs(self, path: Path) -> "list[tuple[np.ndarray, np.ndarray]]":
+        import numpy as np
+
+        try:
+            with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as held:
+                fingerprint, starts, ends = str(held["fingerprint"]), held["starts"], held["ends"]
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+            return []
+        if fingerprint != self.fingerprint:
+            raise SimulationError(
+                f"{path} must be a batch of this campaign. Received one of another campaign. Take it away."
+            )
+        return list(zip(starts, ends, strict=True))
+
+    def add(self, starts: "np.ndarray", ends: "np.ndarray") -> None:
+        """Write a batch, one sample a row.
+
+        Raises
+        ------
+        OutputError
+            When it cannot be written.
+        """
+        import numpy as np
+
+        content = BytesIO()
+        np.savez(content, fingerprint=np.array(self.fingerprint), starts=starts, ends=ends)
+        name = hashlib.sha256(np.ascontiguousarray(starts).tobytes()).hexdigest()[:16]
+        write_whole(self.folder / BATCHES / f"{name}.npz", content.getvalue())

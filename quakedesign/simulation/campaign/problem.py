@@ -1,0 +1,198 @@
+"""What a campaign is about: one closed loop, and how its samples differ."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.controllers import Controller
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.simulation.campaign.ledger import plain
+from quakedesign.simulation.campaign.program import STEP, Program
+from quakedesign.simulation.campaign.reseeding import reseeded
+from quakedesign.simulation.campaign.space import MOST_SAMPLES, Sample, Space, noise_seed, point
+from quakedesign.simulation.energy import WORKS, EnergyBudget, budget
+from quakedesign.simulation.integrators import Integrator
+from quakedesign.simulation.loading import Load
+from quakedesign.simulation.metrics import events, metrics
+from quakedesign.simulation.recorder import Recorder
+from quakedesign.simulation.run import Setting, library_versions, loop_class, run
+from quakedesign.simulation.schemes import Scheme
+from quakedesign.simulation.trajectory import Trajectory
+from quakedesign.simulation.variation import Variation
+
+if TYPE_CHECKING:
+    import numpy as np
+
+_NOT_COMPARED = ("settled_from", "steps", "seconds")
+
+
+@dataclass(frozen=True)
+class ReleasedRecorder(Recorder):
+    """A recorder whose loop does not start from rest.
+
+    Attributes
+    ----------
+    loop, scheme, step
+        As in `Recorder`.
+    initial : tuple of float
+        x1 [m] and x2 [m/s] at the start.
+    """
+
+    initial: tuple[float, float] = (0.0, 0.0)
+
+    def start(self, settled_from: float) -> list[float]:
+        """Vector at time zero; `settled_from` is a time [s]."""
+        vector = super().start(settled_from)
+        vector[2:4] = self.initial
+        return vector
+
+    def energy(self, end: Any) -> EnergyBudget:
+        """Energy budget of a run from its last vector: that from rest, less what it took to get to the start."""
+        whole = super().energy(end).to_dict()
+        before = budget(self.loop, dict.fromkeys(WORKS, 0.0), 0.0, *self.initial).to_dict()
+        return EnergyBudget.of(**{name: whole[name] - before[name] for name in whole if name != "residual"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What is known of a sample that has been run; a diverged one has events, but no figures.
+
+    Attributes
+    ----------
+    figures : mapping of str to float
+        Metrics of the run, those of its length excepted.
+    events : mapping of str to float
+        Time of first occurrence [s].
+    """
+
+    figures: Mapping[str, float]
+    events: Mapping[str, float]
+
+    @property
+    def diverged(self) -> bool:
+        """Whether the run has ended early."""
+        return "diverged" in self.events
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """One closed loop, and how its samples differ.
+
+    Attributes
+    ----------
+    fault : Fault
+    controller : Controller or None
+    scheme : Scheme
+    setting : Setting
+    method : type of Integrator
+    plant : str
+    load : Load
+    space : Space
+    seed : int
+    """
+
+    fault: Fault
+    controller: Controller | None
+    scheme: Scheme
+    setting: Setting
+    method: type[Integrator]
+    plant: str
+    load: Load
+    space: Space
+    seed: int
+
+    def __post_init__(self) -> None:
+        self.fault.require_memoryless("a campaign")
+
+    def point(self, index: int) -> "np.ndarray":
+        """Place of sample number `index` in the unit cube."""
+        return point(self.seed, index, len(self.space.ranges))
+
+    def sample(self, index: int) -> Sample:
+        """Sample number `index`, a function of the seed and of `index` alone.
+
+        Raises
+        ------
+        ParameterError
+            When it is no whole number, or too large.
+        """
+        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < MOST_SAMPLES:
+            raise ParameterError(f"index must be a whole number, 0 to {MOST_SAMPLES - 1}. Received {index!r}.")
+        return self.space.sample(self.point(index), noise_seed(self.seed, index))
+
+    def recorder(self, sample: Sample) -> ReleasedRecorder:
+        """Loop of a sample with all that is watched."""
+        initial = sample.initial_slip, sample.initial_slip_rate
+        scheme = reseeded(self.scheme, sample.noise_seed)
+        return ReleasedRecorder(self._loop(sample.variation), scheme, self.setting.step, initial)
+
+    def start(self, sample: Sample) -> "np.ndarray":
+        """Vector of a sample at time zero."""
+        import numpy as np
+
+        return np.array(self.recorder(sample).start(self.setting.settled_from))
+
+    def _loop(self, variation: Variation) -> Any:
+        kind = loop_class(self.plant)
+        return kind(self.fault, self.controller, load=self.load, factors=variation.values)
+
+    @cached_property
+    def _watched(self) -> Recorder:
+        """Recorder of any sample: what it computes from a vector is the same for all."""
+        return self.recorder(self.sample(0))
+
+    @cached_property
+    def program(self) -> Program:
+        """One step for all samples."""
+        import casadi as ca
+
+        before = ca.SX.sym("z", self._watched.size)
+        step = ca.Function(STEP, [before], [self._watched.advance(before, self.method)])
+        return Program.of(step, self._watched.index("diverged"))
+
+    @cached_property
+    def inputs(self) -> dict[str, Any]:
+        """Everything that determines the digits of every sample, as JSON can hold it."""
+        law = {"law": self.controller.name} | plain(self.controller) if self.controller else None
+        named = {"name": self.scheme.name} | plain(self.scheme.settings)
+        return {
+            "fault": plain(self.fault) | {"friction": {"law": self.fault.friction.name} | plain(self.fault.friction)},
+            "controller": law,
+            "scheme": named | {"as_set": plain(self.scheme)},
+            "setting": plain({name: value for name, value in asdict(self.setting).items() if name != "samples"}),
+            "method": self.method.name,
+            "plant": self.plant,
+            "load": plain(self.load),
+            "ranges": plain(self.space.ranges),
+            "seed": self.seed,
+            "arithmetic": self.program.fingerprint,
+            "versions": library_versions("quakedesign", "casadi", "numpy", "scipy", "sympy"),
+        }
+
+    def outcomes(self, ends: "Sequence[np.ndarray]") -> list[Outcome]:
+        """What the vectors at the end tell."""
+        import casadi as ca
+
+        vector = ca.SX.sym("z", self._watched.size)
+        observe = ca.Function("observe", [vector], [self._watched.observe(vector)])
+        return [self._outcome(observe(end).full().ravel()) for end in ends]
+
+    def _outcome(self, end: Any) -> Outcome:
+        watched = self._watched.watched(end)
+        found = metrics(
+            watched,
+            controlled=self.controller is not None,
+            step=self.setting.step,
+            steps=self.setting.steps,
+            settled_from=self.setting.settled_from,
+            seconds=0.0,
+            sticks=self._watched.loop.sticks,
+        ).to_dict()
+        figures = {name: value for name, value in found.items() if value is not None and name not in _NOT_COMPARED}
+        return Outcome(figures=figures, events=events(watched))
+
+    def trajectory(self, sample: Sample, samples: int) -> Trajectory:
+        """Run of a sample with about that many instants, with the digits that it has in the campaign."""
+        return run(self.recorder(sample), replace(self.setting, samples=samples), self.method)

@@ -1,0 +1,165 @@
+"""One step of a loop as text, and the compiled call that repeats it for many samples."""
+
+import ctypes
+import hashlib
+import platform
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.output import write_whole
+from quakedesign.simulation.backend import FLAGS, Backend, compiler, ladder, shared_library
+from quakedesign.simulation.stepping import Advancer
+
+if TYPE_CHECKING:
+    import numpy as np
+
+Mover = Callable[["np.ndarray", int], None]
+
+STEP = "quakedesign_sample_step"  # no function of the C library may have this name
+# Every sample moves on until its steps are taken or it diverges; the vectors of one sample lie side by side.
+_LOOP = """
+CASADI_SYMBOL_EXPORT int advance_samples(double* vectors, long long samples, long long steps) {{
+  double first[{size}], second[{size}], work[{work}];
+  casadi_int integers[{integers}];
+  const double* arguments[{arguments}];
+  double* results[{results}];
+  long long sample, taken;
+  int i;
+  for (sample = 0; sample < samples; ++sample) {{
+    double* vector = vectors + sample * {size};
+    double *now = first, *next = second, *other;
+    for (i = 0; i < {size}; ++i) now[i] = vector[i];
+    for (taken = 0; taken < steps && !(now[{diverged}] >= 0); ++taken) {{
+      arguments[0] = now;
+      results[0] = next;
+      if ({step}(arguments, results, integers, work, 0)) return 1;
+      other = now;
+      now = next;
+      next = other;
+    }}
+    for (i = 0; i < {size}; ++i) vector[i] = now[i];
+  }}
+  return 0;
+}}
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Program:
+    """What a worker needs to move samples on; it can be sent anywhere.
+
+    Attributes
+    ----------
+    source : str
+        C text with ``advance_samples``.
+    function : str
+        The step as CasADi writes it, for workers without a C compiler.
+    size : int
+        Length of the vector of one sample.
+    diverged : int
+        Index of the time of divergence in it.
+    library : str or None
+        Path of the compiled source, where somebody has compiled it already.
+    """
+
+    source: str
+    function: str
+    size: int
+    diverged: int
+    library: str | None = None
+
+    @classmethod
+    def of(cls, step: Any, diverged: int) -> "Program":
+        """Program of a CasADi Function that maps the vector one step on."""
+        import casadi as ca
+
+        generator = ca.CodeGenerator("steps.c")
+        generator.add(step)
+        sizes = {
+            "step": step.name(),
+            "size": step.size1_in(0),
+            "diverged": diverged,
+            "work": max(1, step.sz_w()),
+            "integers": max(1, step.sz_iw()),
+            "arguments": max(1, step.sz_arg()),
+            "results": max(1, step.sz_res()),
+        }
+        source = generator.dump() + _LOOP.format(**sizes)
+        return cls(source=source, function=step.serialize(), size=step.size1_in(0), diverged=diverged)
+
+    @property
+    def fingerprint(self) -> str:
+        """Digest of the arithmetic of one step."""
+        return hashlib.sha256(self.function.encode()).hexdigest()
+
+    def compiled(self, folder: Path) -> "Program":
+        """Program whose library lies in a folder; the same program where no compiler works."""
+        try:
+            command = compiler()
+            told = "\n".join((self.source, *command, *FLAGS, platform.machine(), platform.system()))
+            library = folder / f"steps-{hashlib.sha256(told.encode()).hexdigest()[:16]}.so"
+            if not library.exists():
+                with TemporaryDirectory(prefix="quakedesign-", ignore_cleanup_errors=True) as scratch:
+                    write_whole(library, shared_library(self.source, Path(scratch), command).read_bytes())
+            return replace(self, library=str(library.absolute()))
+        except (OSError, subprocess.SubprocessError):
+            return self
+
+
+@lru_cache(maxsize=8)
+def mover(program: Program) -> Mover:
+    """Callable (vectors, steps) that moves vectors, one a row, on in place: machine code where it can be had."""
+    with TemporaryDirectory(prefix="quakedesign-", ignore_cleanup_errors=True) as scratch:
+        for found in (lambda: program.library, lambda: program.compiled(Path(scratch)).library):
+            try:
+                if library := found():
+                    return _machine_code(library, program.size)
+            except (OSError, AttributeError):
+                continue
+    return _virtual_machine(program)
+
+
+def _machine_code(library: str, size: int) -> Mover:
+    import numpy as np
+
+    advance = ctypes.CDLL(library).advance_samples
+    rows = np.ctypeslib.ndpointer(dtype=np.float64, ndim=2, flags="C_CONTIGUOUS")
+    advance.argtypes, advance.restype = [rows, ctypes.c_longlong, ctypes.c_longlong], ctypes.c_int
+
+    def move(vectors: "np.ndarray", steps: int) -> None:
+        assert vectors.shape[1] == size
+        if advance(vectors, len(vectors), steps):
+            raise ArithmeticError("the compiled step failed")
+
+    return move
+
+
+def _virtual_machine(program: Program) -> Mover:
+    import casadi as ca
+
+    rungs = ladder(ca.Function.deserialize(program.function))
+    advancer = Advancer.of(Backend(rungs, "virtual-machine", ""), [0.0] * program.size)
+
+    def move(vectors: "np.ndarray", steps: int) -> None:
+        for row in vectors:
+            if row[program.diverged] >= 0:
+                continue
+            advancer.vector[:] = row
+            advancer.advance(steps)
+            if advancer.vector[program.diverged] >= 0:
+                _to_divergence(advancer, row, program.diverged)
+            row[:] = advancer.vector
+
+    return move
+
+
+def _to_divergence(advancer: Advancer, start: "np.ndarray", diverged: int) -> None:
+    """Again from the start, step by step, to the one at which divergence is noticed, as in machine code."""
+    advancer.vector[:] = start
+    while not advancer.vector[diverged] >= 0:
+        advancer.advance(1)

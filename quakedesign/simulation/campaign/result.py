@@ -1,0 +1,205 @@
+"""What a campaign returns: quantiles, the worst samples, and every sample again by its index."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.errors import ParameterError
+from quakedesign.simulation.campaign.problem import Outcome, Problem
+from quakedesign.simulation.campaign.search import Worst
+from quakedesign.simulation.campaign.space import UNITS
+from quakedesign.simulation.metrics import EVENTS, StickMetrics
+from quakedesign.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import numpy as np
+
+LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+SHOWN = 5
+_LESS_IS_WORSE = frozenset({"min_pressure"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """A batch that could not be computed; a run that diverges is a result, not a failure.
+
+    Attributes
+    ----------
+    samples : tuple of str
+        Indices of its samples, those of the search as ``search-0``.
+    reason : str
+    """
+
+    samples: tuple[str, ...]
+    reason: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Campaign:
+    """Many runs of one closed loop.
+
+    Attributes
+    ----------
+    problem : Problem
+    outcomes : tuple of Outcome or None
+        By index; None for a sample of a batch that failed.
+    failures : tuple of Failure
+    resumed : int
+        Number of samples whose outcome was found in the folder.
+    search : Worst or None
+    seconds : float
+        Time that this call took [s].
+    """
+
+    problem: Problem = field(repr=False)
+    outcomes: tuple[Outcome | None, ...] = field(repr=False)
+    failures: tuple[Failure, ...] = ()
+    resumed: int = 0
+    search: Worst | None = None
+    seconds: float = 0.0
+
+    @cached_property
+    def metrics(self) -> tuple[str, ...]:
+        """Names of the metrics that the samples have."""
+        return metric_names([outcome for outcome in self.outcomes if outcome])
+
+    def values(self, metric: str) -> "np.ndarray":
+        """One metric of all samples, shape (samples,): infinite for a diverged one, nan for one that failed.
+
+        Raises
+        ------
+        ParameterError
+            When the samples have no such metric.
+        """
+        import numpy as np
+
+        require_metric(metric, self.metrics)
+        return np.array([math.nan if outcome is None else badness(outcome, metric) for outcome in self.outcomes]) * (
+            -1 if metric in _LESS_IS_WORSE else 1
+        )
+
+    def quantiles(self, levels: Sequence[float] = LEVELS) -> dict[str, dict[str, float | None]]:
+        """Quantiles of every metric over the samples that did not fail, by level; None where they diverge.
+
+        A quantile is the value of a sample (inverse of the distribution function), and of `min_pressure`, where less is
+        worse, it is taken from above, so that high levels are bad throughout.
+        """
+        return {metric: self._quantiles(metric, levels) for metric in self.metrics}
+
+    def _quantiles(self, metric: str, levels: Sequence[float]) -> dict[str, float | None]:
+        way = -1 if metric in _LESS_IS_WORSE else 1
+        found = sorted(way * value for value in self.values(metric).tolist() if not math.isnan(value))
+        places = {level: min(len(found) - 1, max(0, math.ceil(level * len(found)) - 1)) for level in levels}
+        return {f"{level:g}": _finite(way * found[place]) for level, place in places.items()}
+
+    def worst(self, metric: str, count: int = SHOWN) -> list[int]:
+        """Indices of the worst samples by one metric, the worst first, diverged ones before all others."""
+        way = -1 if metric in _LESS_IS_WORSE else 1
+        known = [(-way * value, i) for i, value in enumerate(self.values(metric).tolist()) if not math.isnan(value)]
+        return [i for _, i in sorted(known)[:count]]
+
+    @cached_property
+    def events(self) -> dict[str, list[int]]:
+        """Indices of the samples in which something happened, by what."""
+        pairs = [(i, outcome) for i, outcome in enumerate(self.outcomes) if outcome]
+        return {name: [i for i, outcome in pairs if name in outcome.events] for name in EVENTS}
+
+    def trajectory(self, index: int | str, samples: int = 2000) -> Trajectory:
+        """Run one sample again, with about that many instants and the digits that it has in the campaign.
+
+        Parameters
+        ----------
+        index : int or str
+            Of the sample; ``"search-3"`` is one that the search looked at.
+        samples : int
+
+        Raises
+        ------
+        ParameterError
+            When there is no such sample.
+        """
+        if not isinstance(index, str):
+            return self.problem.trajectory(self.problem.sample(index), samples)
+        looked_at = self.search.looked_at if self.search else ()
+        number = index.removeprefix("search-")
+        if not (index.startswith("search-") and number.isdecimal() and int(number) < len(looked_at)):
+            raise ParameterError(
+                f"index must be a whole number, or search-0 … search-{len(looked_at) - 1}. Got {index!r}."
+            )
+        return self.problem.trajectory(looked_at[int(number)], samples)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON can hold: samples, worst, quantiles, events, failures, search, resumed."""
+        return {
+            "samples": len(self.outcomes),
+            "worst": {metric: [self._told(i, metric) for i in self.worst(metric)] for metric in self.metrics},
+            "quantiles": self.quantiles(),
+            "events": {name: {"count": len(found), "first": found[:SHOWN]} for name, found in self.events.items()},
+            "failures": [{"samples": list(f.samples), "reason": f.reason} for f in self.failures],
+            "search": self._searched(),
+            "resumed": self.resumed,
+        }
+
+    def _told(self, index: int, metric: str) -> dict[str, Any]:
+        value = _finite(float(self.values(metric)[index]))
+        return {"index": index, "value": value, "sample": self.problem.sample(index).numbers}
+
+    def _searched(self) -> dict[str, Any] | None:
+        if self.search is None:
+            return None
+        return {
+            "metric": self.search.metric,
+            "value": _finite(self.search.value * (-1 if self.search.metric in _LESS_IS_WORSE else 1)),
+            "index": f"search-{self.search.index}",
+            "sample": self.search.sample.numbers,
+            "looked_at": len(self.search.looked_at),
+        }
+
+    def to_pandas(self) -> Any:
+        """Return a pandas DataFrame over the index: numbers that differ, and metrics, with units; nan where unknown."""
+        import pandas as pd
+
+        numbers = [self.problem.sample(i).numbers for i in range(len(self.outcomes))]
+        columns: dict[str, Any] = {
+            f"{name} [{UNITS.get(name, '-')}]": [n[name] for n in numbers] for name in numbers[0]
+        }
+        columns |= {f"{m} [{StickMetrics.unit(m) or '-'}]": self.values(m) for m in self.metrics}
+        return pd.DataFrame(columns, index=pd.Index(range(len(numbers)), name="sample"))
+
+    def plot(self) -> Any:
+        """Return a matplotlib Figure of the distribution of the metrics."""
+        from quakedesign.simulation.campaign.plotting import figure
+
+        return figure(self)
+
+
+def metric_names(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
+    """Names of the metrics that any of the outcomes has, in order."""
+    return tuple(dict.fromkeys(name for outcome in outcomes for name in outcome.figures))
+
+
+def require_metric(metric: str, known: Sequence[str]) -> None:
+    """Refuse a metric that there is not.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if metric not in known:
+        raise ParameterError(
+            f"metric must be one of {', '.join(known) or 'none, as all diverge'}. Received {metric!r}."
+        )
+
+
+def badness(outcome: Outcome, metric: str) -> float:
+    """Value of a metric, or its negative where less is worse; infinite for a diverged sample, or one too large."""
+    if metric not in outcome.figures:
+        return math.inf
+    value = outcome.figures[metric]
+    return -value if metric in _LESS_IS_WORSE else value
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

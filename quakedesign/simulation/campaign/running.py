@@ -1,0 +1,247 @@
+"""A campaign from beginning to end, or from where it was left."""
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from quakedesign.controllers import Controller
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.output import write_whole
+from quakedesign.simulation.campaign.crews import Cluster, Crew, Given, Processes
+from quakedesign.simulation.campaign.dispatch import dispatch
+from quakedesign.simulation.campaign.ledger import Ledger
+from quakedesign.simulation.campaign.problem import Outcome, Problem
+from quakedesign.simulation.campaign.program import Program
+from quakedesign.simulation.campaign.result import Campaign, Failure, badness, metric_names, require_metric
+from quakedesign.simulation.campaign.search import Worst, search
+from quakedesign.simulation.campaign.space import Sample, Space, require_count, require_seed
+from quakedesign.simulation.campaign.worker import advance
+from quakedesign.simulation.integrators import integrator
+from quakedesign.simulation.loading import Load
+from quakedesign.simulation.run import Setting
+from quakedesign.simulation.schemes import Scheme, simulation_scheme
+
+if TYPE_CHECKING:
+    import numpy as np
+
+BATCH_STEPS = 20_000_000  # of all samples of a batch together: what is lost when a worker dies, some half a minute
+LARGEST_BATCH = 64
+BATCHES_PER_WORKER = 4
+ROUNDS = 12
+
+Tell = Callable[[str, float], None]
+
+
+def campaign_problem(
+    fault: Fault,
+    controller: Controller | None = None,
+    *,
+    scheme: str | Scheme = "explicit",
+    step: float | None = None,
+    method: str = "dormand-prince",
+    duration: float | None = None,
+    settled_from: float | None = None,
+    plant: str = "smooth",
+    load: Load | None = None,
+    initial_slip: float = 0.0,
+    initial_slip_rate: float = 0.0,
+    seed: int = 0,
+) -> Problem:
+    """Closed loop and the space of its samples; the arguments are those of `simulate` and of `Space.of`.
+
+    Raises
+    ------
+    ParameterError
+    """
+    require_seed(seed)
+    return Problem(
+        fault=fault,
+        controller=controller,
+        scheme=simulation_scheme(scheme) if isinstance(scheme, str) else scheme,
+        setting=Setting.of(fault, step, duration, 1, settled_from),
+        method=integrator(method),
+        plant=plant,
+        load=load or Load(),
+        space=Space.of(fault, initial_slip=initial_slip, initial_slip_rate=initial_slip_rate),
+        seed=seed,
+    )
+
+
+def run_campaign(
+    problem: Problem,
+    samples: int,
+    folder: str | Path,
+    *,
+    metric: str | None = None,
+    rounds: int = ROUNDS,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    executor: Executor | None = None,
+    batch: int | None = None,
+    renew: bool = False,
+    tell: Tell = lambda _what, _done: None,
+) -> Campaign:
+    """Run many samples of a closed loop, and keep every batch that is done in a folder.
+
+    Interrupted or killed at any moment, the same call goes on from the files, and its answer has the digits of an
+    uninterrupted one, whatever the workers and their number. More samples than before go on from those that are there.
+    On a machine with another C library, the last digits may differ.
+
+    Parameters
+    ----------
+    problem : Problem
+        See `campaign_problem`.
+    samples : int
+        Number of samples; number i depends on the seed and on i alone.
+    folder : str or Path
+        New, empty, or that of this campaign. Figure and table are written into it as well.
+    metric : str, optional
+        Look for the worst value of this metric, starting from the worst sample and the corners of the box.
+    rounds : int
+        Of that search.
+    workers : int, optional
+        Number of processes; one per core unless given.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler that is used instead.
+    executor : Executor, optional
+        Any other executor of `concurrent.futures` that is used instead.
+    batch : int, optional
+        Samples in a batch; as many as take about half a minute, unless given.
+    renew : bool
+        Delete another campaign that the folder holds.
+    tell : callable
+        Called with what is being done and the fraction done [-].
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    ParameterError, OutputError
+    SimulationError
+        When the folder holds another campaign, or the workers cannot be reached.
+    """
+    require_count(samples)
+    if scheduler and executor:
+        raise ParameterError("give a scheduler or an executor. Received both. Leave one out.")
+    began = perf_counter()
+    ledger = Ledger.open(Path(folder), problem.inputs, renew=renew)
+    program = problem.program.compiled(Path(folder))
+    with _crew(workers, scheduler, executor) as crew:
+        runner = _Runner(problem, ledger, program, crew, batch, tell)
+        chosen = [problem.sample(i) for i in range(samples)]
+        outcomes = runner.outcomes(chosen, list(map(str, range(samples))), "samples")
+        worst = runner.search(outcomes, metric, rounds) if metric else None
+    found = Campaign(
+        problem=problem,
+        outcomes=tuple(outcomes),
+        failures=tuple(runner.failures),
+        resumed=runner.resumed,
+        search=worst,
+        seconds=perf_counter() - began,
+    )
+    _write(found, Path(folder))
+    return found
+
+
+def _crew(workers: int | None, scheduler: str | None, executor: Executor | None) -> Crew:
+    if executor is not None:
+        return Given(executor, workers)
+    return Cluster(scheduler) if scheduler else Processes(workers)
+
+
+class _Runner:
+    """Outcomes of samples, from the ledger or from the crew."""
+
+    def __init__(
+        self, problem: Problem, ledger: Ledger, program: Program, crew: Crew, batch: int | None, tell: Tell
+    ) -> None:
+        self._problem, self._ledger, self._program, self._crew = problem, ledger, program, crew
+        self._batch, self._tell = batch, tell
+        self._known = ledger.read()
+        self._filed, self._used = frozenset(self._known), set[bytes]()
+        self.failures = list[Failure]()
+
+    @property
+    def resumed(self) -> int:
+        """Number of samples whose outcome was in the folder."""
+        return len(self._used & self._filed)
+
+    def outcomes(self, samples: Sequence[Sample], names: Sequence[str], what: str) -> list[Outcome | None]:
+        """Outcome of every sample, None where its batch failed."""
+        starts = [self._problem.start(sample) for sample in samples]
+        missing = [i for i, start in enumerate(starts) if start.tobytes() not in self._known]
+        self._used.update(start.tobytes() for start in starts)
+        self._compute([starts[i] for i in missing], [names[i] for i in missing], what, len(starts))
+        ends = [self._known.get(start.tobytes()) for start in starts]
+        found = iter(self._problem.outcomes([end for end in ends if end is not None]))
+        return [None if end is None else next(found) for end in ends]
+
+    def _compute(self, starts: "list[np.ndarray]", names: list[str], what: str, total: int) -> None:
+        import numpy as np
+
+        size = self._batch_size(len(starts))
+        batches = {first: np.array(starts[first : first + size]) for first in range(0, len(starts), size)}
+        done = total - len(starts)
+        self._tell(what, done / total)
+
+        def keep(first: int, ends: "np.ndarray") -> None:
+            nonlocal done
+            self._ledger.add(batches[first], ends)
+            self._known |= {start.tobytes(): end for start, end in zip(batches[first], ends, strict=True)}
+            done += len(ends)
+            self._tell(what, done / total)
+
+        steps = self._problem.setting.steps
+        tasks = {first: (self._program, rows, steps) for first, rows in batches.items()}
+        for first, reason in sorted(dispatch(advance, tasks, self._crew, keep).items()):
+            self.failures.append(Failure(samples=tuple(names[first : first + size]), reason=reason))
+
+    def _batch_size(self, count: int) -> int:
+        if self._batch is not None:
+            require_count(self._batch)
+            return self._batch
+        shared = -(-count // (BATCHES_PER_WORKER * self._crew.width))
+        return max(1, min(LARGEST_BATCH, shared, BATCH_STEPS // self._problem.setting.steps))
+
+    def search(self, outcomes: Sequence[Outcome | None], metric: str, rounds: int) -> Worst:
+        """Worst sample by a metric, from the worst one known and the corners on."""
+        known = [(i, outcome) for i, outcome in enumerate(outcomes) if outcome]
+        if not known:
+            raise ParameterError("a search needs at least one sample that did not fail. Received none.")
+        require_metric(metric, metric_names([outcome for _, outcome in known]))
+        first = max(known, key=lambda pair: badness(pair[1], metric))[0]
+        counter = 0
+
+        def evaluate(samples: Sequence[Sample]) -> list[float]:
+            nonlocal counter
+            names = [f"search-{counter + i}" for i in range(len(samples))]
+            counter += len(samples)
+            found = self.outcomes(samples, names, f"search, {counter} samples")
+            return [-math.inf if outcome is None else badness(outcome, metric) for outcome in found]
+
+        start, seed = self._problem.point(first), self._problem.sample(first).noise_seed
+        return search(self._problem.space, metric, evaluate, [start], noise_seed=seed, rounds=rounds)
+
+
+def _write(campaign: Campaign, folder: Path) -> None:
+    """Answer, table and figure, each whole."""
+    from io import BytesIO
+
+    text = json.dumps(campaign.to_dict(), indent=1, allow_nan=False)
+    write_whole(folder / "results.json", text + "\n")
+    write_whole(folder / "samples.csv", campaign.to_pandas().to_csv())
+    drawn = BytesIO()
+    campaign.plot().savefig(drawn, format="png", dpi=150, metadata={"Software": None})
+    write_whole(folder / "distribution.png", drawn.getvalue())
+
+
+def folder_of(fault: Fault) -> Path:
+    """Folder of a campaign unless told."""
+    return Path(f"quakedesign-{fault.name}-campaign")

@@ -1,0 +1,144 @@
+"""What differs from sample to sample, and sample number i as a function of seed and i alone."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.fault.checks import require_nonnegative
+from quakedesign.simulation.variation import Variation, names
+
+if TYPE_CHECKING:
+    import numpy as np
+
+MOST_SAMPLES = 2**20
+PERIODIC = frozenset({"phase"})
+UNITS = {"phase": "rad", "initial_slip": "m", "initial_slip_rate": "m/s"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """One run of a campaign.
+
+    Attributes
+    ----------
+    variation : Variation
+        True parameters and disturbance.
+    initial_slip, initial_slip_rate : float
+        x1 [m] and x2 [m/s] at the start.
+    noise_seed : int
+        Of the noise in the measurements.
+    """
+
+    variation: Variation
+    initial_slip: float
+    initial_slip_rate: float
+    noise_seed: int
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Everything but the seed, by name."""
+        varied = dict(zip(names(), self.variation.values, strict=True))
+        return varied | {"initial_slip": self.initial_slip, "initial_slip_rate": self.initial_slip_rate}
+
+
+@dataclass(frozen=True)
+class Space:
+    """Interval of every number that differs from sample to sample; within it all values are equally likely.
+
+    Attributes
+    ----------
+    ranges : mapping of str to tuple of float
+        Lowest and highest value by the names of `Sample.numbers`, SI units.
+    """
+
+    ranges: Mapping[str, tuple[float, float]]
+
+    @classmethod
+    def of(cls, fault: Fault, *, initial_slip: float = 0.0, initial_slip_rate: float = 0.0) -> "Space":
+        """Space of a fault's uncertainty box and disturbance, and of initial states from rest up to given ones.
+
+        Parameters
+        ----------
+        fault : Fault
+        initial_slip, initial_slip_rate : float
+            Largest x1 [m] and x2 [m/s] at the start, not negative.
+
+        Raises
+        ------
+        ParameterError
+        """
+        require_nonnegative(initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
+        widths = {name: getattr(fault.box, name) for name in ("stiffness", "damping", "authority")}
+        ranges = {name: (float(1 - width), float(1 + width)) for name, width in widths.items()}
+        ranges |= {"weakening": (0.0, 1.0), "amplitude": (0.0, 1.0), "phase": (0.0, 2 * math.pi)}
+        ranges |= {"initial_slip": (0.0, float(initial_slip)), "initial_slip_rate": (0.0, float(initial_slip_rate))}
+        return cls(MappingProxyType(ranges))
+
+    @property
+    def active(self) -> tuple[int, ...]:
+        """Numbers of the coordinates whose interval is more than a point."""
+        return tuple(i for i, (low, high) in enumerate(self.ranges.values()) if high > low)
+
+    @property
+    def periodic(self) -> tuple[int, ...]:
+        """Numbers of the coordinates whose ends are one."""
+        return tuple(i for i, name in enumerate(self.ranges) if name in PERIODIC)
+
+    def sample(self, point: "Sequence[float] | np.ndarray", noise_seed: int) -> Sample:
+        """Sample at a point of the unit cube."""
+        values: dict[str, Any] = {
+            name: min(high, low + float(share) * (high - low))
+            for (name, (low, high)), share in zip(self.ranges.items(), point, strict=True)
+        }
+        varied = {name: values.pop(name) for name in names()}
+        return Sample(variation=Variation(**varied), noise_seed=noise_seed, **values)
+
+
+def point(seed: int, index: int, dimension: int) -> "np.ndarray":
+    """Point number `index` of a scrambled Sobol' sequence in the unit cube, shape (dimension,).
+
+    Sobol' (1967) with the scrambling of Matoušek (1998), as in scipy.stats.qmc.
+    """
+    return _points(seed, dimension, max(6, index.bit_length()))[index]
+
+
+@lru_cache(maxsize=8)
+def _points(seed: int, dimension: int, exponent: int) -> "np.ndarray":
+    import numpy as np
+    from scipy.stats import qmc
+
+    return qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(seed)).random_base2(exponent)
+
+
+def noise_seed(seed: int, index: int) -> int:
+    """Seed of the noise of sample number `index`."""
+    import numpy as np
+
+    return int(np.random.SeedSequence(seed, spawn_key=(index,)).generate_state(1)[0])
+
+
+def require_count(samples: int) -> None:
+    """Refuse a number of samples that is none.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+        raise ParameterError(f"samples must be a whole number, 1 to {MOST_SAMPLES}. Received {samples!r}.")
+
+
+def require_seed(seed: int) -> None:
+    """Refuse what is no seed.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise ParameterError(f"seed must be a whole number of at least 0. Received {seed!r}.")

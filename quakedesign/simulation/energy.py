@@ -1,0 +1,114 @@
+"""Where the energy of a run went: forces times rates on one side, stored energies on the other."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.symbolic import plant
+
+if TYPE_CHECKING:
+    from quakedesign.simulation.closed_loop import ClosedLoop
+
+WORKS = ("work_weakening", "work_injection", "work_viscous", "work_disturbance", "sum_slip")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyBudget:
+    """Energies between the start and the end of a run [J]; what was stored or dissipated came from some work.
+
+    kinetic + elastic + frictional + viscous − far_field − disturbance − residual = 0.
+
+    Attributes
+    ----------
+    kinetic, elastic : float
+        Change of ½m·x2² and of ½k·stretch² [J].
+    frictional : float
+        Heat of friction under the pressure that acted, ∫μA(σ' − p)·x2 dt [J].
+    injection : float
+        Share of the frictional work that the pressure relieved, ∫μAp·x2 dt [J]: without it friction would have taken
+        frictional + injection on the same way.
+    viscous : float
+        Heat of the dashpot (radiation damping, where that is the damping), ∫η(x2 − v_∞)² dt [J].
+    far_field : float
+        Work of the drifting far end on spring and dashpot [J]; 0 without drift.
+    disturbance : float
+        Work of φ_e, ∫mφ̂_e·x2 dt [J].
+    residual : float
+        What is missing [J]: the error of the integration, since works are integrated along with the motion.
+    """
+
+    kinetic: float
+    elastic: float
+    frictional: float
+    injection: float
+    viscous: float
+    far_field: float
+    disturbance: float
+    residual: float
+
+    @classmethod
+    def of(cls, *, injection: float, **parts: float) -> "EnergyBudget":
+        """Budget with the residual that its parts leave."""
+        stored = parts["kinetic"] + parts["elastic"] + parts["frictional"] + parts["viscous"]
+        return cls(injection=injection, residual=stored - parts["far_field"] - parts["disturbance"], **parts)
+
+    @property
+    def relative_residual(self) -> float:
+        """|Residual| over the largest other entry [-]; 0 where nothing happened."""
+        entries = self.to_dict()
+        return abs(entries.pop("residual")) / largest if (largest := max(map(abs, entries.values()))) else 0.0
+
+    def to_dict(self) -> dict[str, float]:
+        """Return the energies [J] by name."""
+        return asdict(self)
+
+    @staticmethod
+    def unit(name: str) -> str:
+        """SI unit of one entry."""
+        return "" if name == "relative_residual" else "J"
+
+
+def powers(loop: "ClosedLoop", time: Any, x: Any, pressure: Any, direction: Any = 1) -> Any:
+    """Integrands per unit mass in the order of `WORKS` (SX): [W/kg], and x1 [m] for the last.
+
+    Friction counts relative to its static value under the whole normal stress, whose work is exact in the slip; it
+    acts against `direction`.
+    """
+    import casadi as ca
+
+    _, normal, damping, stress = hats(loop)
+    rate, relief = (ca.fabs(x[1]), ca.fmin(pressure, stress)) if loop.sticks else (x[1], pressure)
+    friction, way = loop.friction(ca.vertcat(x[0], rate)), direction * x[1]
+    return ca.vertcat(
+        normal * stress * (friction * way - loop.static_friction * x[1]),
+        normal * friction * relief * way,
+        damping * x[1] * x[1],
+        loop.shaken(time, x) * x[1],
+        x[0],
+    )
+
+
+def budget(loop: "ClosedLoop", integrals: Mapping[str, float], time: float, slip: float, rate: float) -> EnergyBudget:
+    """Budget of a run from rest that has taken a time [s], from the integrals of `powers` and its last state."""
+    mass, drift = loop.fault.mass, loop.load.drift
+    stiffness, normal, damping, stress = hats(loop)
+    static = normal * stress * float(loop.static_friction)
+    tension, opened = static - damping * drift, drift * time - slip
+    pull = tension * time + stiffness * (drift * time**2 / 2 - integrals["sum_slip"]) + damping * opened
+    return EnergyBudget.of(
+        kinetic=mass * rate**2 / 2,
+        elastic=mass * (tension + stiffness * opened / 2) * opened,
+        frictional=mass * (integrals["work_weakening"] + static * slip - integrals["work_injection"]),
+        injection=mass * integrals["work_injection"],
+        viscous=mass * (integrals["work_viscous"] + damping * drift * (drift * time - 2 * slip)),
+        far_field=mass * drift * pull,
+        disturbance=mass * integrals["work_disturbance"],
+    )
+
+
+def hats(loop: "ClosedLoop") -> tuple[Any, Any, Any, float]:
+    """k̂ [1/s²], N̂ [m²/kg], η̂ [1/s] with the factors of the loop, and σ' [Pa]."""
+    numbers = plant.plant_values(loop.fault)
+    stiffness, damping, authority = loop.factors[:3] or (1.0,) * 3
+    k, eta, N, sigma = (float(numbers[s]) for s in (plant.k_hat, plant.eta_hat, plant.N_hat, plant.sigma))
+    return k * stiffness, N * authority, eta * damping, sigma

@@ -1,0 +1,225 @@
+"""A sampled controller as C, for the computer of a laboratory."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from quakedesign.controllers import Controller
+from quakedesign.errors import OutputError, ParameterError
+from quakedesign.fault import Fault
+from quakedesign.fault.checks import require_positive
+from quakedesign.output import write_whole
+from quakedesign.simulation.c_source import header_text, source_text
+from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.simulation.integrators import integrator
+from quakedesign.simulation.measurement import EXACT
+from quakedesign.simulation.run import library_versions
+from quakedesign.simulation.schemes import Scheme, simulation_scheme
+from quakedesign.simulation.schemes.sampled import Sampled
+from quakedesign.simulation.sensing import Sensor
+
+SOURCE, HEADER = "controller.c", "controller.h"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerStep:
+    """What a controller does once per sample, as one function of its measurement and its memory.
+
+    Attributes
+    ----------
+    function : casadi.Function
+        (measurement, memory) → memory, pressure [Pa].
+    measurement : mapping of str to str
+        Unit of every measured signal, in order.
+    start : mapping of str to float
+        Memory before the first sample, in order, SI units.
+    step : float
+        Sampling period T_s [s].
+    facts : mapping of str to str
+        Where it comes from: fault, law, gains, scheme, versions.
+    """
+
+    function: Any
+    measurement: Mapping[str, str]
+    start: Mapping[str, float]
+    step: float
+    facts: Mapping[str, str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able facts."""
+        return {
+            "step": self.step,
+            "measurement": dict(self.measurement),
+            "memory": dict(self.start),
+            "facts": dict(self.facts),
+        }
+
+
+def controller_step(
+    fault: Fault, controller: Controller, *, step: float | None = None, scheme: str | Scheme = "explicit"
+) -> ControllerStep:
+    """Sampled step of a controller, built from that of `simulate` with the same scheme, without noise.
+
+    Parameters
+    ----------
+    fault : Fault
+        For its reference, and its input gain where the scheme needs one.
+    controller : Controller
+    step : float, optional
+        T_s [s]; the fault's sampling time unless given.
+    scheme : str or Scheme
+        One that samples. Of its measurement the part that runs on the controller is kept: with a `Sensor` the slip is
+        measured alone, else slip and slip rate.
+
+    Returns
+    -------
+    ControllerStep
+
+    Raises
+    ------
+    ParameterError
+        For a scheme that does not sample, an actuator with a motion of its own, or a step that is not positive or not
+        that of the sensor.
+    """
+    period = fault.sampling_time if step is None else step
+    require_positive(step=period)
+    chosen = _software(simulation_scheme(scheme) if isinstance(scheme, str) else scheme)
+    sensed = isinstance(chosen.measurement, Sensor)
+    if isinstance(chosen.measurement, Sensor):
+        chosen.measurement.require_step(period)
+    measurement = {"slip": "m"} if sensed else {"slip": "m", "slip_rate": "m/s"}
+    function, start = _function(ClosedLoop(fault, controller), chosen, float(period), len(measurement))
+    facts = _facts(fault, controller, chosen)
+    return ControllerStep(function=function, measurement=measurement, start=start, step=float(period), facts=facts)
+
+
+def export_controller(
+    fault: Fault,
+    controller: Controller,
+    folder: str | Path,
+    *,
+    step: float | None = None,
+    scheme: str | Scheme = "explicit",
+    force: bool = False,
+) -> ControllerStep:
+    """Write a controller's sampled step as ``controller.c`` and ``controller.h`` into a folder that appears whole.
+
+    The C has no dynamic memory and no state of its own, needs the standard mathematics library only, and gives the
+    digits of `ControllerStep.function` when compiled with ``-ffp-contract=off``.
+
+    Parameters
+    ----------
+    fault, controller, step, scheme
+        As in `controller_step`.
+    folder : str or Path
+        New folder in an existing one.
+    force : bool
+        Replace a folder that holds an earlier export and nothing else.
+
+    Returns
+    -------
+    ControllerStep
+
+    Raises
+    ------
+    ParameterError
+        As `controller_step`.
+    OutputError
+        When the folder exists, or cannot be written.
+    """
+    target = Path(folder)
+    _require_free(target, force)
+    found = controller_step(fault, controller, step=step, scheme=scheme)
+    texts = {HEADER: header_text(found), SOURCE: source_text(found, HEADER)}
+    try:
+        partial = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.absolute().parent))
+        try:
+            for name, text in texts.items():
+                write_whole(partial / name, text)
+            partial.chmod(0o755)
+            _swap(partial, target)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(f"{target} cannot be written: {error.strerror}. Choose another folder.") from None
+    return found
+
+
+def _require_free(folder: Path, force: bool) -> None:
+    if folder.exists() and not force:
+        raise OutputError(f"the folder of an export must be new. Received {folder}, which exists. Force to replace it.")
+    if folder.exists() and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= {SOURCE, HEADER}):
+        raise OutputError(f"only a folder with {SOURCE} and {HEADER} is replaced. Received {folder}. Choose another.")
+    parent = folder.absolute().parent
+    if not parent.is_dir():
+        raise OutputError(f"{parent} is no folder. Create it, or choose another.")
+
+
+def _swap(partial: Path, target: Path) -> None:
+    if not target.exists():
+        partial.rename(target)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{target.name}-old-", dir=target.absolute().parent))
+    os.replace(target, old / target.name)
+    os.replace(partial, target)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _software(scheme: Scheme) -> Sampled:
+    """Scheme without noise, transducer and substeps; refuses what no controller can carry out."""
+    if not isinstance(scheme, Sampled):
+        raise ParameterError(f"a controller is exported with a scheme that samples. Received {scheme.name}.")
+    if scheme.actuator.flowing:
+        names = ", ".join(stage.name for stage in scheme.actuator.flowing)
+        raise ParameterError(f"what moves between samples belongs to the plant. Received {names}. Leave it out.")
+    measurement: Any = scheme.measurement
+    kept: Any = measurement.software if isinstance(measurement, Sensor) else EXACT
+    return replace(scheme, measurement=kept, substeps=1)
+
+
+def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> tuple[Any, dict[str, float]]:
+    """CasADi Function of the step, and the memory at the start; what never changes is written into the function."""
+    import casadi as ca
+
+    numbers = scheme.memory(loop, step)
+    names = [str(symbol) for symbol in loop.integrals] + list(numbers)
+    values = [0.0] * len(loop.integrals) + list(numbers.values())
+    free = [ca.SX.sym(name) for name in names]
+    after = _after(loop, scheme, ca.SX.sym("sample"), ca.vertcat(ca.SX.sym("x", 2), *free), step)
+    changing = [not ca.is_equal(after[i], symbol) for i, symbol in enumerate(free)]
+    start = {"sample": 0.0} | {n: v for n, v, c in zip(names, values, changing, strict=True) if c}
+    memory, measurement = ca.SX.sym("memory", len(start)), ca.SX.sym("measurement", measured)
+    entries = iter(ca.vertsplit(memory))
+    counter = next(entries)
+    own = [next(entries) if c else ca.SX(v) for v, c in zip(values, changing, strict=True)]
+    state = ca.vertcat(measurement, ca.SX(2 - measured, 1), *own)
+    moved = _after(loop, scheme, counter, state, step)
+    later = [counter + 1, *(moved[i] for i, c in enumerate(changing) if c)]
+    outputs = ca.cse([ca.vertcat(*later), scheme.pressure(loop, counter, state, step)])
+    return ca.Function("sampled_step", [measurement, memory], outputs), start
+
+
+def _after(loop: ClosedLoop, scheme: Sampled, counter: Any, state: Any, step: float) -> Any:
+    """Integral states and memory at the next sample; they do not depend on how the plant moves meanwhile."""
+    return scheme.advance(loop, integrator("rk4"), counter, state, step)[2:]
+
+
+def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, str]:
+    gains = {f"gain {n}": f"{v} {controller.gain_units[n]}" for n, v in controller.gains.items()}
+    rest = {f.name: _text(getattr(controller, f.name)) for f in fields(controller) if f.name != "gains"}
+    found = {"fault": fault.name, "law": controller.title, "source": controller.source, **gains, **rest}
+    found |= {"scheme": scheme.name} | {name: str(value) for name, value in scheme.settings.items()}
+    return found | library_versions("quakedesign", "casadi")
+
+
+def _text(value: Any) -> str:
+    """Exact numbers as p/q, values by their fields."""
+    if not is_dataclass(value):
+        return str(value)
+    return ", ".join(f"{f.name} {getattr(value, f.name)}" for f in fields(value))

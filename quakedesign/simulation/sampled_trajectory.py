@@ -1,0 +1,30 @@
+"""What a simulation with an actuator returns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from quakedesign.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import numpy as np
+
+Signal = tuple["np.ndarray", str, str]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SampledTrajectory(Trajectory):
+    """A run whose pressure reaches the fault through an actuator; `pressure` is that in the fault.
+
+    Attributes
+    ----------
+    actuation : mapping of str to tuple
+        Values, shape (n,), long name and SI unit of ``well_pressure`` [Pa], and where the actuator stores fluid of
+        ``injected_volume`` [m³] and ``flow_rate`` [m³/s].
+    """
+
+    actuation: Mapping[str, Signal] = field(repr=False)
+
+    def signals(self) -> dict[str, Signal]:
+        """Values, long name and SI unit of every signal that this run has, by name."""
+        return super().signals() | dict(self.actuation)

@@ -1,0 +1,281 @@
+"""How a sampled loop answers to its sampling period, to noise and to its input gain: tables and figures."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.controllers import Controller, SlidingMode
+from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.fault import Fault
+from quakedesign.simulation.measurement import Measurement
+from quakedesign.simulation.run import simulate
+from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.simulation.variation import Variation
+
+if TYPE_CHECKING:
+    from quakedesign.simulation.trajectory import Trajectory
+
+SCHEMES = ("explicit", "implicit", "semi-implicit", "compensated")
+QUANTITIES = {
+    "slip_error": ("max |e1|", "m"),
+    "slip_rate_error": ("max |e2|", "m/s"),
+    "matched_error": ("max |e3|", "m/s^2"),
+}
+_COLOURS = {"explicit": "#D55E00", "implicit": "#0072B2", "semi-implicit": "#CC79A7", "compensated": "#009E73"}
+_KEPT = 20_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """Largest errors of several schemes over one parameter.
+
+    Attributes
+    ----------
+    title : str
+    label, unit : str
+        Of the parameter.
+    levels : tuple of float
+        Its values.
+    errors : mapping of str to mapping
+        Largest errors at every level, by scheme and by the names of `QUANTITIES`; infinite for a run that diverged.
+    """
+
+    title: str
+    label: str
+    unit: str
+    levels: tuple[float, ...]
+    errors: Mapping[str, Mapping[str, tuple[float, ...]]]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row a scheme and level."""
+        return [
+            {"scheme": scheme, self.label: level} | {name: values[i] for name, values in found.items()}
+            for scheme, found in self.errors.items()
+            for i, level in enumerate(self.levels)
+        ]
+
+    def to_pandas(self) -> Any:
+        """Return the rows as a pandas DataFrame."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows())
+
+    def orders(self) -> dict[str, dict[str, float]]:
+        """Exponent n of error ~ levelⁿ by scheme and quantity: slope of the line of least squares in logarithms."""
+        import numpy as np
+
+        place = np.log(self.levels)
+        return {
+            scheme: {name: float(np.polyfit(place, np.log(values), 1)[0]) for name, values in found.items()}
+            for scheme, found in self.errors.items()
+        }
+
+    def figure(self) -> Any:
+        """Return a matplotlib Figure with one panel a quantity, one line a scheme."""
+        from matplotlib.figure import Figure
+
+        shown = list(next(iter(self.errors.values())))
+        drawing = Figure(figsize=(8, 1.2 + 2.4 * len(shown)), layout="constrained", dpi=150)
+        axes = drawing.subplots(len(shown), 1, sharex=True, squeeze=False).ravel()
+        for axis, name in zip(axes, shown, strict=True):
+            self._panel(axis, name)
+        axes[-1].set_xlabel(f"{self.label} [{self.unit or '-'}]")
+        drawing.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
+        drawing.suptitle(self.title)
+        return drawing
+
+    def _panel(self, axis: Any, name: str) -> None:
+        label, unit = QUANTITIES[name]
+        for scheme, found in self.errors.items():
+            axis.plot(self.levels, found[name], "o-", ms=3, lw=1.2, color=_COLOURS.get(scheme, "#555555"), label=scheme)
+        wide = min(self.levels) > 0 and max(self.levels) > 10 * min(self.levels)
+        axis.set_xscale("log" if wide else "linear")
+        axis.set_yscale("log")
+        axis.set_ylabel(f"{label} [{unit}]")
+        axis.grid(visible=True, alpha=0.3)
+
+
+def accuracy(
+    fault: Fault,
+    controller: SlidingMode,
+    *,
+    steps: Sequence[float],
+    schemes: Sequence[str] = SCHEMES,
+    duration: float,
+    settled_from: float,
+) -> Study:
+    """Errors of a sliding mode against the sampling period.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : SlidingMode
+        Without feed-forward, so that e3 = ξ1 + h.
+    steps : sequence of float
+        T_s [s].
+    schemes : sequence of str
+    duration, settled_from : float
+        Length of every run, and time from which errors count [s].
+
+    Returns
+    -------
+    Study
+        `orders` gives the exponents: 3, 2 and 1 for the explicit scheme.
+
+    Raises
+    ------
+    ParameterError
+        For a law with feed-forward.
+    """
+    if any(controller.feedforward.coefficients.values()):
+        raise ParameterError("the accuracy of e3 = xi1 + h needs a law without feed-forward. Received one with it.")
+
+    def run(scheme: str, step: float) -> "Trajectory":
+        return simulate(
+            fault,
+            controller,
+            scheme=scheme,
+            step=step,
+            duration=duration,
+            settled_from=settled_from,
+            samples=_KEPT,
+        )
+
+    title = f"{fault.name}, {controller.title}: accuracy of sampling"
+    return _study(title, ("T_s", "s"), tuple(steps), schemes, run, matched=True)
+
+
+def noise_sensitivity(
+    fault: Fault,
+    controller: Controller,
+    *,
+    levels: Sequence[float],
+    of: str = "slip_noise",
+    schemes: Sequence[str] = SCHEMES,
+    seed: int = 0,
+    duration: float | None = None,
+) -> Study:
+    """Errors against the noise of the measurement.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : Controller
+    levels : sequence of float
+        Standard deviations, in the unit of `of`.
+    of : str
+        ``"slip_noise"`` [m] or ``"rate_noise"`` [m/s]; the other one is 0.
+    schemes : sequence of str
+    seed : int
+    duration : float, optional
+        [s]; the operation time unless given.
+    """
+    units = {"slip_noise": "m", "rate_noise": "m/s"}
+    exact = Measurement(seed=seed)
+    if of not in units:
+        raise ParameterError(f"noise must be one of {', '.join(units)}. Received {of!r}.")
+
+    def run(scheme: str, level: float) -> "Trajectory":
+        slip, rate = (level, 0.0) if of == "slip_noise" else (0.0, level)
+        measurement = replace(exact, slip_noise=slip, rate_noise=rate)
+        return simulate(fault, controller, scheme=scheme, measurement=measurement, duration=duration)
+
+    title = f"{fault.name}, {controller.title}: sensitivity to noise"
+    return _study(title, (of.replace("_", " "), units[of]), tuple(levels), schemes, run)
+
+
+def gain_sensitivity(
+    fault: Fault,
+    controller: Controller,
+    *,
+    points: int = 5,
+    schemes: Sequence[str] = SCHEMES,
+    duration: float | None = None,
+) -> Study:
+    """Errors against the true input gain, over the whole range of β = μN̂/(μ0N̂0) that the fault's box allows.
+
+    At every level N̂ is chosen such that β at rest is that level times the geometric middle of the box, which is what
+    the scheme ``compensated`` assumes; the run then lowers β further as friction weakens.
+
+    Parameters
+    ----------
+    fault : Fault
+        With a box in which N̂ is uncertain, such as ``ten-percent``.
+    controller : Controller
+    points : int
+        Number of levels, at least 2.
+    schemes : sequence of str
+    duration : float, optional
+        [s]; the operation time unless given.
+    """
+    import numpy as np
+
+    width = float(fault.box.authority)
+    if not width or points < 2:
+        raise ParameterError(
+            f"sensitivity to the input gain needs a box with uncertain authority and at least 2 points. Received the "
+            f"box {fault.box.name!r} and {points!r}. Use fault.with_box('ten-percent')."
+        )
+    low, high = fault.friction.bounds
+    factors = np.linspace(1 - width, 1 + width, points)
+    levels = {float(high * x / np.sqrt(low * (1 - width) * high * (1 + width))): float(x) for x in factors}
+
+    def run(scheme: str, level: float) -> "Trajectory":
+        variation = Variation(authority=levels[level])
+        return simulate(fault, controller, scheme=scheme, variation=variation, duration=duration)
+
+    title = f"{fault.name}, {controller.title}: sensitivity to the input gain"
+    return _study(title, ("beta at rest over its middle", ""), tuple(levels), schemes, run)
+
+
+def weight_study(
+    fault: Fault, controller: Controller, *, weights: Sequence[float] = (0.25, 0.5, 0.75, 1.0), duration: float
+) -> Study:
+    """Errors of the scheme ``compensated`` from the start on, against the weight of its estimate.
+
+    Its B0 is the smallest of the box, so that β/β0 = μ_max/μ_res at the start: what
+    `quakedesign.simulation.schemes.compensation` says about the weights then shows.
+    """
+    base: Any = simulation_scheme("compensated")
+
+    def run(_: str, level: float) -> "Trajectory":
+        least = fault.friction.bounds[0] * fault.authority * (1 - float(fault.box.authority))
+        scheme = replace(base, weight=level, authority=least)
+        return simulate(fault, controller, scheme=scheme, duration=duration, settled_from=duration / 4)
+
+    title = f"{fault.name}, {controller.title}: weight of the estimate"
+    return _study(title, ("weight", ""), tuple(weights), ("compensated",), run)
+
+
+def _study(
+    title: str,
+    parameter: tuple[str, str],
+    levels: tuple[float, ...],
+    schemes: Sequence[str],
+    run: "Callable[[str, float], Trajectory]",
+    *,
+    matched: bool = False,
+) -> Study:
+    errors = {}
+    for scheme in schemes:
+        found = [_errors(run(scheme, level), matched) for level in levels]
+        errors[scheme] = {name: tuple(values[name] for values in found) for name in found[0]}
+    label, unit = parameter
+    return Study(title=title, label=label, unit=unit, levels=levels, errors=errors)
+
+
+def _errors(run: "Trajectory", matched: bool) -> dict[str, float]:
+    """Largest errors of a run; that of e3 from the instants that it keeps."""
+    import numpy as np
+
+    metrics, infinite = run.metrics, float("inf")
+    found = {"slip_error": metrics.max_slip_error, "slip_rate_error": metrics.max_slip_rate_error}
+    if "diverged" in run.events:
+        return dict.fromkeys([*found, "matched_error"] if matched else found, infinite)
+    if None in found.values():
+        raise SimulationError("a study needs runs that are longer than the time from which errors count.")
+    if matched:
+        settled = run.time > metrics.settled_from
+        assert run.matched_perturbation is not None
+        found["matched_error"] = float(np.max(np.abs(run.integrals[0] + run.matched_perturbation)[settled]))
+    return {name: float(value) for name, value in found.items() if value is not None}

@@ -1,0 +1,196 @@
+"""Exported controllers: C against Python digit for digit, and against the simulated loop."""
+
+import ctypes
+import json
+import os
+import subprocess
+
+import numpy as np
+import pytest
+
+from quakedesign.controllers import published
+from quakedesign.controllers.feed_forward import feed_forward
+from quakedesign.errors import OutputError, ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.simulation import simulate
+from quakedesign.simulation.actuators.chain import Actuator
+from quakedesign.simulation.actuators.delay import Delay
+from quakedesign.simulation.actuators.lag import Lag
+from quakedesign.simulation.actuators.rate_limit import RateLimit
+from quakedesign.simulation.actuators.saturation import Saturation
+from quakedesign.simulation.export import controller_step, export_controller
+from quakedesign.simulation.measurement import Measurement
+from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.simulation.sensing import Averaging, Differentiator, OutputFeedback, Transducer
+
+LAB = load_fault("lab-fault")
+PUBLISHED = published("lab-fault")
+FEED_FORWARD = PUBLISHED["cta"].with_feedforward(feed_forward("nominal", LAB, PUBLISHED["cta"].divisor))
+LIMITED = Actuator(stages=(Delay(samples=2), RateLimit(rate=1e8), Saturation(lowest=-9e4, highest=9e4)))
+SENSED = OutputFeedback(
+    stages=(Transducer(deviation=1e-6), Averaging(samples=2)),
+    differentiator=Differentiator(bound=100.0, step=1e-3, filter_order=1),
+)
+CASES = {
+    "cta": (PUBLISHED["cta"], "explicit", {}),
+    "dia": (PUBLISHED["dia"], "explicit", {}),
+    "elqr": (PUBLISHED["elqr"], "explicit", {}),
+    "cta feed-forward": (FEED_FORWARD, "explicit", {}),
+    "cta implicit": (PUBLISHED["cta"], "implicit", {}),
+    "dia compensated": (PUBLISHED["dia"], "compensated", {}),
+    "elqr implicit": (PUBLISHED["elqr"], "implicit", {}),
+    "cta limited": (PUBLISHED["cta"], "explicit", {"actuator": LIMITED}),
+    "cta sensed": (PUBLISHED["cta"], "explicit", {"measurement": SENSED}),
+    "dia semi-implicit sensed": (PUBLISHED["dia"], "semi-implicit", {"measurement": SENSED}),
+}
+Numbers = ctypes.POINTER(ctypes.c_double)
+
+
+def compiled(folder, *flags):
+    """Functions of the header from a shared library, compiled as the header says."""
+    command = ["cc", "-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Werror", *flags, "-fPIC", "-shared"]
+    call = [*command, "controller.c", "-o", "controller.so", "-lm"]
+    subprocess.run(call, cwd=folder, check=True, capture_output=True)
+    library = ctypes.CDLL(str(folder / "controller.so"))
+    library.controller_step.argtypes, library.controller_step.restype = [Numbers] * 3, None
+    library.controller_reset.argtypes, library.controller_reset.restype = [Numbers], None
+    return library
+
+
+def pointer(array):
+    return array.ctypes.data_as(Numbers)
+
+
+def python_step(found):
+    """The step in Python on fixed arrays: measurement, memory before, memory after, pressure, and a call."""
+    measurement, memory = np.zeros(len(found.measurement)), np.zeros(len(found.start))
+    after, pressure = np.zeros_like(memory), np.zeros(1)
+    buffer, evaluate = found.function.buffer()
+    for i, array in enumerate((measurement, memory)):
+        buffer.set_arg(i, array.data)
+    for i, array in enumerate((after, pressure)):
+        buffer.set_res(i, array.data)
+    return measurement, memory, after, pressure, evaluate, buffer
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_c_and_python_agree_bit_for_bit_over_random_steps(case, tmp_path):
+    controller, scheme, settings = CASES[case]
+    chosen = simulation_scheme(scheme, **settings)
+    found = export_controller(LAB, controller, tmp_path / "c", step=1e-3, scheme=chosen)
+    library = compiled(tmp_path / "c")
+    steps = 100_000 if scheme == "explicit" or case == "cta implicit" else 20_000
+    own, answer = np.zeros(len(found.start)), np.zeros(1)
+    library.controller_reset(pointer(own))
+    assert list(own) == list(found.start.values())
+    measurement, memory, after, pressure, evaluate, _ = python_step(found)
+    memory[:] = own
+    random = np.random.default_rng(7)
+    signals = random.normal(size=(steps, len(measurement))) * [1e-3, 1e-2][: len(measurement)]
+    signals[random.random(steps) < 0.05] = 0.0  # kinks too
+    arguments = pointer(measurement), pointer(own), pointer(answer)
+    different = 0
+    for row in signals:
+        measurement[:] = row
+        library.controller_step(*arguments)
+        evaluate()
+        memory[:] = after
+        different += answer.tobytes() != pressure.tobytes() or own.tobytes() != after.tobytes()
+    assert different == 0
+    assert np.isfinite(own).all()
+    assert own[0] == steps
+    assert abs(answer[0]) > 0
+
+
+@pytest.mark.parametrize("case", ["elqr", "cta", "cta implicit", "dia compensated", "cta sensed", "cta limited"])
+def test_the_exported_step_decides_as_the_controller_of_the_simulated_loop(case):
+    """Told the slips and slip rates of a run, it asks for the pressures of that run."""
+    controller, scheme, settings = CASES[case]
+    quiet = {k: (v.software if k == "measurement" else v) for k, v in settings.items()}
+    found = controller_step(LAB, controller, step=1e-3, scheme=simulation_scheme(scheme, **settings))
+    run = simulate(
+        LAB,
+        controller,
+        step=1e-3,
+        scheme=simulation_scheme(scheme, **quiet),
+        method="rk4",
+        duration=0.2,
+        samples=200,
+        compiled=False,
+    )
+    measurement, memory, after, pressure, evaluate, _ = python_step(found)
+    memory[:] = list(found.start.values())
+    pressures = []
+    for slip, rate in zip(run.slip, run.slip_rate, strict=True):
+        measurement[:] = (slip, rate)[: len(measurement)]
+        evaluate()
+        memory[:] = after
+        pressures.append(pressure[0])
+    assert run.pressure == pytest.approx(pressures, rel=1e-9, abs=1e-9 * max(np.abs(pressures)))
+    assert len(set(pressures)) > 50
+
+
+def test_the_files_say_what_every_number_is(tmp_path):
+    found = export_controller(LAB, FEED_FORWARD, tmp_path / "c")
+    header, source = ((tmp_path / "c" / name).read_text() for name in ("controller.h", "controller.c"))
+    assert {f.name for f in (tmp_path / "c").iterdir()} == {"controller.h", "controller.c"}
+    for said in ("slip [m]", "slip_rate [m/s]", "gain k1: 15/2 m^(2/3)/s^2", "lab-fault", "2-CTA", "xi_1", "4/1385"):
+        assert said in header
+    assert "CONTROLLER_STEP 0.001" in header
+    assert "malloc" not in source
+    assert json.loads(json.dumps(found.to_dict()))["memory"]["sample"] == 0.0
+
+
+def test_a_sensed_controller_measures_the_slip_alone_and_leaves_the_noise_to_the_instrument():
+    found = controller_step(LAB, PUBLISHED["cta"], scheme=simulation_scheme("explicit", measurement=SENSED))
+    assert dict(found.measurement) == {"slip": "m"}
+    noisy = simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-6))
+    plain = controller_step(LAB, PUBLISHED["cta"])
+    assert controller_step(LAB, PUBLISHED["cta"], scheme=noisy).start == plain.start
+
+
+def test_no_text_of_the_user_ends_the_comment(tmp_path):
+    from dataclasses import replace
+
+    export_controller(replace(LAB, name="*/ #error \n#error"), PUBLISHED["elqr"], tmp_path / "c")
+    compiled(tmp_path / "c")
+
+
+def test_what_is_there_stays_unless_forced(tmp_path):
+    target = tmp_path / "c"
+    export_controller(LAB, PUBLISHED["elqr"], target)
+    before = (target / "controller.h").read_bytes()
+    with pytest.raises(OutputError, match="must be new"):
+        export_controller(LAB, PUBLISHED["cta"], target)
+    assert (target / "controller.h").read_bytes() == before
+    export_controller(LAB, PUBLISHED["cta"], target, force=True)
+    assert b"2-CTA" in (target / "controller.h").read_bytes()
+    (target / "notes").write_text("mine")
+    with pytest.raises(OutputError, match="only a folder"):
+        export_controller(LAB, PUBLISHED["cta"], target, force=True)
+    with pytest.raises(OutputError, match="no folder"):
+        export_controller(LAB, PUBLISHED["cta"], tmp_path / "none" / "c")
+
+
+def test_nothing_is_left_of_a_failed_export(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+    with pytest.raises(OutputError, match="No space"):
+        export_controller(LAB, PUBLISHED["elqr"], tmp_path / "c")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ({"scheme": "continuous"}, "samples"),
+        (
+            {"scheme": simulation_scheme("explicit", actuator=Actuator(stages=(Lag(time_constant=0.1),)))},
+            "between samples",
+        ),
+        ({"scheme": simulation_scheme("explicit", measurement=SENSED), "step": 2e-3}, "sampling period"),
+        ({"step": 0.0}, "step"),
+    ],
+)
+def test_what_no_controller_can_do_is_refused(settings, named):
+    with pytest.raises(ParameterError, match=named):
+        controller_step(LAB, PUBLISHED["cta"], **settings)
