@@ -1,6 +1,6 @@
 """Claims about closed loops, their files, and the exact decision."""
 
-from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, loop_of
+from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, Witness, loop_of
 from quakedesign.certificates.files import certificate_text, load_certificate, parse_certificate, save_certificate
 
 __all__ = [
@@ -8,6 +8,7 @@ __all__ = [
     "Equilibrium",
     "Loop",
     "Verdict",
+    "Witness",
     "certificate_text",
     "load_certificate",
     "loop_of",

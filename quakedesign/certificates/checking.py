@@ -1,18 +1,19 @@
 """The exact decision: whether a certificate proves, or refutes, what it claims."""
 
+from collections.abc import Mapping
 from fractions import Fraction
 from itertools import product
 
 from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, loop_of, require
 from quakedesign.certificates.obligations import claimed
-from quakedesign.controllers import control_laws
-from quakedesign.sos import proves
+from quakedesign.certificates.witnesses import proves
+from quakedesign.controllers import LoopField, Subject, laws, model_of
 from quakedesign.symbolic.terms import Term, value
 
 
-def check(certificate: Certificate) -> Verdict:
+def check(certificate: Certificate, law: Subject | None = None) -> Verdict:
     """Decide a certificate in exact arithmetic; see `Certificate.check`."""
-    _same_field(certificate.loop)
+    _same_field(certificate.loop, law)
     if certificate.refutation is not None:
         _check_equilibrium(certificate.loop, certificate.refutation)
         return Verdict.REFUTED
@@ -20,34 +21,40 @@ def check(certificate: Certificate) -> Verdict:
     return Verdict.PROVED
 
 
-def _same_field(loop: Loop) -> None:
-    """Re-derive the field from the law's own expressions and compare."""
-    laws = control_laws()
-    require(loop.law in laws, f"the law {loop.law!r} is unknown, so its field cannot be derived again.")
-    model = laws[loop.law].loop_field()
-    derived = loop_of(loop.law, model, gains=loop.gains, uncertain=loop.uncertain, constants=loop.constants)
+def _same_field(loop: Loop, law: Subject | None) -> None:
+    """Re-derive the field from the law's own expressions and compare; a bare field has no name to compare."""
+    require(
+        law is not None or loop.law in laws(),
+        f"the law {loop.law!r} is not one of the package, so its field cannot be derived again. "
+        "Give its class or its LoopField to check().",
+    )
+    name, model = model_of(loop.law if law is None else law)
+    require(isinstance(law, LoopField) or name == loop.law, f"the certificate is about {loop.law!r}, not {name!r}.")
     names = (model.gains, model.constants, model.uncertain)
     given = (loop.gains, loop.constants, loop.uncertain)
     require(
         all({s.name for s in symbols} == set(values) for symbols, values in zip(names, given, strict=True)),
         f"the gains, constants or uncertain parameters are not those of {loop.law}.",
     )
+    derived = loop_of(loop.law, model, gains=loop.gains, uncertain=loop.uncertain, constants=loop.constants)
     require(
         list(derived.states.items()) == list(loop.states.items())
         and derived.domain == loop.domain
-        and _sorted(derived) == _sorted(loop),
+        and {name: of for name, (of, _) in derived.roots.items()} == {name: of for name, (of, _) in loop.roots.items()}
+        and _sorted(derived, derived.field) == _sorted(loop, loop.field)
+        and _sorted(derived, derived.lifts) == _sorted(loop, loop.lifts),
         f"the field is not that of {loop.law}.",
     )
 
 
-def _sorted(loop: Loop) -> dict[str, list[Term]]:
-    order = {s: i for i, s in enumerate(loop.states)}
+def _sorted(loop: Loop, sums: Mapping[str, tuple[Term, ...]]) -> dict[str, list[Term]]:
+    order = {s: i for i, s in enumerate((*loop.states, *loop.lifts))}
     return {
         state: sorted(
             Term(t.coefficient, tuple(sorted(t.parameters)), tuple(sorted(t.factors, key=lambda f: order[f[0]])))
             for t in terms
         )
-        for state, terms in loop.field.items()
+        for state, terms in sums.items()
     }
 
 
@@ -55,33 +62,40 @@ def _check_proof(certificate: Certificate) -> None:
     loop, claims = certificate.loop, certificate.claims
     second = "decrease" if loop.domain == "cells" else "rate"
     required, allowed = {"positive", second}, {f"bound_{state}" for state in loop.states}
+    allowed |= {"decay"} if second == "decrease" else set()
     require(
-        required <= set(claims) <= required | allowed, f"the claims must be positive, {second} and bounds of states."
+        required <= set(claims) <= required | allowed,
+        f"the claims must be positive, {second}, bounds of states and, on cells, decay.",
     )
     require(all(c > 0 for c in claims.values()), "a claim must be positive.")
-    uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.uncertain)
+    uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.ranges)
     require(not uncertain, "V must not depend on an uncertain parameter.")
-    known = set[tuple[tuple[tuple[int, ...], Fraction], ...]]()
+    _check_roots(loop)
+    known = set[tuple]()
     expected = list[str]()
-    for name, polynomial in claimed(loop, certificate.lyapunov, claims):
-        key = tuple(sorted(polynomial.items()))
-        if key in known:
+    for one in claimed(loop, certificate.lyapunov, claims):
+        if one.key in known:
             continue
-        known.add(key)
-        expected.append(name)
-        require(name in certificate.witnesses, f"the witness of {name!r} is missing.")
-        witness = certificate.witnesses[name]
-        fits = all(len(e) == len(loop.states) for e in witness.multiplier)
-        require(
-            fits and proves(polynomial, witness, orthant=loop.domain == "cells"),
-            f"the witness of {name!r} does not prove its polynomial.",
-        )
+        known.add(one.key)
+        expected.append(one.name)
+        require(one.name in certificate.witnesses, f"the witness of {one.name!r} is missing.")
+        holds = proves(one, certificate.witnesses[one.name], loop.domain)
+        require(holds, f"the witness of {one.name!r} does not prove its polynomial.")
     extra = "there are witnesses that no obligation needs, or in another order."
     require(expected == list(certificate.witnesses), extra)
 
 
+def _check_roots(loop: Loop) -> None:
+    for name, (of, (low, high)) in loop.roots.items():
+        number = loop.parameters[of]
+        require(
+            0 <= low <= high and low**2 <= number <= high**2, f"the range of {name} does not hold the root of {of}."
+        )
+    require(loop.domain == "cells" or not loop.lifts, "lifts belong on cells.")
+
+
 def _check_equilibrium(loop: Loop, equilibrium: Equilibrium) -> None:
-    require(loop.domain == "cells", "an equilibrium refutes only a loop on cells.")
+    require(loop.domain == "cells" and not loop.lifts and not loop.roots, "an equilibrium needs cells without lifts.")
     point, parameters = equilibrium.point, equilibrium.parameters
     require(set(point) == set(loop.states) and any(point.values()), "the point must be away from the origin.")
     require(

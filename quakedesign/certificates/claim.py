@@ -1,16 +1,19 @@
 """What a certificate is about, and what it consists of."""
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
+from math import isqrt
 
 import sympy as sp
 
-from quakedesign.controllers import LoopField
+from quakedesign.controllers import LoopField, Subject
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.sos import Witness
-from quakedesign.symbolic.terms import Term, from_terms, to_terms
+from quakedesign.sos.exact.polynomial import Polynomial
+from quakedesign.sos.exact.proofs import Square
+from quakedesign.symbolic.terms import Term, from_terms, to_terms, without_nesting
 
 Range = tuple[Fraction, Fraction]
 
@@ -40,6 +43,11 @@ class Loop:
         ``"cells"`` or ``"reals"``.
     uncertain : mapping of str to (Fraction, Fraction)
     field : mapping of str to tuple of Term
+        Powers of states and of lifts.
+    roots : mapping of str to (str, (Fraction, Fraction))
+        The gain or constant whose positive square root a name stands for, and an interval that holds it.
+    lifts : mapping of str to tuple of Term
+        Argument of every nested power.
     """
 
     law: str
@@ -49,6 +57,8 @@ class Loop:
     domain: str
     uncertain: Mapping[str, Range]
     field: Mapping[str, tuple[Term, ...]]
+    roots: Mapping[str, tuple[str, Range]] = dataclasses.field(default_factory=dict)
+    lifts: Mapping[str, tuple[Term, ...]] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, (low, high) in self.uncertain.items():
@@ -58,12 +68,40 @@ class Loop:
     @property
     def symbols(self) -> dict[str, sp.Symbol]:
         """SymPy symbol of every name."""
-        return {n: sp.Symbol(n, real=True) for n in (*self.states, *self.gains, *self.constants, *self.uncertain)}
+        names = (*self.states, *self.gains, *self.constants, *self.uncertain, *self.roots, *self.lifts)
+        return {n: sp.Symbol(n, real=True) for n in names}
+
+    @property
+    def ranges(self) -> dict[str, Range]:
+        """Ends of everything whose value is not known exactly: uncertain parameters, then roots."""
+        return {**self.uncertain, **{name: ends for name, (_, ends) in self.roots.items()}}
 
     @property
     def parameters(self) -> dict[str, Fraction]:
         """Exact values of gains and constants."""
         return {**self.gains, **self.constants}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Witness:
+    """multiplier · P = Σ squares + Σ cofactor_k · h_k on one cell.
+
+    Attributes
+    ----------
+    multiplier : mapping of exponents to Fraction
+        Positive coefficients.
+    squares : tuple of Square
+        Products of variables (their indices) and of sign conditions (indices after those of the variables).
+    cofactors : tuple of Polynomial
+        One for every equality of the cell.
+    conditions : int
+        Number of sign conditions of the cell.
+    """
+
+    multiplier: Polynomial
+    squares: tuple[Square, ...] = ()
+    cofactors: tuple[Polynomial, ...] = ()
+    conditions: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,17 +144,22 @@ class Certificate:
     witnesses: Mapping[str, Witness] = field(default_factory=dict)
     refutation: Equilibrium | None = None
 
-    def check(self) -> Verdict:
+    def check(self, law: Subject | None = None) -> Verdict:
         """Re-decide the statement from nothing but its claim, in exact arithmetic; field against law as well.
+
+        Parameters
+        ----------
+        law : str, type of Law or LoopField, optional
+            What the field must be that of; without it the law of the package that the certificate names.
 
         Raises
         ------
         CertificateError
-            When the proof does not hold.
+            When the proof does not hold, or the field is not that of the law.
         """
         from quakedesign.certificates.checking import check
 
-        return check(self)
+        return check(self, law)
 
     def save(self, path) -> None:
         """Write the file of FORMAT.md, whole or not at all."""
@@ -141,6 +184,10 @@ def loop_of(
         When the law has parts that this format cannot express, such as nested powers.
     """
     states = tuple(model.states)
+    names = [s.name for s in (*model.gains, *model.constants, *model.uncertain, *model.roots, *states)]
+    lifts, rates = without_nesting(list(model.field.values()), states, names)
+    powers = (*states, *lifts)
+    values = {**gains, **(constants or {})}
     return Loop(
         law=law,
         gains=dict(gains),
@@ -148,8 +195,28 @@ def loop_of(
         states={s.name: w for s, w in model.states.items()},
         domain=model.domain,
         uncertain=dict(uncertain),
-        field={s.name: to_terms(rate, states) for s, rate in model.field.items()},
+        field={s.name: to_terms(rate, powers) for s, rate in zip(states, rates, strict=True)},
+        roots={root.name: (of.name, root_enclosure(values[of.name])) for root, of in model.roots.items()},
+        lifts={lift.name: to_terms(argument, powers) for lift, argument in lifts.items()},
     )
+
+
+def root_enclosure(number: Fraction) -> Range:
+    """Rational interval around the square root of a number ≥ 0: a point if rational, else of relative width 1e-6.
+
+    Raises
+    ------
+    ParameterError
+        When the number is negative.
+    """
+    if number < 0:
+        raise ParameterError(f"a root needs a number that is not negative. Received {number}.")
+    top, bottom = isqrt(number.numerator), isqrt(number.denominator)
+    if Fraction(top, bottom) ** 2 == number:
+        return Fraction(top, bottom), Fraction(top, bottom)
+    scale = 2 ** max(0, 20 + (number.denominator.bit_length() - number.numerator.bit_length()) // 2)
+    low = Fraction(isqrt(number.numerator * scale**2 // number.denominator), scale)
+    return low, low + Fraction(1, scale)
 
 
 def sympy_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:

@@ -2,15 +2,16 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from quakedesign.certificates.claim import Certificate, Equilibrium, Loop
+from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Witness
 from quakedesign.errors import CertificateError
 from quakedesign.output import write_whole
-from quakedesign.sos import Block, Witness
+from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.exact.strict import (
     LARGEST_FILE,
     NAME,
@@ -29,7 +30,16 @@ from quakedesign.sos.exact.strict import (
 from quakedesign.symbolic.terms import Term
 
 _LAW = re.compile(r"[A-Za-z0-9_-]{1,40}")
-_LIMITS = {"states": 6, "uncertain": 8, "parameters": 64, "terms": 200, "basis": 200, "witnesses": 4096}
+_LIMITS = {
+    "roots": 4,
+    "lifts": 4,
+    "states": 6,
+    "uncertain": 8,
+    "parameters": 64,
+    "terms": 200,
+    "basis": 200,
+    "witnesses": 4096,
+}
 
 
 def load_certificate(path: str | Path) -> Certificate:
@@ -79,7 +89,8 @@ def certificate_of(raw: Any) -> Certificate:
     return _certificate(with_keys(raw, _PROOF if isinstance(raw, dict) and "refutation" not in raw else _REFUTATION))
 
 
-_COMMON = {"format", "law", "gains", "constants", "states", "domain", "uncertain", "field"}
+_COMMON = {"format", "law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field"}
+_WITNESS = {"obligation", "multiplier", "squares", "equalities", "inequalities"}
 _PROOF = _COMMON | {"V", "claims", "witnesses"}
 _REFUTATION = _COMMON | {"refutation"}
 
@@ -91,13 +102,13 @@ def _certificate(raw: dict[str, Any]) -> Certificate:
         return Certificate(loop=loop, refutation=_equilibrium(raw["refutation"]))
     witnesses: dict[str, Witness] = {}
     for entry in listed(raw["witnesses"], "witnesses", _LIMITS["witnesses"]):
-        name = with_keys(entry, {"obligation", "multiplier", "squares"})["obligation"]
+        name = with_keys(entry, _WITNESS)["obligation"]
         need(isinstance(name, str) and name not in witnesses, "an obligation must be named once, by a text")
-        witnesses[name] = _witness(entry, len(loop.states))
+        witnesses[name] = _witness(entry, loop)
     return Certificate(
         loop=loop,
-        lyapunov=_terms(raw["V"], loop),
-        claims=read_rationals(raw["claims"], "claims", 2 + _LIMITS["states"]),
+        lyapunov=_terms(raw["V"], loop, tuple(loop.states)),
+        claims=read_rationals(raw["claims"], "claims", 3 + _LIMITS["states"]),
         witnesses=witnesses,
     )
 
@@ -109,7 +120,9 @@ def _loop(raw: dict[str, Any]) -> Loop:
     constants = read_rationals(raw["constants"], "constants", _LIMITS["parameters"])
     states = objected(raw["states"], "states", _LIMITS["states"])
     uncertain = objected(raw["uncertain"], "uncertain", _LIMITS["uncertain"])
-    names = [*gains, *constants, *states, *uncertain]
+    lifts = objected(raw["lifts"], "lifts", _LIMITS["lifts"])
+    roots = objected(raw["roots"], "roots", _LIMITS["roots"])
+    names = [*gains, *constants, *states, *uncertain, *roots, *lifts]
     need(len(set(names)) == len(names) and len(gains) + len(constants) <= _LIMITS["parameters"], "names must differ")
     need(all(NAME.fullmatch(n) for n in names) and states != {}, "states and uncertain need names")
     top = 12 if raw["domain"] == "cells" else 1
@@ -119,6 +132,7 @@ def _loop(raw: dict[str, Any]) -> Loop:
         low, high = (read_rational(v) for v in listed(ends, "a range", length=2))
         need(low <= high, f"the range of {name} is not ordered")
         ranges[name] = (low, high)
+    known = {**gains, **constants}
     bare = Loop(
         law=raw["law"],
         gains=gains,
@@ -127,55 +141,83 @@ def _loop(raw: dict[str, Any]) -> Loop:
         domain=raw["domain"],
         uncertain=ranges,
         field={},
+        roots={name: _root(entry, known) for name, entry in roots.items()},
     )
+    powers = (*states, *lifts)
+    arguments = {lift: _terms(lifts[lift], bare, powers[: len(states) + i]) for i, lift in enumerate(lifts)}
+    need(bare.domain == "cells" or not lifts, "lifts belong on cells")
     rates = with_keys(raw["field"], set(states))
-    field = {state: _terms(rates[state], bare) for state in states}
-    return Loop(**{**{f: getattr(bare, f) for f in bare.__slots__}, "field": field})
+    return replace(bare, lifts=arguments, field={state: _terms(rates[state], bare, powers) for state in states})
 
 
-def _terms(raw: Any, loop: Loop) -> tuple[Term, ...]:
-    return tuple(_term(entry, loop) for entry in listed(raw, "terms", _LIMITS["terms"]))
+def _root(raw: Any, known: dict[str, Fraction]) -> tuple[str, tuple[Fraction, Fraction]]:
+    of, low, high = listed(raw, "a root", length=3)
+    need(isinstance(of, str) and of in known, "a root must be one of a gain or constant")
+    return of, (read_rational(low), read_rational(high))
 
 
-def _term(raw: Any, loop: Loop) -> Term:
-    number, names, powers = listed(raw, "a term", length=3)
+def _terms(raw: Any, loop: Loop, powers: Sequence[str]) -> tuple[Term, ...]:
+    return tuple(_term(entry, loop, powers) for entry in listed(raw, "terms", _LIMITS["terms"]))
+
+
+def _term(raw: Any, loop: Loop, powers: Sequence[str]) -> Term:
+    number, names, entries = listed(raw, "a term", length=3)
     coefficient = read_rational(number)
     need(coefficient != 0, "a term must not be zero")
-    known = {*loop.gains, *loop.constants, *loop.uncertain}
+    known = {*loop.gains, *loop.constants, *loop.ranges}
     parameters = tuple(listed(names, "parameters", 32))
     need(all(isinstance(n, str) and n in known for n in parameters), "a term has an unknown parameter")
-    factors = tuple(_factor(entry, loop) for entry in listed(powers, "factors", _LIMITS["states"]))
+    factors = tuple(_factor(entry, powers) for entry in listed(entries, "factors", len(powers)))
     need(len({f[0] for f in factors}) == len(factors), "a state occurs twice in a term")
     return Term(coefficient, parameters, factors)
 
 
-def _factor(raw: Any, loop: Loop) -> tuple[str, Fraction, str]:
+def _factor(raw: Any, powers: Sequence[str]) -> tuple[str, Fraction, str]:
     state, exponent, kind = listed(raw, "a factor", length=3)
     power = read_rational(exponent)
-    need(isinstance(state, str) and state in loop.states, "a factor has an unknown state")
+    need(isinstance(state, str) and state in powers, "a factor has an unknown state")
     need(
         kind in ("s", "a") and 0 <= power <= 24 and (kind == "s" or power > 0), "a factor has a wrong kind or exponent"
     )
     return state, power, kind
 
 
-def _witness(raw: dict[str, Any], variables: int) -> Witness:
-    multiplier = read_polynomial(raw["multiplier"], "multiplier", variables, _LIMITS["basis"])
-    blocks = []
-    for entry in listed(raw["squares"], "squares", 1 << variables):
-        block = with_keys(entry, {"times", "basis", "gram"})
-        gram = [read_rational(v) for v in listed(block["gram"], "gram")]
+def _witness(raw: dict[str, Any], loop: Loop) -> Witness:
+    multiplier = read_polynomial(raw["multiplier"], "multiplier", None, _LIMITS["basis"])
+    need(multiplier != {}, "a multiplier must not be empty")
+    variables = len(next(iter(multiplier)))
+    need(len(loop.states) <= variables <= len(loop.states) + len(loop.lifts) + 1, "a multiplier has a wrong key")
+    squares = _squares(raw["squares"], variables, loop, ())
+    conditions = listed(raw["inequalities"], "inequalities", _LIMITS["lifts"])
+    for k, entries in enumerate(conditions):
+        squares += _squares(entries, variables, loop, (variables + k,))
+    cofactors = listed(raw["equalities"], "equalities", _LIMITS["lifts"] + 1)
+    return Witness(
+        multiplier=multiplier,
+        squares=tuple(squares),
+        cofactors=tuple(read_polynomial(q, "a cofactor", variables, 20_000) for q in cofactors),
+        conditions=len(conditions),
+    )
+
+
+def _squares(raw: Any, variables: int, loop: Loop, condition: tuple[int, ...]) -> list[Square]:
+    found = []
+    for entry in listed(raw, "squares", 1 << variables):
+        square = with_keys(entry, {"times", "basis", "gram"})
+        times = read_exponents(square["times"], variables, 1 if loop.domain == "cells" else 0)
+        gram = [read_rational(v) for v in listed(square["gram"], "gram")]
         common_grid(gram)
-        basis = listed(block["basis"], "basis", _LIMITS["basis"])
+        basis = tuple(read_exponents(b, variables, 999) for b in listed(square["basis"], "basis", _LIMITS["basis"]))
         size = len(basis)
-        blocks.append(
-            Block(
-                times=read_exponents(block["times"], variables, 1),
-                basis=tuple(read_exponents(b, variables, 999) for b in basis),
+        need(0 < size == len(set(basis)), "a basis must be a list of different exponents")
+        found.append(
+            Square(
+                product=(*(i for i, x in enumerate(times) if x), *condition),
+                basis=basis,
                 gram=tuple(listed(gram, "gram", length=size * (size + 1) // 2)),
             )
         )
-    return Witness(multiplier=multiplier, blocks=tuple(blocks))
+    return found
 
 
 def _equilibrium(raw: Any) -> Equilibrium:
@@ -211,6 +253,8 @@ def _plain(certificate: Certificate) -> dict[str, Any]:
         "states": dict(loop.states),
         "domain": loop.domain,
         "uncertain": {name: [str(low), str(high)] for name, (low, high) in loop.uncertain.items()},
+        "roots": {name: [of, str(low), str(high)] for name, (of, (low, high)) in loop.roots.items()},
+        "lifts": {lift: _plain_terms(terms) for lift, terms in loop.lifts.items()},
         "field": {state: _plain_terms(terms) for state, terms in loop.field.items()},
     }
     if certificate.refutation is not None:
@@ -220,18 +264,32 @@ def _plain(certificate: Certificate) -> dict[str, Any]:
     return plain | {
         "V": _plain_terms(certificate.lyapunov),
         "claims": _texts(certificate.claims),
-        "witnesses": [
-            {
-                "obligation": name,
-                "multiplier": polynomial_text(witness.multiplier),
-                "squares": [
-                    {"times": list(b.times), "basis": [list(v) for v in b.basis], "gram": [str(v) for v in b.gram]}
-                    for b in witness.blocks
-                ],
-            }
-            for name, witness in certificate.witnesses.items()
-        ],
+        "witnesses": [_plain_witness(name, witness) for name, witness in certificate.witnesses.items()],
     }
+
+
+def _plain_witness(name: str, witness: Witness) -> dict[str, Any]:
+    variables = len(next(iter(witness.multiplier)))
+
+    def squares(condition: int | None) -> list[dict[str, Any]]:
+        return [_plain_square(s, variables) for s in witness.squares if _condition(s, variables) == condition]
+
+    return {
+        "obligation": name,
+        "multiplier": polynomial_text(witness.multiplier),
+        "squares": squares(None),
+        "equalities": [polynomial_text(q) for q in witness.cofactors],
+        "inequalities": [squares(k) for k in range(witness.conditions)],
+    }
+
+
+def _condition(square: Square, variables: int) -> int | None:
+    return next((i - variables for i in square.product if i >= variables), None)
+
+
+def _plain_square(square: Square, variables: int) -> dict[str, Any]:
+    times = [int(i in square.product) for i in range(variables)]
+    return {"times": times, "basis": [list(b) for b in square.basis], "gram": [str(v) for v in square.gram]}
 
 
 def save_certificate(certificate: Certificate, path: str | Path) -> None:

@@ -1,4 +1,4 @@
-"""From a loop and a Lyapunov function to the polynomials that must be non-negative."""
+"""From a loop and a Lyapunov function to the polynomials that must be non-negative (FORMAT.md, 2 to 5)."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -8,13 +8,56 @@ from itertools import product
 
 from quakedesign.certificates.claim import Loop, require, sympy_field
 from quakedesign.errors import CertificateError, KinkError
-from quakedesign.sos import Polynomial
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination
 from quakedesign.symbolic.terms import Term, cell_polynomial, from_terms, lie_derivative, real_polynomial, to_terms
 
 
 @dataclass(frozen=True)
+class Cell:
+    """Signs of states and lifts, and the conditions on the cell variables.
+
+    Attributes
+    ----------
+    name : str
+        Signs as a word of + and −, states first; empty on the reals.
+    signs : mapping of str to int
+    equalities, inequalities : tuple of Polynomial
+        Each is 0, or ≥ 0, on the cell.
+    """
+
+    name: str
+    signs: Mapping[str, int]
+    equalities: tuple[Polynomial, ...] = ()
+    inequalities: tuple[Polynomial, ...] = ()
+
+
+@dataclass(frozen=True)
+class Obligation:
+    """One polynomial that must be non-negative on a cell.
+
+    Attributes
+    ----------
+    name : str
+    polynomial : Polynomial
+        In the variables of states, lifts and, for a decay, V^{1/m}; all ≥ 0 unless on the reals.
+    equalities, inequalities : tuple of Polynomial
+    """
+
+    name: str
+    polynomial: Polynomial
+    equalities: tuple[Polynomial, ...] = ()
+    inequalities: tuple[Polynomial, ...] = ()
+
+    @property
+    def key(self) -> tuple:
+        """What two obligations share when one witness serves both."""
+        parts = ((self.polynomial,), self.equalities, self.inequalities)
+        return tuple(tuple(tuple(sorted(p.items())) for p in part) for part in parts)
+
+
+@dataclass(frozen=True)
 class Obligations:
-    """All polynomials that decide V > 0 and V̇ < 0 for one loop and one V (FORMAT.md, 2 to 5).
+    """All polynomials that decide V > 0 and V̇ < 0 for one loop and one V.
 
     Attributes
     ----------
@@ -27,7 +70,7 @@ class Obligations:
 
     @cached_property
     def derivative(self) -> tuple[Term, ...]:
-        """Terms of V̇; refused unless V is C¹ and V̇ affine in every uncertain parameter."""
+        """Terms of V̇; refused unless V is C¹ and V̇ affine in everything that has a range."""
         symbols = self.loop.symbols
         kinks = [t for t in self.lyapunov for _, a, kind in t.factors if a < 1 or (kind == "a" and a == 1)]
         require(not kinks, "V is not continuously differentiable term by term.")
@@ -35,44 +78,142 @@ class Obligations:
             rate = lie_derivative(from_terms(self.lyapunov, symbols), sympy_field(self.loop))
         except KinkError as error:
             raise CertificateError(f"V is not continuously differentiable: {error}") from None
-        terms = to_terms(rate, [symbols[s] for s in self.loop.states])
-        twice = {p for t in terms for p in t.parameters if p in self.loop.uncertain and t.parameters.count(p) > 1}
+        terms = to_terms(rate, [symbols[s] for s in (*self.loop.states, *self.loop.lifts)])
+        ranges = self.loop.ranges
+        twice = {p for t in terms for p in t.parameters if p in ranges and t.parameters.count(p) > 1}
         require(not twice, f"V̇ is not affine in {', '.join(sorted(twice))}; the ends of its range do not decide.")
         return terms
 
-    def cells(self) -> Iterator[tuple[str, dict[str, int]]]:
-        """Every sign cell with its name; one without a name on the reals."""
-        states = tuple(self.loop.states)
+    def sign_cells(self) -> Iterator[Cell]:
+        """Every sign cell of the states; one without a name on the reals."""
         if self.loop.domain == "reals":
-            yield "", dict.fromkeys(states, 1)
+            yield Cell("", dict.fromkeys(self.loop.states, 1))
             return
-        for signs in product((1, -1), repeat=len(states)):
-            yield "".join("+" if s > 0 else "-" for s in signs), dict(zip(states, signs, strict=True))
+        for signs in _signs(tuple(self.loop.states)):
+            yield Cell(_word(signs), signs)
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """Every sign cell of states and lifts that may have an interior."""
+        if not self.loop.lifts:
+            return tuple(self.sign_cells())
+        found = (self._cell(signs) for signs in _signs((*self.loop.states, *self.loop.lifts)))
+        return tuple(cell for cell in found if cell is not None)
+
+    @cached_property
+    def with_variable(self) -> tuple[str, ...]:
+        """Lifts that occur with a positive exponent somewhere, in order; refused if one occurs nowhere."""
+        everything = [t for terms in (*self.loop.field.values(), *self.loop.lifts.values()) for t in terms]
+        exponents: dict[str, list[Fraction]] = {lift: [] for lift in self.loop.lifts}
+        for term in everything:
+            for name, exponent, _ in term.factors:
+                if name in exponents:
+                    exponents[name].append(exponent)
+        require(all(exponents.values()), "a lift occurs nowhere.")
+        return tuple(lift for lift, found in exponents.items() if any(found))
+
+    @cached_property
+    def lift_degrees(self) -> dict[str, int]:
+        """Degree n of every lift's argument, a form in the cell variables."""
+        degrees: dict[str, int] = {}
+        for lift, terms in self.loop.lifts.items():
+            values = self._fixed_values()
+            weights = {**self.loop.states, **degrees}
+            found = {
+                sum(e)
+                for signs in _signs(tuple(weights))
+                for e in cell_polynomial(self._live(terms, values), weights, signs, values) or [()]
+            }
+            require(len(found) == 1 and min(found) >= 1, f"the argument of {lift} is no form of one positive degree.")
+            degrees[lift] = found.pop()
+        return degrees
+
+    def _cell(self, signs: Mapping[str, int]) -> Cell | None:
+        """Cell with its conditions; None where a condition leaves it without interior."""
+        values, weights = self._fixed_values(), {**self.loop.states, **self.lift_degrees}
+        equalities, inequalities = [], []
+        for lift, terms in self.loop.lifts.items():
+            argument = self._kept(cell_polynomial(self._live(terms, values), weights, signs, values))
+            if lift in self.with_variable:
+                position = len(self.loop.states) + self.with_variable.index(lift)
+                power = tuple(self.lift_degrees[lift] * (i == position) for i in range(self.variables))
+                condition = combination([(Fraction(signs[lift]), {power: Fraction(1)}), (Fraction(-1), argument)])
+                equalities.append(condition)
+                if len({c > 0 for c in condition.values()}) == 1:
+                    return None
+            else:
+                inequalities.append({e: signs[lift] * c for e, c in argument.items()})
+                if all(c < 0 for c in inequalities[-1].values()):
+                    return None
+        return Cell(_word(signs), signs, tuple(equalities), tuple(inequalities))
+
+    @property
+    def variables(self) -> int:
+        """Number of cell variables of states and lifts."""
+        return len(self.loop.states) + len(self.with_variable)
+
+    def _fixed_values(self) -> dict[str, Fraction]:
+        """Values of everything that is a point."""
+        points = {name: low for name, (low, high) in self.loop.ranges.items() if low == high}
+        return {**self.loop.parameters, **points}
+
+    def _live(self, terms: tuple[Term, ...], values: Mapping[str, Fraction]) -> tuple[Term, ...]:
+        """Terms of a lift without those that a zero parameter removes; refused if one has a range."""
+        known = self.loop.parameters
+        live = tuple(t for t in terms if all(known.get(p, Fraction(1)) for p in t.parameters))
+        require(
+            all(p in values for t in live for p in t.parameters), "the argument of a lift has a parameter with a range."
+        )
+        return live
+
+    def _kept(self, polynomial: Polynomial) -> dict[Exponents, Fraction]:
+        """Polynomial without the columns of lifts that have no variable."""
+        names = (*self.loop.states, *self.loop.lifts)
+        kept = [i for i, name in enumerate(names) if name not in self.loop.lifts or name in self.with_variable]
+        return combination([(c, {tuple(e[i] for i in kept): Fraction(1)}) for e, c in polynomial.items()])
 
     def vertices(self) -> Iterator[tuple[str, dict[str, Fraction]]]:
-        """Every vertex of the uncertain box with its name."""
-        ends = [sorted(set(ends)) for ends in self.loop.uncertain.values()]
-        for values in product(*ends):
-            vertex = dict(zip(self.loop.uncertain, values, strict=True))
+        """Every vertex of the box of ranges with its name."""
+        ranges = self.loop.ranges
+        for values in product(*(sorted(set(ends)) for ends in ranges.values())):
+            vertex = dict(zip(ranges, values, strict=True))
             yield " ".join(f"{name}={v}" for name, v in vertex.items()), vertex
 
-    def function(self, claim: str = "positive") -> Iterator[tuple[str, Polynomial]]:
-        """V on every cell; `claim` begins the names."""
-        for cell, signs in self.cells():
-            yield " ".join(filter(None, (claim, cell))), self._polynomial(self.lyapunov, signs, {})
+    def function(self, claim: str = "positive") -> Iterator[tuple[str, dict[Exponents, Fraction]]]:
+        """V on every sign cell of the states; `claim` begins the names."""
+        for cell in self.sign_cells():
+            yield " ".join(filter(None, (claim, cell.name))), self.potential(cell.signs)
 
-    def decrease(self, claim: str) -> Iterator[tuple[str, Polynomial]]:
+    def potential(self, signs: Mapping[str, int]) -> dict[Exponents, Fraction]:
+        """V on one cell, in the variables of the states."""
+        states = {s: signs[s] for s in self.loop.states}
+        if self.loop.domain == "reals":
+            return real_polynomial(self.lyapunov, tuple(states), self.loop.parameters)
+        return cell_polynomial(self.lyapunov, self.loop.states, states, self.loop.parameters)
+
+    def decrease(self, claim: str) -> Iterator[tuple[Cell, Obligation]]:
         """−V̇ on every cell and vertex; `claim` begins the names."""
-        for cell, signs in self.cells():
+        for cell in self.cells:
             for vertex, values in self.vertices():
-                negative = {e: -c for e, c in self._polynomial(self.derivative, signs, values).items()}
-                yield " ".join(filter(None, (claim, cell, vertex))), negative
+                name = " ".join(filter(None, (claim, cell.name, vertex)))
+                polynomial = {e: -c for e, c in self._rate(cell.signs, values).items()}
+                yield cell, Obligation(name, polynomial, cell.equalities, cell.inequalities)
 
-    def _polynomial(self, terms: tuple[Term, ...], signs: Mapping[str, int], vertex: Mapping[str, Fraction]):
+    def _rate(self, signs: Mapping[str, int], vertex: Mapping[str, Fraction]) -> dict[Exponents, Fraction]:
         values = {**self.loop.parameters, **vertex}
         if self.loop.domain == "reals":
-            return real_polynomial(terms, tuple(self.loop.states), values)
-        return cell_polynomial(terms, self.loop.states, signs, values)
+            return real_polynomial(self.derivative, tuple(self.loop.states), values)
+        weights = {**self.loop.states, **self.lift_degrees}
+        return self._kept(cell_polynomial(self.derivative, weights, signs, values))
+
+
+def _signs(names: tuple[str, ...]) -> Iterator[dict[str, int]]:
+    for signs in product((1, -1), repeat=len(names)):
+        yield dict(zip(names, signs, strict=True))
+
+
+def _word(signs: Mapping[str, int]) -> str:
+    return "".join("+" if s > 0 else "-" for s in signs.values())
 
 
 def degree(polynomials: list[Polynomial], what: str) -> int:
@@ -85,41 +226,59 @@ def degree(polynomials: list[Polynomial], what: str) -> int:
     """
     degrees = {sum(exponents) for p in polynomials for exponents in p}
     require(len(degrees) == 1 and min(degrees) >= 1, f"{what} is not homogeneous of one positive degree.")
+    require(all(polynomials), f"{what} vanishes on a cell.")
     return degrees.pop()
 
 
-def power_sum(variables: int, power: int, factor: Fraction) -> dict[tuple[int, ...], Fraction]:
-    """factor · Σ u_i^power."""
-    return {tuple(power if j == i else 0 for j in range(variables)): factor for i in range(variables)}
+def power_sum(chosen: int, power: int, variables: int) -> dict[Exponents, Fraction]:
+    """Σ u_i^power over the first `chosen` of the variables."""
+    return {tuple(power if j == i else 0 for j in range(variables)): Fraction(1) for i in range(chosen)}
 
 
-def difference(left: Polynomial, right: Polynomial) -> dict[tuple[int, ...], Fraction]:
-    """Left minus right, without zero coefficients."""
-    total = dict(left)
-    for exponents, c in right.items():
-        total[exponents] = total.get(exponents, Fraction(0)) - c
-    return {e: c for e, c in total.items() if c}
-
-
-def claimed(loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fraction]) -> Iterator[tuple[str, Polynomial]]:
+def claimed(loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fraction]) -> Iterator[Obligation]:
     """Every obligation of a certificate with the polynomial that must be non-negative, in the order of FORMAT.md."""
     obligations = Obligations(loop, lyapunov)
-    variables = len(loop.states)
+    states = len(loop.states)
     function = list(obligations.function())
     m = degree([p for _, p in function], "V")
     require(loop.domain == "cells" or m % 2 == 0, "V has odd degree on the reals.")
     for name, polynomial in function:
-        yield name, difference(polynomial, power_sum(variables, m, claims["positive"]))
+        yield Obligation(name, less(polynomial, claims["positive"], power_sum(states, m, states)))
     for i, state in enumerate(loop.states):
         for name, polynomial in obligations.function(f"bound_{state}") if f"bound_{state}" in claims else ():
-            corner = {tuple(m if j == i else 0 for j in range(variables)): claims[f"bound_{state}"]}
-            yield name, difference(polynomial, corner)
+            corner = {tuple(m if j == i else 0 for j in range(states)): Fraction(1)}
+            yield Obligation(name, less(polynomial, claims[f"bound_{state}"], corner))
     second = "decrease" if loop.domain == "cells" else "rate"
     decrease = list(obligations.decrease(second))
-    n = degree([p for _, p in decrease], "V̇")
-    for name, polynomial in decrease:
-        if second == "decrease":
-            yield name, difference(polynomial, power_sum(variables, n, claims[second]))
-        else:
-            require(m == n, "a rate needs V and V̇ of the same degree.")
-            yield name, difference(polynomial, {e: 2 * claims[second] * c for e, c in function[0][1].items()})
+    n = degree([o.polynomial for _, o in decrease], "V̇")
+    require(second == "decrease" or m == n, "a rate needs V and V̇ of the same degree.")
+    width = len(next(iter(decrease[0][1].polynomial)))
+    margin = power_sum(states, n, width) if second == "decrease" else {e: 2 * c for e, c in function[0][1].items()}
+    for _, one in decrease:
+        polynomial = less(one.polynomial, claims[second], margin)
+        yield Obligation(one.name, polynomial, one.equalities, one.inequalities)
+    if "decay" in claims:
+        for cell, one in decrease:
+            yield with_decay(obligations, cell, one, claims["decay"], m, n)
+
+
+def with_decay(obligations: Obligations, cell: Cell, one: Obligation, rate: Fraction, m: int, n: int) -> Obligation:
+    """−V̇ − κv^n with v^m = V, from −V̇ on a cell."""
+    states, width = len(obligations.loop.states), len(next(iter(one.polynomial))) + 1
+    potential = {(*e, *(0,) * (width - states)): c for e, c in obligations.potential(cell.signs).items()}
+    last = {(*(0,) * (width - 1), m): Fraction(1)}
+
+    def wider(p: Polynomial) -> dict[Exponents, Fraction]:
+        return {(*e, 0): c for e, c in p.items()}
+
+    return Obligation(
+        name=one.name.replace("decrease", "decay", 1),
+        polynomial=less(wider(one.polynomial), rate, {(*(0,) * (width - 1), n): Fraction(1)}),
+        equalities=(*map(wider, one.equalities), less(last, Fraction(1), potential)),
+        inequalities=tuple(map(wider, one.inequalities)),
+    )
+
+
+def less(polynomial: Polynomial, factor: Fraction, other: Polynomial) -> dict[Exponents, Fraction]:
+    """Polynomial − factor · other, without zero coefficients."""
+    return combination([(Fraction(1), polynomial), (-factor, other)])

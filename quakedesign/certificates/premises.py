@@ -1,172 +1,134 @@
 """What a certificate needs, against what a given fault, reference and disturbance ask for. Ball arithmetic only."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
-import sympy as sp
-
-from quakedesign.certificates.claim import Certificate, require, sympy_field
+from quakedesign.certificates.claim import Certificate, require
+from quakedesign.certificates.domain import Domain, Question, certified_domain, certified_lipschitz
+from quakedesign.certificates.level_sets import LevelSets
+from quakedesign.certificates.matched import (
+    Errors,
+    Range,
+    coefficient_range,
+    friction_range,
+    initial_perturbation,
+    largest_matched_rate,
+    least_authority,
+    plant_ranges,
+)
+from quakedesign.certificates.premise import Premise
+from quakedesign.certificates.robustness import robustness
 from quakedesign.controllers import SlidingMode
+from quakedesign.controllers.feed_forward import FEED_FORWARDS, FeedForward, feed_forward
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
-from quakedesign.symbolic import plant
-from quakedesign.symbolic.balls import enclose, upper_bound
-from quakedesign.symbolic.terms import from_terms
 
-Range = tuple[Fraction, Fraction]
-
-stage = sp.Symbol("s", nonnegative=True)
+__all__ = [
+    "Domain",
+    "Errors",
+    "LevelSets",
+    "Premise",
+    "Range",
+    "Variant",
+    "certified_lipschitz",
+    "coefficient_range",
+    "control_coefficient",
+    "feedforward_variants",
+    "friction_range",
+    "largest_matched_rate",
+    "least_authority",
+    "matched_rate_premise",
+    "plant_ranges",
+    "sliding_mode_premises",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Premise:
-    """One condition under which a certificate speaks about a given loop.
+class Variant:
+    """What is certified of the same gains with one feed-forward.
 
     Attributes
     ----------
-    name : str
-    required : float
-        What the loop asks for, in `unit`; a rigorous upper bound unless `measured`.
-    certified : float
-        What the certificate covers, in `unit`.
-    unit : str
-    proved : bool
-        False if `certified` is only a limit that no certificate can exceed; the premise then never holds.
-    measured : bool
-        True if `required` was read off a simulation.
-    note : str
-        What the number assumes.
+    feedforward : FeedForward
+    premises : tuple of Premise
+    domain : Domain or None
+        None where the certificate has no bounds of its states, or there is none.
     """
 
-    name: str
-    required: float
-    certified: float
-    unit: str
-    measured: bool = False
-    proved: bool = True
-    note: str = ""
+    feedforward: FeedForward
+    premises: tuple[Premise, ...]
+    domain: Domain | None
 
-    @property
-    def ratio(self) -> float | None:
-        """required/certified [-]; None where nothing is certified and something is required."""
-        if self.certified == 0:
-            return 0.0 if self.required == 0 else None
-        return self.required / self.certified
-
-    @property
-    def holds(self) -> bool:
-        """Whether the ratio is at most 1 and a certificate exists."""
-        return self.proved and self.ratio is not None and self.ratio <= 1
-
-    def to_dict(self) -> dict:
-        """Keys of DESIGN.md and the unit."""
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; exact coefficients as texts."""
         return {
-            "name": self.name,
-            "required": self.required,
-            "certified": self.certified,
-            "ratio": self.ratio,
-            "holds": self.holds,
-            "unit": self.unit,
-            "measured": self.measured,
-            "note": self.note,
+            "feedforward": self.feedforward.name,
+            "coefficients": {name: str(v) for name, v in self.feedforward.coefficients.items()},
+            "premises": [p.to_dict() for p in self.premises],
+            "domain": self.domain.to_dict() if self.domain else None,
         }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Errors:
-    """Bounds on |e1| [m], |e2| [m/s] and |e2'| [m/s²]."""
+def sliding_mode_premises(
+    fault: Fault, controller: SlidingMode, certificate: Certificate | None
+) -> tuple[list[Premise], Domain | None]:
+    """Premises that can be decided without a run, and the certified domain.
 
-    slip: Fraction
-    rate: Fraction
-    acceleration: Fraction
+    `along_reference` takes the errors as zero. `level_set` takes the level set of V that holds the start x = 0, ξ = 0
+    for every disturbance of the class, and the errors' own part of h on it, by the better of two methods (`Domain`).
 
-    def ranges(self) -> dict[sp.Symbol, Range]:
-        """Symmetric ranges by symbol."""
-        parts = {plant.e1: self.slip, plant.e2: self.rate, plant.acceleration_error: self.acceleration}
-        return {symbol: (-v, v) for symbol, v in parts.items()}
-
-
-def friction_range(fault: Fault) -> Range:
-    """μ_res and μ_max [-], exact."""
-    low, high = (_fraction(v) for v in fault.friction.exact().bounds)
-    return low, high
-
-
-def plant_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
-    """Ranges of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] over the uncertainty box; σ'_n [Pa] is known."""
-    values = {symbol: _fraction(v) for symbol, v in plant.plant_values(fault).items()}
-    widths = {plant.k_hat: fault.box.stiffness, plant.eta_hat: fault.box.damping, plant.N_hat: fault.box.authority}
-    return {s: (v * (1 - widths.get(s, 0)), v * (1 + widths.get(s, 0))) for s, v in values.items()}
-
-
-def least_authority(fault: Fault) -> Fraction:
-    """μ_res·N̂_min [m²/kg], the divisor of designed gains and the b of the e-LQR (ERRATA 9)."""
-    return friction_range(fault)[0] * plant_ranges(fault)[plant.N_hat][0]
-
-
-def coefficient_range(fault: Fault, divisor: Fraction) -> Range:
-    """Range of β = μN̂/divisor [-] (eq. Bounds)."""
-    low, high = friction_range(fault)
-    N_low, N_high = plant_ranges(fault)[plant.N_hat]
-    return low * N_low / divisor, high * N_high / divisor
-
-
-def _reference_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
-    """r and its three derivatives [m, m/s, …] as polynomials of the stage t/t_op."""
-    t_op = sp.Rational(str(rational(fault.reference.operation_time)))
-    r = fault.reference.slip(stage * t_op)
-    names = (plant.r0, plant.r1, plant.r2, plant.r3)
-    return {name: sp.factor(sp.expand(r).diff(stage, n) / t_op**n) for n, name in enumerate(names)}
-
-
-@lru_cache(maxsize=16)
-def _matched_rate(fault: Fault, divisor: Fraction) -> sp.Expr:
-    static = friction_range(fault)[1]
-    known = {
-        plant.mu_star: sp.Rational(static.numerator, static.denominator),
-        plant.divisor: sp.Rational(divisor.numerator, divisor.denominator),
-    }
-    return plant.matched_rate().subs(known).subs(_reference_values(fault))
-
-
-def _box(fault: Fault) -> dict[sp.Symbol, Range]:
-    """Everything that h' depends on, but the errors: friction anywhere in its bounds and slopes."""
-    law, disturbance = fault.friction.exact(), fault.disturbance
-    slip_slope, rate_slope = (_fraction(sp.sympify(v)) for v in (law.slip_slope, law.rate_slope))
-    value, change = (rational(v) for v in (disturbance.largest_explicit, disturbance.largest_rate))
-    growth = rational(disturbance.slip_growth), rational(disturbance.rate_growth)
-    return plant_ranges(fault) | {
-        stage: (Fraction(0), Fraction(1)),
-        plant.friction_value: friction_range(fault),
-        plant.slip_slope: (-slip_slope, Fraction(0)),
-        plant.rate_slope: (-rate_slope, rate_slope),
-        plant.phi: (-value, value),
-        plant.phi_t: (-change, change),
-        plant.phi_1: (growth[0], growth[0]),
-        plant.phi_2: (growth[1], growth[1]),
-    }
-
-
-def largest_matched_rate(fault: Fault, divisor: Fraction, errors: Errors, *, pieces: int = 400) -> Fraction:
-    """Rigorous bound on |h'| [unit of ν per s] over the uncertainty box, the reference and the disturbance class.
-
-    Friction may be any function that weakens with slip within its bounds and slope bounds. The disturbance may
-    be any function of the preset's amplitude and rate of change.
-
-    Parameters
-    ----------
-    fault : Fault
-    divisor : Fraction
-        μ0N̂0 [m²/kg].
-    errors : Errors
-        Ranges of e1 [m], e2 [m/s], e2' [m/s²].
-    pieces : int
-        Largest number of subdivisions; fewer give a larger bound.
+    Raises
+    ------
+    CertificateError
+        When the certificate is about other gains.
     """
-    return upper_bound(_matched_rate(fault, divisor), _box(fault) | errors.ranges(), pieces=pieces)
+    (only,) = _variants(fault, controller, certificate, [controller.feedforward])
+    return list(only.premises), only.domain
+
+
+def feedforward_variants(fault: Fault, controller: SlidingMode, certificate: Certificate | None) -> tuple[Variant, ...]:
+    """The same gains and certificate with every named feed-forward, the controller's own first.
+
+    Raises
+    ------
+    CertificateError
+        When the certificate is about other gains.
+    """
+    known = [feed_forward(name, fault, controller.divisor) for name in FEED_FORWARDS]
+    return _variants(fault, controller, certificate, dict.fromkeys([controller.feedforward, *known]))
+
+
+def _variants(
+    fault: Fault, controller: SlidingMode, certificate: Certificate | None, choices: Iterable[FeedForward]
+) -> tuple[Variant, ...]:
+    laws = [controller.with_feedforward(choice) for choice in choices]
+    if certificate is None or certificate.refutation is not None:
+        premises = [_along_reference(fault, law, None) for law in laws]
+        return tuple(
+            Variant(feedforward=law.feedforward, premises=(premise,), domain=None)
+            for law, premise in zip(laws, premises, strict=True)
+        )
+    require(
+        certificate.loop.law == controller.name and dict(certificate.loop.gains) == dict(controller.gains),
+        "the certificate is about other gains than the controller's.",
+    )
+    bounded = all(f"bound_{state}" in certificate.claims for state in certificate.loop.states)
+    known = robustness(certificate) if bounded else None
+    return tuple(_variant(Question(fault, law, certificate, known), bounded=bounded) for law in laws)
+
+
+def _variant(question: Question, *, bounded: bool) -> Variant:
+    fault, law, certificate = question.fault, question.controller, question.certificate
+    premises = [
+        control_coefficient(fault, law.divisor, certificate.loop.uncertain["beta"]),
+        _along_reference(fault, law, certified_lipschitz(certificate)),
+    ]
+    if bounded:
+        premises.append(_level_set(question))
+    domain = certified_domain(question) if bounded else None
+    return Variant(feedforward=law.feedforward, premises=tuple(premises), domain=domain)
 
 
 def control_coefficient(fault: Fault, divisor: Fraction, certified: Range) -> Premise:
@@ -186,8 +148,9 @@ def matched_rate_premise(
     fault: Fault, controller: SlidingMode, name: str, errors: Errors, certified: Fraction | None, note: str
 ) -> Premise:
     """|h'| ≤ L̄ while the errors stay within bounds; without a certificate against the limit of the gains."""
-    required = largest_matched_rate(fault, controller.divisor, errors)
+    required = largest_matched_rate(fault, controller.divisor, errors, feedforward=controller.feedforward)
     against = controller.lipschitz_limit if certified is None else certified * controller.scale
+    note += _with(controller)
     return Premise(
         name=name,
         required=_up(required),
@@ -198,146 +161,37 @@ def matched_rate_premise(
     )
 
 
-@dataclass(frozen=True)
-class LevelSets:
-    """Level sets of a proved V for gains scaled by λ, in metres and seconds.
-
-    Attributes
-    ----------
-    certificate : Certificate
-        For the base gains (λ = 1), with bounds of all states.
-    scale : Fraction
-        λ; the scaled loop has the errors λe of the base loop at the same time.
-    """
-
-    certificate: Certificate
-    scale: Fraction
-
-    def level(self, matched: Fraction) -> Fraction:
-        """Upper bound of V where e1 = e2 = 0 and |e3| ≤ matched [unit of ν]."""
-        loop = self.certificate.loop
-        states = [loop.symbols[s] for s in loop.states]
-        box = {s: (Fraction(0), Fraction(0)) for s in states}
-        box[states[-1]] = (-matched / self.scale, matched / self.scale)
-        return _top(enclose(from_terms(self.certificate.lyapunov, loop.symbols), box))
-
-    def errors(self, level: Fraction) -> Errors:
-        """Bounds on e1, e2 and e2' on {V ≤ level}, from V ≥ γ_i u_i^m."""
-        loop = self.certificate.loop
-        degree = sum(f[1] * loop.states[f[0]] for f in self.certificate.lyapunov[0].factors)
-        x, g = sp.symbols("x g", positive=True)
-        sizes: dict[str, Fraction] = {}
-        for state, weight in loop.states.items():
-            gamma = self.certificate.claims[f"bound_{state}"]
-            power = sp.Rational(weight) / sp.Rational(int(degree))
-            sizes[state] = _top(enclose((x / g) ** power, {x: (level, level), g: (gamma, gamma)})) if level else level
-        box = {loop.symbols[s]: (-v, v) for s, v in sizes.items()} | {
-            loop.symbols[n]: ends for n, ends in loop.uncertain.items()
-        }
-        box |= {loop.symbols[n]: (v, v) for n, v in loop.parameters.items()}
-        first, second, _ = loop.states
-        acceleration = _top(abs(enclose(sympy_field(loop)[loop.symbols[second]], box)))
-        return Errors(
-            slip=self.scale * sizes[first], rate=self.scale * sizes[second], acceleration=self.scale * acceleration
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Domain:
-    """Largest level set found on which |h'| ≤ L̄ holds with the control's own contribution (ERRATA 16).
-
-    Attributes
-    ----------
-    level : float
-        Of V for the base gains; 0 when there is none.
-    slip_error, slip_rate_error : float
-        Bounds on |e1| [m] and |e2| [m/s] on it.
-    """
-
-    level: float
-    slip_error: float
-    slip_rate_error: float
-
-    def to_dict(self) -> dict[str, float]:
-        """Plain values, SI."""
-        return {"level": self.level, "slip_error": self.slip_error, "slip_rate_error": self.slip_rate_error}
-
-
-def certified_domain(fault: Fault, controller: SlidingMode, certificate: Certificate, doublings: int = 400) -> Domain:
-    """Largest level 2^−n on which the premise on |h'| proves itself, rigorous but not sharp."""
-    sets = LevelSets(certificate, controller.scale)
-    allowed = certified_lipschitz(certificate) * controller.scale
-
-    def holds(exponent: int) -> bool:
-        errors = sets.errors(Fraction(2) ** exponent)
-        return largest_matched_rate(fault, controller.divisor, errors, pieces=40) <= allowed
-
-    low, high = -doublings, 40
-    if not holds(low):
-        return Domain(level=0.0, slip_error=0.0, slip_rate_error=0.0)
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    errors = sets.errors(Fraction(2) ** low)
-    return Domain(level=2.0**low, slip_error=float(errors.slip), slip_rate_error=float(errors.rate))
-
-
-def certified_lipschitz(certificate: Certificate) -> Fraction:
-    """L̄ of the base gains: the smaller end of the range of d = h'."""
-    low, high = certificate.loop.uncertain["d"]
-    return min(-low, high)
-
-
-def sliding_mode_premises(
-    fault: Fault, controller: SlidingMode, certificate: Certificate | None
-) -> tuple[list[Premise], Domain | None]:
-    """Premises that can be decided without a run, and the certified domain.
-
-    `along_reference` takes the errors as zero. `level_set` takes the level set of V that holds the start
-    x = 0, ξ = 0 for every disturbance of the class, and the control's own part of h' on it.
-
-    Raises
-    ------
-    CertificateError
-        When the certificate is about other gains.
-    """
-    zero = Errors(slip=Fraction(0), rate=Fraction(0), acceleration=Fraction(0))
+def _along_reference(fault: Fault, controller: SlidingMode, certified: Fraction | None) -> Premise:
     note = "rigorous over the uncertainty box and the disturbance class, errors zero"
-    if certificate is None or certificate.refutation is not None:
-        return [matched_rate_premise(fault, controller, "along_reference", zero, None, note)], None
-    require(
-        certificate.loop.law == controller.name and dict(certificate.loop.gains) == dict(controller.gains),
-        "the certificate is about other gains than the controller's.",
-    )
-    lipschitz = certified_lipschitz(certificate)
-    premises = [
-        control_coefficient(fault, controller.divisor, certificate.loop.uncertain["beta"]),
-        matched_rate_premise(fault, controller, "along_reference", zero, lipschitz, note),
-    ]
-    if not all(f"bound_{state}" in certificate.claims for state in certificate.loop.states):
-        return premises, None
-    sets = LevelSets(certificate, controller.scale)
-    errors = sets.errors(sets.level(_initial_perturbation(fault, controller.divisor)))
+    return matched_rate_premise(fault, controller, "along_reference", Errors(), certified, note)
+
+
+def _level_set(question: Question) -> Premise:
+    """Either |h'| ≤ L̄ with the errors' part, or the errors' part against the decrease of V: whichever is closer."""
+    fault, law = question.fault, question.controller
+    level = question.sets.level(initial_perturbation(fault, law.divisor))
+    errors = question.sets.errors(level)
     start = f"rigorous on the level set of V that holds the start: |e1| <= {float(errors.slip):.2g} m, "
     start += f"|e2| <= {float(errors.rate):.2g} m/s"
-    premises.append(matched_rate_premise(fault, controller, "level_set", errors, lipschitz, start))
-    return premises, certified_domain(fault, controller, certificate)
+    parts, rate = question.split(level), question.whole(level)
+    share = sum(parts.values(), Fraction(0)) if parts else None
+    if share is None or rate <= share:
+        return matched_rate_premise(fault, law, "level_set", errors, certified_lipschitz(question.certificate), start)
+    return Premise(
+        name="level_set",
+        required=_up(share),
+        certified=1.0,
+        unit="-",
+        note=start
+        + "; share of the decrease of V that the errors' part of h takes, along_reference holding"
+        + _with(law),
+    )
 
 
-def _initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
-    """Bound on |h| at t = 0, x = 0: the disturbance over β, friction at its static value."""
-    static, least = friction_range(fault)[1], plant_ranges(fault)[plant.N_hat][0]
-    return rational(fault.disturbance.largest_explicit) * divisor / (static * least)
-
-
-def _fraction(value: sp.Rational) -> Fraction:
-    exact = sp.nsimplify(value, rational=True)
-    return Fraction(int(exact.p), int(exact.q))
-
-
-def _top(enclosure: Any) -> Fraction:
-    end = enclosure.upper().fmpq()
-    return Fraction(int(end.p), int(end.q))
+def _with(controller: SlidingMode) -> str:
+    """What the law adds to ν, for a note."""
+    name = controller.feedforward.name
+    return "" if name == "none" else f"; with {name} feed-forward"
 
 
 def _up(value: Fraction) -> float:

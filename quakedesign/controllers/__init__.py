@@ -1,4 +1,4 @@
-"""Control laws, one a file, found by looking into this folder; and the gains that the paper prints."""
+"""Laws, one a file, found by looking into this folder; and the gains that the paper prints."""
 
 import tomllib
 from fractions import Fraction
@@ -8,23 +8,59 @@ from importlib.resources import files
 from inspect import isabstract
 from pkgutil import iter_modules
 
-from quakedesign.controllers.base import Controller, LoopField, Signals
+from quakedesign.controllers.base import Controller, Law, LoopField, Signals
 from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.errors import UnknownNameError
 
-__all__ = ["Controller", "LoopField", "Signals", "SlidingMode", "control_law", "control_laws", "family", "published"]
+__all__ = [
+    "Controller",
+    "Law",
+    "LoopField",
+    "Signals",
+    "SlidingMode",
+    "Subject",
+    "control_law",
+    "control_laws",
+    "family",
+    "law",
+    "laws",
+    "model_of",
+    "published",
+]
+
+Subject = str | type[Law] | LoopField
+"""What a claim can be about: the name of a law of the package, a law of the user's own, or a bare closed loop."""
+BARE = "custom"
+
+
+@cache
+def laws() -> dict[str, type[Law]]:
+    """Every law of the package by name, those included that act on other plants than a fault and are only proved."""
+    found: dict[str, type[Law]] = {}
+    for info in iter_modules(__path__):
+        module = import_module(f"{__name__}.{info.name}")
+        for item in vars(module).values():
+            if isinstance(item, type) and issubclass(item, Law) and not isabstract(item):
+                found[item.name] = item
+    return found
+
+
+def law(name: str) -> type[Law]:
+    """Law of a given name.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    if name not in laws():
+        raise UnknownNameError(f"controller must be one of {', '.join(laws())}. Received {name!r}.")
+    return laws()[name]
 
 
 @cache
 def control_laws() -> dict[str, type[Controller]]:
-    """Every control law of the package, by name."""
-    laws: dict[str, type[Controller]] = {}
-    for info in iter_modules(__path__):
-        module = import_module(f"{__name__}.{info.name}")
-        for item in vars(module).values():
-            if isinstance(item, type) and issubclass(item, Controller) and not isabstract(item):
-                laws[item.name] = item
-    return laws
+    """Every law of the package that acts on the slip of a fault, by name."""
+    return {name: item for name, item in laws().items() if issubclass(item, Controller)}
 
 
 def control_law(name: str) -> type[Controller]:
@@ -34,10 +70,24 @@ def control_law(name: str) -> type[Controller]:
     ------
     UnknownNameError
     """
-    laws = control_laws()
-    if name not in laws:
-        raise UnknownNameError(f"controller must be one of {', '.join(laws)}. Received {name!r}.")
-    return laws[name]
+    known = control_laws()
+    if name not in known:
+        raise UnknownNameError(f"controller must be one of {', '.join(known)}. Received {name!r}.")
+    return known[name]
+
+
+def model_of(subject: Subject) -> tuple[str, LoopField]:
+    """Name and closed loop of what a claim is about; a bare loop is called ``custom``.
+
+    Raises
+    ------
+    UnknownNameError
+        For a name that the package does not know.
+    """
+    if isinstance(subject, LoopField):
+        return BARE, subject
+    chosen = law(subject) if isinstance(subject, str) else subject
+    return chosen.name, chosen.loop_field()
 
 
 def published(fault_name: str) -> dict[str, Controller]:
@@ -58,10 +108,10 @@ def published(fault_name: str) -> dict[str, Controller]:
     found: dict[str, Controller] = {}
     for name, entry in sets.get(fault_name, {}).items():
         more = {k: v for k, v in entry.items() if k != "gains"}
-        law = control_law(name)
-        if issubclass(law, SlidingMode):
+        chosen = control_law(name)
+        if issubclass(chosen, SlidingMode):
             more["divisor"] = data["divisor"]
-        found[name] = law.from_values(tuple(entry["gains"]), **more)
+        found[name] = chosen.from_values(tuple(entry["gains"]), **more)
     return found
 
 
@@ -76,5 +126,5 @@ def family(name: str) -> tuple[Fraction, tuple[Controller, ...]]:
     data = tomllib.loads((files(__name__) / "families.toml").read_text(encoding="utf-8"))
     if name not in data:
         raise UnknownNameError(f"base gains exist for {', '.join(data)}. Received {name!r}.")
-    law = control_law(name)
-    return Fraction(data[name]["lipschitz"]), tuple(law.from_values(tuple(g)) for g in data[name]["gains"])
+    chosen = control_law(name)
+    return Fraction(data[name]["lipschitz"]), tuple(chosen.from_values(tuple(g)) for g in data[name]["gains"])

@@ -1,8 +1,8 @@
-"""What every control law offers."""
+"""What every law offers to the proof, and what one that acts on a fault offers besides."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
@@ -26,6 +26,8 @@ class Signals:
         e1 = x1 − r [m], e2 = x2 − r' [m/s].
     integrals : tuple of Expr
         The law's own states ξ.
+    reference_acceleration : Expr
+        r'' [m/s²]; zero unless told, as for a reference at rest.
     """
 
     slip: sp.Expr
@@ -33,6 +35,7 @@ class Signals:
     slip_error: sp.Expr
     slip_rate_error: sp.Expr
     integrals: tuple[sp.Expr, ...]
+    reference_acceleration: sp.Expr = sp.S.Zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,8 +51,10 @@ class LoopField:
     gains, constants, uncertain : tuple of Symbol
     domain : str
         ``"cells"`` for signed powers, ``"reals"`` for polynomials.
-    degree : int
-        Degree of the Lyapunov functions to try.
+    roots : mapping of Symbol to Symbol
+        Symbols that stand for the positive square root of a gain.
+    units : mapping of Symbol to Expr
+        Error that one unit of a state stands for, where it is not one unit; in gains.
     """
 
     states: dict[sp.Symbol, int]
@@ -58,12 +63,24 @@ class LoopField:
     constants: tuple[sp.Symbol, ...]
     uncertain: tuple[sp.Symbol, ...]
     domain: str
-    degree: int
+    roots: Mapping[sp.Symbol, sp.Symbol] = field(default_factory=dict)
+    units: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+
+    @property
+    def degree(self) -> int:
+        """Lowest degree of the Lyapunov functions to try, see `lowest_degree`."""
+        return lowest_degree(self.states.values(), self.domain)
+
+
+def lowest_degree(weights: Iterable[int], domain: str) -> int:
+    """Degree of the product of the two heaviest states, from where on a V can couple them; 2 on the reals."""
+    *_, first, second = (1, *sorted(weights))
+    return first + second if domain == "cells" else 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Controller(ABC):
-    """A control law with exact gains.
+class Law(ABC):
+    """A law with exact gains whose closed loop can be proved.
 
     Attributes
     ----------
@@ -80,7 +97,6 @@ class Controller(ABC):
     title: ClassVar[str]
     source: ClassVar[str]
     gain_units: ClassVar[Mapping[str, str]]
-    integral_units: ClassVar[tuple[str, ...]]
 
     gains: Mapping[str, Fraction]
 
@@ -96,14 +112,6 @@ class Controller(ABC):
         # A read-only view cannot be pickled, and campaigns send controllers to other processes.
         entries = {f.name: getattr(self, f.name) for f in fields(self)} | {"gains": dict(self.gains)}
         return partial(type(self), **entries), ()
-
-    @abstractmethod
-    def pressure(self, signals: Signals) -> sp.Expr:
-        """Fluid pressure p [Pa] that the law asks for."""
-
-    @abstractmethod
-    def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
-        """Time derivatives of the law's own states."""
 
     @classmethod
     @abstractmethod
@@ -138,3 +146,18 @@ class Controller(ABC):
 
     def _exact_gains(self) -> list[sp.Rational]:
         return [sp.Rational(v.numerator, v.denominator) for v in self.gains.values()]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller(Law):
+    """A law that acts on the slip of a fault through the fluid pressure."""
+
+    integral_units: ClassVar[tuple[str, ...]]
+
+    @abstractmethod
+    def pressure(self, signals: Signals) -> sp.Expr:
+        """Fluid pressure p [Pa] that the law asks for."""
+
+    @abstractmethod
+    def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
+        """Time derivatives of the law's own states."""

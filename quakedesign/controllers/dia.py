@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import sympy as sp
 
+from quakedesign.controllers.base import LoopField
 from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic import SignedPower
@@ -47,6 +48,31 @@ class DiscontinuousIntegral(SlidingMode):
         _, _, k3, k4 = gains
         inner = error + scale ** sp.Rational(-1, 2) * k4 * SignedPower(rate_error, sp.Rational(3, 2))
         return -scale * k3 * SignedPower(inner, 0)
+
+    @classmethod
+    def loop_field(cls) -> LoopField:
+        """Closed loop with λ = 1 in (f1, e2, e3), where f1 = κ³e1 and κ = √k_I1.
+
+        Then ν = −k_I2⌈⌈e2⌋^{3/2} + f1⌋^⅓ + ξ1 has no root inside, and κ is a factor of f1' = κk_I1e2 alone: V̇ is affine
+        in it, so that an interval around the root is enough, unless k_I4 brings it into the argument of the sign.
+        """
+        f1, e2, e3, beta, d, root = sp.symbols("f1 e2 e3 beta d kappa", real=True)
+        k1, k2, k3, k4 = sp.symbols("kI1 kI2 kI3 kI4", real=True)
+        power = SignedPower(e2, sp.Rational(3, 2))
+        return LoopField(
+            states={f1: 3, e2: 2, e3: 1},
+            field={
+                f1: root * k1 * e2,
+                e2: beta * (e3 - k2 * SignedPower(f1 + power, sp.Rational(1, 3))),
+                e3: d - k3 * SignedPower(f1 + k4 * k1 * root * power, 0),
+            },
+            gains=(k1, k2, k3, k4),
+            constants=(),
+            uncertain=(beta, d),
+            domain="cells",
+            roots={root: k1},
+            units={f1: root**-3},
+        )
 
     @property
     def lipschitz_limit(self) -> Fraction:

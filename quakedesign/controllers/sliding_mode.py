@@ -8,6 +8,7 @@ from typing import ClassVar, Self
 import sympy as sp
 
 from quakedesign.controllers.base import Controller, LoopField, Signals
+from quakedesign.controllers.feed_forward import NONE, FeedForward
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
 
@@ -25,6 +26,8 @@ class SlidingMode(Controller):
         λ [-], which stretches the loop: e → λe maps the loop with λ = 1 onto this one.
     divisor : Fraction
         μ0N̂0 of eq. ps [m²/kg].
+    feedforward : FeedForward
+        What is added to ν from what is known of the plant; nothing unless told.
     """
 
     integral_units: ClassVar[tuple[str, ...]] = ("m/s^2",)
@@ -32,6 +35,7 @@ class SlidingMode(Controller):
 
     scale: Fraction = Fraction(1)
     divisor: Fraction = Fraction(1)
+    feedforward: FeedForward = NONE
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -60,12 +64,17 @@ class SlidingMode(Controller):
         """Return the same base gains with another λ."""
         return replace(self, gains=dict(self.gains), scale=scale)
 
+    def with_feedforward(self, feedforward: FeedForward) -> Self:
+        """Return the same law with another feed-forward."""
+        return replace(self, gains=dict(self.gains), feedforward=feedforward)
+
     def pressure(self, signals: Signals) -> sp.Expr:
-        """Return p [Pa] = ν/(μ0N̂0), eq. ps."""
+        """Return p [Pa] = (ν + feed-forward)/(μ0N̂0), eq. ps and the remark after it."""
         nu = self.virtual_control(
             signals.slip_error, signals.slip_rate_error, signals.integrals[0], self._exact_gains(), self._exact_scale()
         )
-        return nu / sp.Rational(self.divisor.numerator, self.divisor.denominator)
+        known = self.feedforward.acceleration(signals.slip, signals.slip_rate, signals.reference_acceleration)
+        return (nu + known) / sp.Rational(self.divisor.numerator, self.divisor.denominator)
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
         """ξ1' as one entry."""
@@ -90,7 +99,6 @@ class SlidingMode(Controller):
             constants=(),
             uncertain=(beta, d),
             domain="cells",
-            degree=5,
         )
 
     def _exact_scale(self) -> sp.Rational:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import count
 
 import sympy as sp
 
@@ -50,6 +51,43 @@ def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ..
         key = (tuple(sorted(parameters)), factors)
         collected[key] = collected.get(key, Fraction(0)) + coefficient
     return tuple(sorted(Term(c, *key) for key, c in collected.items() if c))
+
+
+def without_nesting(
+    expressions: Sequence[sp.Expr], states: Sequence[sp.Symbol], taken: Iterable[str] = ()
+) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr]]:
+    """Nested signed powers named: the argument of every power of a sum becomes a symbol of its own.
+
+    Parameters
+    ----------
+    expressions : sequence of Expr
+    states : sequence of Symbol
+    taken : iterable of str
+        Names that the new symbols must not have.
+
+    Returns
+    -------
+    lifts : dict of Symbol to Expr
+        Argument of every new symbol, in states and earlier symbols; empty without nesting.
+    expressions : list of Expr
+        The same, in states and new symbols.
+    """
+    lifts: dict[sp.Expr, sp.Symbol] = {}
+    names = (f"n{i}" for i in count(1))
+    free = (name for name in names if name not in set(taken))
+
+    def walk(e: sp.Expr) -> sp.Expr:
+        if not e.args:
+            return e
+        if isinstance(e, SignedPower | AbsolutePower) and e.args[0] not in states and e.args[0].has(*states):
+            argument = sp.expand(walk(e.args[0]))
+            if argument not in lifts:
+                lifts[argument] = sp.Symbol(next(free), real=True)
+            return e.func(lifts[argument], e.args[1])
+        return e.func(*(walk(a) for a in e.args))
+
+    found = [walk(sp.sympify(e)) for e in expressions]
+    return {symbol: argument for argument, symbol in lifts.items()}, found
 
 
 def _split(part: sp.Expr, states: Mapping[sp.Symbol, int]):

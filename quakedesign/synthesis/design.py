@@ -9,23 +9,22 @@ from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
 from quakedesign.certificates.linear_premises import linear_premises, sectors
 from quakedesign.certificates.premises import (
     Domain,
+    Errors,
     Premise,
+    Variant,
     coefficient_range,
+    feedforward_variants,
+    largest_matched_rate,
     least_authority,
     sliding_mode_premises,
 )
 from quakedesign.controllers import Controller, SlidingMode, control_law, family
+from quakedesign.controllers.feed_forward import NONE, FeedForward, feed_forward
 from quakedesign.errors import CertificateError, KinkError, ParameterError, UnknownNameError
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
-from quakedesign.synthesis.lyapunov import (
-    balance,
-    claims_of,
-    find_certificate,
-    finish,
-    quadratic_margin,
-    refute,
-)
+from quakedesign.synthesis.finishing import claims_of, finish
+from quakedesign.synthesis.lyapunov import find_certificate
+from quakedesign.synthesis.quadratic import quadratic_margin
 from quakedesign.synthesis.riccati import riccati_design
 
 DESIGNABLE = ("cta", "elqr")
@@ -65,15 +64,13 @@ class Design:
 
     @property
     def gains(self) -> dict[str, Fraction]:
-        """Exact gains; for a sliding mode also ``scale`` λ and ``divisor`` μ0N̂0 [m²/kg]."""
-        if self.controller is None:
-            return {}
-        more = (
-            {"scale": self.controller.scale, "divisor": self.controller.divisor}
-            if isinstance(self.controller, SlidingMode)
-            else {}
-        )
-        return {**self.controller.gains, **more}
+        """Exact gains; for a sliding mode also ``scale`` λ, ``divisor`` μ0N̂0 [m²/kg] and a feed-forward that is on."""
+        law = self.controller
+        if not isinstance(law, SlidingMode):
+            return dict(law.gains) if law else {}
+        added = {} if law.feedforward == NONE else law.feedforward.coefficients
+        known = {f"feedforward_{name}": value for name, value in added.items()}
+        return {**law.gains, "scale": law.scale, "divisor": law.divisor, **known}
 
     @property
     def title(self) -> str:
@@ -83,6 +80,15 @@ class Design:
     def with_premise(self, premise: Premise) -> "Design":
         """Return the design with one more premise, such as one read off a run."""
         return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
+
+    def feedforward_variants(self) -> tuple[Variant, ...]:
+        """Premises and domain of the same gains with every named feed-forward, its own first; none for other laws.
+
+        Takes a few seconds.
+        """
+        if not isinstance(self.controller, SlidingMode):
+            return ()
+        return feedforward_variants(self.fault, self.controller, self.certificate)
 
     def _repr_html_(self) -> str:
         from html import escape
@@ -97,7 +103,7 @@ class Design:
         return f"<b>{self.title}: {self.verdict}</b><br>{escape(gains)}<table>{head}{rows}</table>"
 
 
-def design(fault: Fault, controller: str = "cta") -> Design:
+def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none") -> Design:
     """Find gains with a proof for a fault.
 
     2-CTA: base gains from the literature are proved for the fault's range of β and scaled by λ = ρ⁶ (ρ rational, so
@@ -109,6 +115,9 @@ def design(fault: Fault, controller: str = "cta") -> Design:
     fault : Fault
     controller : str
         ``"cta"`` or ``"elqr"``.
+    feedforward : str
+        What a sliding mode adds to ν from what is known of the plant: ``"none"``, ``"nominal"`` or ``"centred"``, see
+        `quakedesign.controllers.feed_forward`. It enlarges the certified domain; the e-LQR takes none.
 
     Returns
     -------
@@ -118,15 +127,24 @@ def design(fault: Fault, controller: str = "cta") -> Design:
     Raises
     ------
     UnknownNameError
-        For a controller that cannot be designed.
+        For a controller that cannot be designed, or an unknown feed-forward.
+    ParameterError
+        For a feed-forward with a law that takes none.
     """
     if controller not in DESIGNABLE:
         raise UnknownNameError(f"controller to design must be one of {', '.join(DESIGNABLE)}. Received {controller!r}.")
     fault.require_memoryless("design")
-    return _design_linear(fault) if controller == "elqr" else _design_sliding_mode(fault, controller)
+    added = feed_forward(feedforward, fault, least_authority(fault))
+    if issubclass(control_law(controller), SlidingMode):
+        return _design_sliding_mode(fault, controller, added)
+    if added != NONE:
+        raise ParameterError(
+            f"a feed-forward is part of sliding-mode laws. Received {feedforward!r} with {controller}. Leave it out."
+        )
+    return _design_linear(fault)
 
 
-def _design_sliding_mode(fault: Fault, name: str) -> Design:
+def _design_sliding_mode(fault: Fault, name: str, added: FeedForward) -> Design:
     divisor = least_authority(fault)
     lipschitz, bases = family(name)
     for base in bases:
@@ -144,18 +162,17 @@ def _design_sliding_mode(fault: Fault, name: str) -> Design:
             premises=(),
             details={"reason": "no base gains of the family were proved for the fault's range of β"},
         )
-    needed = required_lipschitz(fault, base, divisor)
+    needed = required_lipschitz(fault, base, divisor, added)
     rho = smallest_root(needed * _HEADROOM / lipschitz)
-    controller = type(base)(gains=dict(base.gains), scale=rho**6, divisor=divisor)  # type: ignore[call-arg]
+    controller = type(base)(  # type: ignore[call-arg]
+        gains=dict(base.gains), scale=rho**6, divisor=divisor, feedforward=added
+    )
     return _judged(fault, controller, certificate, {"rho": str(rho), "base_lipschitz": str(lipschitz)})
 
 
-def required_lipschitz(fault: Fault, law: Controller, divisor: Fraction) -> Fraction:
+def required_lipschitz(fault: Fault, law: Controller, divisor: Fraction, added: FeedForward = NONE) -> Fraction:
     """Bound on |h'| [m/s³] that the reference, the disturbance and the uncertainty need while the errors are zero."""
-    from quakedesign.certificates.premises import Errors, largest_matched_rate
-
-    zero = Errors(slip=Fraction(0), rate=Fraction(0), acceleration=Fraction(0))
-    return largest_matched_rate(fault, divisor, zero)
+    return largest_matched_rate(fault, divisor, Errors(), feedforward=added)
 
 
 def smallest_root(scale: Fraction) -> Fraction:
@@ -197,10 +214,9 @@ def linear_loop(fault: Fault, controller: Controller) -> Loop:
 def _design_linear(fault: Fault) -> Design:
     found = riccati_design(fault)
     loop = linear_loop(fault, found.controller)
-    scale = balance(loop)
     margin = quadratic_margin(loop, found.lyapunov)
     claims = claims_of(loop, found.lyapunov, (margin, Fraction(0)))
-    certificate = finish(loop, found.lyapunov, claims, scale) if min(claims.values()) > 0 else None
+    certificate = finish(loop, found.lyapunov, claims) if min(claims.values()) > 0 else None
     certificate = certificate or find_certificate(loop, 2)
     details = {
         "R": found.R,
@@ -252,53 +268,3 @@ def _judged(
         domain=domain,
         details=dict(details),
     )
-
-
-def certify(
-    law: str,
-    gains: tuple[str | float | Fraction, ...],
-    *,
-    lipschitz: str | float | Fraction,
-    gain_range: tuple[str | float | Fraction, str | float | Fraction] = (1, 1),
-) -> tuple[Verdict, Certificate | None]:
-    """Decide whether gains (λ = 1) make the origin finite-time stable for |h'| ≤ lipschitz and all β of a range.
-
-    Parameters
-    ----------
-    law : str
-        Name of a sliding-mode law.
-    gains : tuple of number or text
-        Exact: decimals, exponents or p/q; order of the law.
-    lipschitz : number or text
-        L̄ [unit of ν per s], not negative.
-    gain_range : tuple of two
-        b_m and b_M [-], positive.
-
-    Returns
-    -------
-    verdict : Verdict
-    certificate : Certificate or None
-        Proof or counterexample; None when undecided.
-
-    Raises
-    ------
-    ParameterError
-        For gains or ranges that are no numbers, or a range that is empty or not positive.
-    UnknownNameError
-        For an unknown law.
-    """
-    controller = control_law(law).from_values(gains)
-    if not isinstance(controller, SlidingMode):
-        raise ParameterError(f"a Lipschitz bound applies to sliding-mode laws. Received {law!r}.")
-    bound = rational(lipschitz, "lipschitz")
-    low, high = (rational(v, "gain_range") for v in gain_range)
-    if bound < 0 or not 0 < low <= high:
-        raise ParameterError(
-            f"lipschitz must not be negative and gain_range must be 0 < b_m <= b_M. Received {bound}, [{low}, {high}]."
-        )
-    try:
-        loop = sliding_mode_loop(controller, bound, (low, high))
-    except CertificateError:
-        return Verdict.UNDECIDED, None
-    certificate = refute(loop, type(controller)) or find_certificate(loop, controller.loop_field().degree)
-    return (certificate.check(), certificate) if certificate else (Verdict.UNDECIDED, None)

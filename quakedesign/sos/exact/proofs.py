@@ -115,9 +115,21 @@ def holds(statement: Statement, proof: Proof) -> bool:
         return False
 
 
+def identity_holds(statement: Statement, proof: SumOfSquares) -> bool:
+    """Whether the identity is exact and every square one; whether the multiplier is positive is not asked."""
+    try:
+        return _identity_holds(statement, proof)
+    except (ValueError, TypeError, AttributeError):
+        return False
+
+
 def _sum_of_squares_holds(statement: Statement, proof: SumOfSquares) -> bool:
+    return multiplier_is_positive(statement, proof.multiplier) and _identity_holds(statement, proof)
+
+
+def _identity_holds(statement: Statement, proof: SumOfSquares) -> bool:
     size = len(statement.variables)
-    if len(proof.cofactors) != len(statement.equalities) or not multiplier_is_positive(statement, proof.multiplier):
+    if len(proof.cofactors) != len(statement.equalities):
         return False
     total = ring(size).constant(0)
     for square in proof.squares:

@@ -67,6 +67,13 @@ class Statement:
         return tuple(self.weight(s) for s in self.products)
 
     @cached_property
+    def graded(self) -> bool:
+        """Whether target and constraints are forms, the target of the statement's degree."""
+        constraints = (*self.inequalities, *self.equalities)
+        own = all(sum(e) == self.degree for e in self.target)
+        return own and all(len({sum(e) for e in p}) == 1 for p in constraints)
+
+    @cached_property
     def dense(self) -> bool:
         """Whether the set is ℝⁿ or an orthant, so that a multiplier may vanish on a thin part of it."""
         return not self.equalities and all(self.is_variable(g) for g in self.inequalities)

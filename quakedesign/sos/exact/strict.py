@@ -122,12 +122,14 @@ def common_grid(gram: list[Fraction]) -> None:
         need(common.bit_length() <= _GRID_BITS, f"the common denominator of a Gram matrix exceeds {_GRID_BITS} bits")
 
 
-def read_polynomial(raw: Any, what: str, variables: int, limit: int) -> dict[tuple[int, ...], Fraction]:
-    """Polynomial from an object of exponents to nonzero rationals."""
+def read_polynomial(raw: Any, what: str, variables: int | None, limit: int) -> dict[tuple[int, ...], Fraction]:
+    """Polynomial from an object of exponents to nonzero rationals; with `variables` None its keys are equally long."""
     polynomial: dict[tuple[int, ...], Fraction] = {}
     for key, number in objected(raw, what, limit).items():
         need(_EXPONENTS.fullmatch(key) is not None, f"{what} has a wrong key")
-        exponents = read_exponents([int(part) for part in key.split(",")], variables, 999)
+        parts = [int(part) for part in key.split(",")]
+        variables = len(parts) if variables is None else variables
+        exponents = read_exponents(parts, variables, 999)
         polynomial[exponents] = read_rational(number)
         need(polynomial[exponents] != 0, f"{what} has a zero coefficient")
     return polynomial

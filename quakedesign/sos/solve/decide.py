@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from quakedesign.rationals import nearest
-from quakedesign.sos.exact.polynomial import Exponents, Polynomial
-from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree
+from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds, identity_holds
 from quakedesign.sos.exact.reduction import full_bases, parity_classes, reduced_bases
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.faces import Block, at_kernels, at_real_zeros, at_zeros, modulo
@@ -168,10 +168,27 @@ class Search:
         return Solution(margin=1.0, grams=[], moments=[], functional={}, cofactors=[0.0] * len(self.relations))
 
 
+def strict_proof(asked: Statement) -> SumOfSquares | None:
+    """Checked identity for a statement that holds with a margin, in monomials; None if none is found.
+
+    Whether the multiplier is positive is the caller's question.
+    """
+    search = Search(asked)
+    solution = search._solve(search.blocks)[0]
+    if solution is None or not solution.margin > 0:
+        return None
+    found = rounded(search.statement, search.blocks, solution, holds=identity_holds)
+    restored = None if found is None else search.moved.restore(found)
+    return restored if isinstance(restored, SumOfSquares) and identity_holds(asked, restored) else None
+
+
 def initial_blocks(statement: Statement) -> list[Block]:
-    """Blocks after the exact reduction, split by sign symmetry."""
+    """Blocks after the exact reduction, split by sign symmetry; among forms only squares of the target's degree."""
     found = []
+    graded = statement.graded
     for chosen, weight, basis in zip(statement.products, statement.weights, reduced_bases(statement), strict=True):
+        if graded:
+            basis = tuple(b for b in basis if 2 * sum(b) + degree(weight) == statement.degree)
         for part in parity_classes(statement, basis):
             found.append(Block(product=chosen, weight=weight, monomials=tuple(basis[i] for i in part)))
     return found

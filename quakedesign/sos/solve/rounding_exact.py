@@ -1,12 +1,12 @@
 """From floating-point Gram matrices to an exact sum of squares: round, then put the exact residual back."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
 from quakedesign.rationals import nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, product, times
-from quakedesign.sos.exact.proofs import Square, SumOfSquares, holds, residual
+from quakedesign.sos.exact.proofs import Square, SumOfSquares, identity_holds, residual
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.faces import Block
 from quakedesign.sos.solve.moment import Solution
@@ -14,7 +14,12 @@ from quakedesign.sos.solve.moment import Solution
 _BITS = (4, 7, 10, 13, 16, 20, 24, 28, 33, 38, 44)
 
 
-def rounded(statement: Statement, blocks: Sequence[Block], solution: Solution) -> SumOfSquares | None:
+def rounded(
+    statement: Statement,
+    blocks: Sequence[Block],
+    solution: Solution,
+    holds: Callable[[Statement, SumOfSquares], bool] = identity_holds,
+) -> SumOfSquares | None:
     """Exact proof near a floating-point one, with the coarsest rounding that works; None if none does.
 
     Parameters
@@ -23,6 +28,8 @@ def rounded(statement: Statement, blocks: Sequence[Block], solution: Solution) -
     blocks : sequence of Block
         As solved.
     solution : Solution
+    holds : callable
+        The exact decision.
 
     Returns
     -------
@@ -48,10 +55,11 @@ def rounded(statement: Statement, blocks: Sequence[Block], solution: Solution) -
 
 
 def relations(statement: Statement) -> Iterator[tuple[int, Exponents, dict[Exponents, Fraction]]]:
-    """Equality, monomial and their product, for all products within the degree."""
+    """Equality, monomial and their product, for all products within the degree; among forms of just that degree."""
     size = len(statement.variables)
     for k, h in enumerate(statement.equalities):
-        for m in monomials(size, statement.degree - degree(h)):
+        most = statement.degree - degree(h)
+        for m in monomials(size, most, most if statement.graded else 0):
             yield k, m, {times(m, e): c for e, c in h.items()}
 
 

@@ -1,0 +1,90 @@
+"""Level sets of a proved Lyapunov function in metres and seconds."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.certificates.claim import Certificate, sympy_field
+from quakedesign.certificates.matched import Errors
+from quakedesign.symbolic.balls import enclose
+from quakedesign.symbolic.terms import from_terms
+
+_BASE, _OTHER = sp.symbols("x y", positive=True)
+
+
+@dataclass(frozen=True)
+class LevelSets:
+    """Level sets of a proved V for gains scaled by λ, in metres and seconds.
+
+    Attributes
+    ----------
+    certificate : Certificate
+        For the base gains (λ = 1), with bounds of all states.
+    scale : Fraction
+        λ; the scaled loop has the errors λe of the base loop at the same time.
+    """
+
+    certificate: Certificate
+    scale: Fraction
+
+    @property
+    def degree(self) -> Fraction:
+        """m, the degree of V."""
+        loop = self.certificate.loop
+        return sum((f[1] * loop.states[f[0]] for f in self.certificate.lyapunov[0].factors), Fraction(0))
+
+    def level(self, matched: Fraction) -> Fraction:
+        """Upper bound of V where e1 = e2 = 0 and |e3| ≤ matched [unit of ν]."""
+        return self.level_of(matched=matched)
+
+    def level_of(self, *, slip: Fraction = Fraction(0), rate: Fraction = Fraction(0), matched: Fraction) -> Fraction:
+        """Upper bound of V where |e1| ≤ slip [m], |e2| ≤ rate [m/s] and |e3| ≤ matched [unit of ν]."""
+        loop = self.certificate.loop
+        first, second, *rest = (loop.symbols[s] for s in loop.states)
+        sizes = {first: slip, second: rate, **dict.fromkeys(rest[:-1], Fraction(0)), rest[-1]: matched}
+        box = {symbol: (-v / self.scale, v / self.scale) for symbol, v in sizes.items()}
+        return _top(enclose(from_terms(self.certificate.lyapunov, loop.symbols), box))
+
+    def errors(self, level: Fraction) -> Errors:
+        """Bounds on e1, e2 and e2' on {V ≤ level}, from V ≥ γ_i u_i^m."""
+        loop = self.certificate.loop
+        sizes: dict[str, Fraction] = {}
+        for state, weight in loop.states.items():
+            gamma = self.certificate.claims[f"bound_{state}"]
+            quotient = enclose((_BASE / _OTHER) ** self._power(weight), {_BASE: (level,) * 2, _OTHER: (gamma,) * 2})
+            sizes[state] = _top(quotient) if level else level
+        box = {loop.symbols[s]: (-v, v) for s, v in sizes.items()} | {
+            loop.symbols[n]: ends for n, ends in loop.uncertain.items()
+        }
+        box |= {loop.symbols[n]: (v, v) for n, v in loop.parameters.items()}
+        first, second, *_ = loop.states
+        acceleration = _top(abs(enclose(sympy_field(loop)[loop.symbols[second]], box)))
+        return Errors(
+            slip=self.scale * sizes[first], rate=self.scale * sizes[second], acceleration=self.scale * acceleration
+        )
+
+    def starts(self, level: Fraction) -> tuple[Fraction, ...]:
+        """Largest size of every state for which {V ≤ level} surely holds it while the other states are zero."""
+        loop = self.certificate.loop
+        function, found = from_terms(self.certificate.lyapunov, loop.symbols), []
+        for state, weight in loop.states.items():
+            rest = {loop.symbols[s]: 0 for s in loop.states if s != state}
+            peak = max(_top(enclose(function.subs(rest | {loop.symbols[state]: sign}), {})) for sign in (1, -1))
+            size = enclose((_BASE / _OTHER) ** self._power(weight), {_BASE: (level,) * 2, _OTHER: (peak,) * 2})
+            found.append(self.scale * _bottom(size) if level else level)
+        return tuple(found)
+
+    def _power(self, weight: int) -> sp.Rational:
+        return sp.Rational(weight) / sp.Rational(self.degree.numerator, self.degree.denominator)
+
+
+def _top(enclosure: Any) -> Fraction:
+    end = enclosure.upper().fmpq()
+    return Fraction(int(end.p), int(end.q))
+
+
+def _bottom(enclosure: Any) -> Fraction:
+    end = enclosure.lower().fmpq()
+    return Fraction(int(end.p), int(end.q))

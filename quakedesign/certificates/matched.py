@@ -1,0 +1,212 @@
+"""What the matched perturbation h of a fault asks for, with and without feed-forward. Ball arithmetic only."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+
+import sympy as sp
+
+from quakedesign.controllers.feed_forward import NONE, FeedForward
+from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.balls import upper_bound
+
+Range = tuple[Fraction, Fraction]
+
+stage = sp.Symbol("s", nonnegative=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Errors:
+    """Bounds on |e1| [m], |e2| [m/s] and |e2'| [m/s²]."""
+
+    slip: Fraction = Fraction(0)
+    rate: Fraction = Fraction(0)
+    acceleration: Fraction = Fraction(0)
+
+    def ranges(self) -> dict[sp.Symbol, Range]:
+        """Symmetric ranges by symbol."""
+        parts = {plant.e1: self.slip, plant.e2: self.rate, plant.acceleration_error: self.acceleration}
+        return {symbol: (-v, v) for symbol, v in parts.items()}
+
+
+def friction_range(fault: Fault) -> Range:
+    """μ_res and μ_max [-], exact."""
+    low, high = (_fraction(v) for v in fault.friction.exact().bounds)
+    return low, high
+
+
+def plant_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
+    """Ranges of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] over the uncertainty box; σ'_n [Pa] is known."""
+    values = {symbol: _fraction(v) for symbol, v in plant.plant_values(fault).items()}
+    widths = {plant.k_hat: fault.box.stiffness, plant.eta_hat: fault.box.damping, plant.N_hat: fault.box.authority}
+    return {s: (v * (1 - widths.get(s, 0)), v * (1 + widths.get(s, 0))) for s, v in values.items()}
+
+
+def least_authority(fault: Fault) -> Fraction:
+    """μ_res·N̂_min [m²/kg], the divisor of designed gains and the b of the e-LQR (ERRATA 9)."""
+    return friction_range(fault)[0] * plant_ranges(fault)[plant.N_hat][0]
+
+
+def coefficient_range(fault: Fault, divisor: Fraction) -> Range:
+    """Range of β = μN̂/divisor [-] (eq. Bounds)."""
+    low, high = friction_range(fault)
+    N_low, N_high = plant_ranges(fault)[plant.N_hat]
+    return low * N_low / divisor, high * N_high / divisor
+
+
+@lru_cache(maxsize=16)
+def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> sp.Expr:
+    """h' along a solution [unit of ν per s], in what `known_ranges` and the errors bound."""
+    slopes = (plant.slip_slope, plant.rate_slope)
+    total = sp.expand(plant.matched_rate())
+    flat = sp.expand(total.subs(dict.fromkeys(slopes, 0)) + _feedforward_rate(feedforward))
+    moved = (plant.r3, plant.r2, plant.r1, plant.phi_t, plant.acceleration_error, plant.e2)
+    bending = sp.factor_terms(sp.collect(sp.expand(total - total.subs(dict.fromkeys(slopes, 0))), slopes))
+    return _with_known(bending + sp.collect(flat, moved), fault, divisor)
+
+
+def _feedforward_rate(feedforward: FeedForward) -> sp.Expr:
+    """Time derivative of the feed-forward along a solution, by the chain rule."""
+    x1, x2, push = sp.symbols("x1 x2 push", real=True)
+    rates = {x1: plant.e2 + plant.r1, x2: plant.acceleration_error + plant.r2, push: plant.r3}
+    added = feedforward.acceleration(x1, x2, push)
+    return sum((added.diff(signal) * rate for signal, rate in rates.items()), start=sp.Integer(0))
+
+
+@lru_cache(maxsize=16)
+def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> tuple[sp.Expr, sp.Expr]:
+    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time; along a chord where friction has no derivative.
+
+    They bound the part of h that the errors cause: |h(t, e) − h(t, 0)| ≤ g1|e1| + g2|e2| with the largest
+    absolute values g1, g2 between 0 and e.
+    """
+    value = sp.Function("m_v", positive=True)(plant.e1, plant.e2)
+    force = sp.Function("f_v", real=True)(plant.e1, plant.e2)
+    h = _insert(plant.error_dynamics().h, value, force)
+    added = feedforward.acceleration(plant.e1, plant.e2, sp.Integer(0))
+    found = []
+    slopes = ((plant.e1, plant.slip_slope, plant.phi_1), (plant.e2, plant.rate_slope, plant.phi_2))
+    for error, slope, growth in slopes:
+        bent = h.diff(error).subs({value.diff(error): slope, force.diff(error): growth})
+        bent = sp.expand(_named(bent.subs({value: plant.friction_value, force: plant.phi})))
+        straight = bent.coeff(slope, 0) + added.diff(error)
+        part = sp.expand(bent.coeff(slope))
+        # apart, so that N̂ cancels where it can and occurs once elsewhere
+        stressed = sp.simplify(part.coeff(plant.sigma)) * plant.sigma
+        part = stressed + sp.factor(part.coeff(plant.sigma, 0))
+        found.append(_with_known(slope * part + straight, fault, divisor))
+    return found[0], found[1]
+
+
+def _insert(h: sp.Expr, value: sp.Expr, force: sp.Expr) -> sp.Expr:
+    """Stand-ins for μ and φ̂_e where they act."""
+    kinds = {plant.mu: value, plant.disturbance: force}
+    return h.replace(
+        lambda e: isinstance(e, sp.core.function.AppliedUndef) and e.func in kinds, lambda e: kinds[e.func]
+    )
+
+
+def _named(h: sp.Expr) -> sp.Expr:
+    """Symbols for the reference and its derivatives."""
+    r = plant.reference(plant.t)
+    for part, name in ((r.diff(plant.t, 2), plant.r2), (r.diff(plant.t), plant.r1), (r, plant.r0)):
+        h = h.subs(part, name)
+    return h
+
+
+def _with_known(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Expr:
+    """Insert μ*, the divisor, the reference, and the growth of the disturbance where its value stands."""
+    static = friction_range(fault)[1]
+    grown = plant.phi_1 * (plant.e1 + plant.r0) + plant.phi_2 * (plant.e2 + plant.r1)
+    known = {
+        plant.mu_star: sp.Rational(static.numerator, static.denominator),
+        plant.divisor: sp.Rational(divisor.numerator, divisor.denominator),
+    }
+    return expression.subs(plant.phi, plant.phi + grown).subs(known).subs(_reference_values(fault))
+
+
+def _reference_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
+    """r and its three derivatives [m, m/s, …] as polynomials of the stage t/t_op."""
+    t_op = sp.Rational(str(rational(fault.reference.operation_time)))
+    r = fault.reference.slip(stage * t_op)
+    names = (plant.r0, plant.r1, plant.r2, plant.r3)
+    return {name: sp.factor(sp.expand(r).diff(stage, n) / t_op**n) for n, name in enumerate(names)}
+
+
+def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
+    """Ranges of all that h' and its sensitivities depend on, but the errors: friction in its bounds and slopes."""
+    law, disturbance = fault.friction.exact(), fault.disturbance
+    slip_slope, rate_slope = (_fraction(sp.sympify(v)) for v in (law.slip_slope, law.rate_slope))
+    value, change = (rational(v) for v in (disturbance.largest_explicit, disturbance.largest_rate))
+    growth = rational(disturbance.slip_growth), rational(disturbance.rate_growth)
+    return plant_ranges(fault) | {
+        stage: (Fraction(0), Fraction(1)),
+        plant.friction_value: friction_range(fault),
+        plant.slip_slope: (-slip_slope, Fraction(0)),
+        plant.rate_slope: (-rate_slope, rate_slope),
+        plant.phi: (-value, value),
+        plant.phi_t: (-change, change),
+        plant.phi_1: (growth[0], growth[0]),
+        plant.phi_2: (growth[1], growth[1]),
+    }
+
+
+@lru_cache(maxsize=256)
+def largest_matched_rate(
+    fault: Fault, divisor: Fraction, errors: Errors, *, pieces: int = 120, feedforward: FeedForward = NONE
+) -> Fraction:
+    """Rigorous bound on |h'| [unit of ν per s] over the uncertainty box, the reference and the disturbance class.
+
+    Friction may be any function that weakens with slip within its bounds and slope bounds. The disturbance may
+    be any function of the preset's amplitude and rate of change.
+
+    Parameters
+    ----------
+    fault : Fault
+    divisor : Fraction
+        μ0N̂0 [m²/kg].
+    errors : Errors
+        Ranges of e1 [m], e2 [m/s], e2' [m/s²].
+    pieces : int
+        Largest number of subdivisions; fewer give a larger bound.
+    feedforward : FeedForward
+        What the law adds to ν, and so to h.
+    """
+    expression = rate_expression(fault, divisor, feedforward)
+    return upper_bound(expression, known_ranges(fault) | errors.ranges(), pieces=pieces)
+
+
+@lru_cache(maxsize=256)
+def largest_sensitivities(
+    fault: Fault, divisor: Fraction, errors: Errors, *, pieces: int = 60, feedforward: FeedForward = NONE
+) -> tuple[Fraction, Fraction]:
+    """Rigorous bounds g1 on |∂h/∂e1| [1/s²] and g2 on |∂h/∂e2| [1/s], as `largest_matched_rate`."""
+    box = known_ranges(fault) | errors.ranges()
+    first, second = sensitivity_expressions(fault, divisor, feedforward)
+    return upper_bound(first, box, pieces=pieces), upper_bound(second, box, pieces=pieces)
+
+
+def shares(expression: sp.Expr, box: Mapping[sp.Symbol, Range], kinds: Mapping[str, tuple[sp.Symbol, ...]]):
+    """Rigorous bound on what each kind of symbols contributes to an expression, largest first.
+
+    The symbols of all other kinds are set to zero.
+    """
+    found = {}
+    for kind in kinds:
+        others = {s: 0 for other, group in kinds.items() if other != kind for s in group}
+        found[kind] = upper_bound(expression.subs(others), box, pieces=60)
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
+    """Bound on |h| at t = 0, x = 0: the disturbance over β, friction at its static value; no feed-forward there."""
+    static, least = friction_range(fault)[1], plant_ranges(fault)[plant.N_hat][0]
+    return rational(fault.disturbance.largest_explicit) * divisor / (static * least)
+
+
+def _fraction(value: sp.Rational) -> Fraction:
+    exact = sp.nsimplify(value, rational=True)
+    return Fraction(int(exact.p), int(exact.q))

@@ -1,0 +1,210 @@
+"""How much a proved decrease withstands: numbers of a certificate alone, the same for every fault and every λ.
+
+Let V have degree m along a field of degree d. A perturbation w of the acceleration, e2' = β(ν + e3 + w), adds
+β·∂V/∂e2·w to V'. For |w| ≤ g1|e1| + g2|e2| the quotients β|∂V/∂e2||e_i| / (−V'·V^{p_i}), p_i = (r_i − r_2 − d)/m, are
+homogeneous of degree 0, so they have largest values a_i, and V' stays negative where a1·g1·V^{p1} + a2·g2·V^{p2} < 1.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+import sympy as sp
+
+from quakedesign.certificates.claim import Certificate, require
+from quakedesign.certificates.forms import Form, largest_ratio
+from quakedesign.certificates.obligations import Obligations, degree
+from quakedesign.errors import CertificateError, KinkError
+from quakedesign.symbolic.balls import enclose
+from quakedesign.symbolic.terms import Term, cell_polynomial, from_terms, lie_derivative, to_terms
+
+DECAY_CLAIMS = ("decay", "kappa")
+"""Names under which a certificate may claim κ of V' ≤ −κV^{(m+d)/m}."""
+
+Problem = tuple[tuple[Form, ...], tuple[Fraction, ...]]
+
+_PUSHED = 1
+"""Index of e2, on which ν acts."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robustness:
+    """What V' withstands in the acceleration.
+
+    Attributes
+    ----------
+    slip, rate : Fraction
+        Upper bounds on a1 [1/s² of the scaled loop, inverse] and a2; see the head of this file.
+    slip_power, rate_power : Fraction
+        p1 and p2 [-].
+    source : str
+        How they were bounded.
+    """
+
+    slip: Fraction
+    rate: Fraction
+    slip_power: Fraction
+    rate_power: Fraction
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decay:
+    """κ of V' ≤ −κV^{(m+d)/m}, a rational lower bound.
+
+    Attributes
+    ----------
+    rate : Fraction
+    source : str
+        ``"claimed"``, ``"bisection of the cells"`` or ``"chain of norms"``.
+    """
+
+    rate: Fraction
+    source: str
+
+
+class _Cells:
+    """Forms of a certificate on the sign cells, in coordinates that make {V ≤ 1} about the unit box."""
+
+    def __init__(self, certificate: Certificate) -> None:
+        self.loop, self.lyapunov = certificate.loop, certificate.lyapunov
+        self.obligations = Obligations(certificate.loop, certificate.lyapunov)
+        self.weights = list(self.loop.states.values())
+        self.m = degree([p for _, p in self.obligations.function()], "V")
+        # e1' = e2 gives the degree of the whole field
+        self.degree = self.weights[_PUSHED] - self.weights[0]
+        self.fallen = self.m + self.degree
+        self.sizes = [_size(certificate.claims.get(f"bound_{s}"), self.m) for s in self.loop.states]
+
+    def form(self, polynomial: dict[tuple[int, ...], Fraction], total: int) -> Form:
+        return Form.of(polynomial, len(self.weights), total, self.sizes)
+
+    def functions(self) -> Iterator[tuple[dict[str, int], Form]]:
+        """Signs of every cell and V on it."""
+        for cell in self.obligations.sign_cells():
+            yield dict(cell.signs), self.form(self.obligations.potential(cell.signs), self.m)
+
+    def decreases(self, signs: dict[str, int]) -> Iterator[tuple[dict[str, Fraction], Form]]:
+        """Uncertain values at every vertex and −V' there on a cell."""
+        require(not self.loop.lifts, "V' is no polynomial in the states where powers are nested.")
+        for _, values in self.obligations.vertices():
+            known = {**self.loop.parameters, **values}
+            rate = cell_polynomial(self.obligations.derivative, self.loop.states, signs, known)
+            yield values, self.form({e: -c for e, c in rate.items()}, self.fallen)
+
+    def power(self, index: int) -> Fraction:
+        """p_i = (r_i − r_2 − d)/m with d from the field's own degree."""
+        return Fraction(self.weights[index] - self.weights[_PUSHED] - self.degree, self.m)
+
+    def slope(self) -> tuple[Term, ...]:
+        """∂V/∂e2."""
+        symbols = self.loop.symbols
+        second = symbols[list(self.loop.states)[_PUSHED]]
+        found = lie_derivative(from_terms(self.lyapunov, symbols), {second: sp.Integer(1)})
+        return to_terms(found, [symbols[s] for s in self.loop.states])
+
+    def push(self, slope: tuple[Term, ...], index: int, signs: dict[str, int], beta: Fraction) -> Form:
+        """β·∂V/∂e2·|e_i| on a cell."""
+        weight = self.weights[index]
+        bare = cell_polynomial(slope, self.loop.states, signs, {})
+        raised = {tuple(k + weight * (j == index) for j, k in enumerate(e)): beta * c for e, c in bare.items()}
+        return self.form(raised, self.m - self.weights[_PUSHED] + weight)
+
+
+def _size(gamma: Fraction | None, m: int) -> Fraction:
+    """Short rational near γ^{−1/m}; any positive number is right, this one makes the bisection quick."""
+    return Fraction(float(gamma) ** (-1 / m)).limit_denominator(1000) if gamma else Fraction(1)
+
+
+def robustness(certificate: Certificate) -> Robustness | None:
+    """Bounds on what V' withstands, for all uncertain values of the certificate.
+
+    On polynomial cells V' itself is compared; elsewhere −κV^{(m+d)/m} with the κ that the certificate claims.
+
+    Returns
+    -------
+    Robustness or None
+        None where no bound was found, as where V is not polynomial on its cells.
+    """
+    try:
+        cells = _Cells(certificate)
+        slope = cells.slope()
+    except (CertificateError, KinkError):
+        return None
+    try:
+        found = [largest_ratio(_against_decrease(cells, slope, index)) for index in (0, _PUSHED)]
+        source = "bisection of the cells"
+    except (CertificateError, KinkError):
+        kappa = _claimed(certificate)
+        largest = [largest_ratio(_against_function(cells, slope, index)) for index in (0, _PUSHED)]
+        found = [None if kappa is None or v is None else v / kappa for v in largest]
+        source = "claimed decay"
+    slip, rate = found
+    if slip is None or rate is None:
+        return None
+    return Robustness(slip=slip, rate=rate, slip_power=cells.power(0), rate_power=cells.power(_PUSHED), source=source)
+
+
+def _against_decrease(cells: _Cells, slope: tuple[Term, ...], index: int) -> list[Problem]:
+    """β|∂V/∂e2||e_i| / (−V'·V^p) on every cell and vertex."""
+    powers = (Fraction(1), Fraction(-1), -cells.power(index))
+    return [
+        ((cells.push(slope, index, signs, values["beta"]), decrease, function), powers)
+        for signs, function in cells.functions()
+        for values, decrease in cells.decreases(signs)
+    ]
+
+
+def _against_function(cells: _Cells, slope: tuple[Term, ...], index: int) -> list[Problem]:
+    """β|∂V/∂e2||e_i| / V^{1 + …} on every cell, with the largest β."""
+    beta = cells.loop.uncertain["beta"][1]
+    return [
+        ((push, function), (Fraction(1), -Fraction(push.degree, cells.m)))
+        for signs, function in cells.functions()
+        for push in (cells.push(slope, index, signs, beta),)
+    ]
+
+
+def decay(certificate: Certificate) -> Decay:
+    """κ of V' ≤ −κV^{(m+d)/m}: the certificate's own claim, else by bisection of its cells, else by a chain of norms.
+
+    Raises
+    ------
+    CertificateError
+        When the certificate claims no κ and its cells are not polynomial.
+    """
+    claimed = _claimed(certificate)
+    if claimed is not None:
+        return Decay(rate=claimed, source="claimed")
+    cells = _Cells(certificate)
+    powers = (Fraction(cells.fallen, cells.m), Fraction(-1))
+    found = largest_ratio(
+        [
+            ((function, decrease), powers)
+            for signs, function in cells.functions()
+            for _, decrease in cells.decreases(signs)
+        ]
+    )
+    if found is not None:
+        return Decay(rate=1 / found, source="bisection of the cells")
+    return Decay(rate=decay_by_norms(certificate), source="chain of norms")
+
+
+def decay_by_norms(certificate: Certificate) -> Fraction:
+    """κ = ε·C^{−(m+d)/m} from the claim −V' ≥ ε·Σu_i^{m+d} and V ≤ C·Σu_i^m: exact, simple and weak.
+
+    It uses Σu_i^m ≤ (Σu_i^{m+d})^{m/(m+d)}; C bounds every monomial by weighted means.
+    """
+    cells = _Cells(certificate)
+    largest = max(
+        sum((c * e[i] / cells.m for e, c in polynomial.items() if c > 0), Fraction(0))
+        for _, polynomial in cells.obligations.function()
+        for i in range(len(cells.weights))
+    )
+    x = sp.Symbol("x", positive=True)
+    power = enclose(x ** sp.Rational(cells.fallen, cells.m), {x: (largest, largest)}).upper().fmpq()
+    return certificate.claims["decrease"] / Fraction(int(power.p), int(power.q))
+
+
+def _claimed(certificate: Certificate) -> Fraction | None:
+    return next((certificate.claims[name] for name in DECAY_CLAIMS if name in certificate.claims), None)
