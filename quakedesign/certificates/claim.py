@@ -9,6 +9,7 @@ from math import isqrt
 
 import sympy as sp
 
+from quakedesign.certificates.response import Response
 from quakedesign.controllers import LoopField, Subject
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.sos.exact.polynomial import Polynomial
@@ -48,6 +49,8 @@ class Loop:
         The gain or constant whose positive square root a name stands for, and an interval that holds it.
     lifts : mapping of str to tuple of Term
         Argument of every nested power.
+    inputs : mapping of str to tuple of Fraction
+        Bound of every measurable input in the field and, if its rate is limited too, that of its rate.
     """
 
     law: str
@@ -59,6 +62,7 @@ class Loop:
     field: Mapping[str, tuple[Term, ...]]
     roots: Mapping[str, tuple[str, Range]] = dataclasses.field(default_factory=dict)
     lifts: Mapping[str, tuple[Term, ...]] = dataclasses.field(default_factory=dict)
+    inputs: Mapping[str, tuple[Fraction, ...]] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, (low, high) in self.uncertain.items():
@@ -68,7 +72,9 @@ class Loop:
     @property
     def symbols(self) -> dict[str, sp.Symbol]:
         """SymPy symbol of every name."""
-        names = (*self.states, *self.gains, *self.constants, *self.uncertain, *self.roots, *self.lifts)
+        names = (
+            *self.states, *self.gains, *self.constants, *self.uncertain, *self.roots, *self.lifts, *self.inputs
+        )  # fmt: skip
         return {n: sp.Symbol(n, real=True) for n in names}
 
     @property
@@ -136,6 +142,8 @@ class Certificate:
     witnesses : mapping of str to Witness
         One for every different obligation, by name.
     refutation : Equilibrium, optional
+    response : Response, optional
+        Bounds on outputs under the inputs of the loop, instead of a V and claims.
     """
 
     loop: Loop
@@ -143,6 +151,7 @@ class Certificate:
     claims: Mapping[str, Fraction] = field(default_factory=dict)
     witnesses: Mapping[str, Witness] = field(default_factory=dict)
     refutation: Equilibrium | None = None
+    response: Response | None = None
 
     def check(self, law: Subject | None = None) -> Verdict:
         """Re-decide the statement from nothing but its claim, in exact arithmetic; field against law as well.
@@ -223,6 +232,32 @@ def sympy_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:
     """Vector field of a loop as SymPy expressions."""
     symbols = loop.symbols
     return {symbols[state]: from_terms(terms, symbols) for state, terms in loop.field.items()}
+
+
+def full_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:
+    """Vector field of a loop with every nested power written out."""
+    symbols = loop.symbols
+    found = sympy_field(loop)
+    for lift, terms in reversed(list(loop.lifts.items())):
+        argument = from_terms(terms, symbols)
+        found = {state: rate.subs(symbols[lift], argument) for state, rate in found.items()}
+    return found
+
+
+def error_units(loop: Loop) -> dict[str, Range]:
+    """Interval of the error that one unit of each state stands for; one where the law says nothing else."""
+    from quakedesign.controllers import laws
+    from quakedesign.symbolic.balls import enclose
+
+    known = laws().get(loop.law)
+    units = known.loop_field().units if known is not None else {}
+    values = {**{n: (v, v) for n, v in loop.parameters.items()}, **{n: ends for n, (_, ends) in loop.roots.items()}}
+    found: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))
+    for state, unit in units.items():
+        ball = enclose(unit, {s: values[s.name] for s in unit.free_symbols if isinstance(s, sp.Symbol)})
+        ends = [end.fmpq() for end in (ball.lower(), ball.upper())]
+        found[state.name] = (Fraction(int(ends[0].p), int(ends[0].q)), Fraction(int(ends[1].p), int(ends[1].q)))
+    return found
 
 
 def require(condition: bool, reason: str) -> None:

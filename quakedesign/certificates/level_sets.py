@@ -6,7 +6,7 @@ from typing import Any
 
 import sympy as sp
 
-from quakedesign.certificates.claim import Certificate, sympy_field
+from quakedesign.certificates.claim import Certificate, error_units, full_field
 from quakedesign.certificates.matched import Errors
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.terms import from_terms
@@ -43,7 +43,9 @@ class LevelSets:
         """Upper bound of V where |e1| ≤ slip [m], |e2| ≤ rate [m/s] and |e3| ≤ matched [unit of ν]."""
         loop = self.certificate.loop
         first, second, *rest = (loop.symbols[s] for s in loop.states)
+        units = {loop.symbols[s]: low for s, (low, _) in error_units(loop).items()}
         sizes = {first: slip, second: rate, **dict.fromkeys(rest[:-1], Fraction(0)), rest[-1]: matched}
+        sizes = {symbol: size / units[symbol] for symbol, size in sizes.items()}
         box = {symbol: (-v / self.scale, v / self.scale) for symbol, v in sizes.items()}
         return _top(enclose(from_terms(self.certificate.lyapunov, loop.symbols), box))
 
@@ -59,10 +61,14 @@ class LevelSets:
             loop.symbols[n]: ends for n, ends in loop.uncertain.items()
         }
         box |= {loop.symbols[n]: (v, v) for n, v in loop.parameters.items()}
+        box |= {loop.symbols[n]: ends for n, (_, ends) in loop.roots.items()}
         first, second, *_ = loop.states
-        acceleration = _top(abs(enclose(sympy_field(loop)[loop.symbols[second]], box)))
+        units = error_units(loop)
+        acceleration = _top(abs(enclose(full_field(loop)[loop.symbols[second]], box))) * units[second][1]
         return Errors(
-            slip=self.scale * sizes[first], rate=self.scale * sizes[second], acceleration=self.scale * acceleration
+            slip=self.scale * sizes[first] * units[first][1],
+            rate=self.scale * sizes[second] * units[second][1],
+            acceleration=self.scale * acceleration,
         )
 
     def starts(self, level: Fraction) -> tuple[Fraction, ...]:
@@ -73,7 +79,7 @@ class LevelSets:
             rest = {loop.symbols[s]: 0 for s in loop.states if s != state}
             peak = max(_top(enclose(function.subs(rest | {loop.symbols[state]: sign}), {})) for sign in (1, -1))
             size = enclose((_BASE / _OTHER) ** self._power(weight), {_BASE: (level,) * 2, _OTHER: (peak,) * 2})
-            found.append(self.scale * _bottom(size) if level else level)
+            found.append(self.scale * _bottom(size) * error_units(loop)[state][0] if level else level)
         return tuple(found)
 
     def _power(self, weight: int) -> sp.Rational:

@@ -1,6 +1,6 @@
 """From a loop and a Lyapunov function to the polynomials that must be non-negative (FORMAT.md, 2 to 5)."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -216,7 +216,7 @@ def _word(signs: Mapping[str, int]) -> str:
     return "".join("+" if s > 0 else "-" for s in signs.values())
 
 
-def degree(polynomials: list[Polynomial], what: str) -> int:
+def degree(polynomials: Sequence[Polynomial], what: str) -> int:
     """Degree of forms that must all share it.
 
     Raises

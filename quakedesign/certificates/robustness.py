@@ -11,7 +11,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from quakedesign.certificates.claim import Certificate, require
+from quakedesign.certificates.claim import Certificate, error_units, require
 from quakedesign.certificates.forms import Form, largest_ratio
 from quakedesign.certificates.obligations import Obligations, degree
 from quakedesign.errors import CertificateError, KinkError
@@ -104,9 +104,10 @@ class _Cells:
         return to_terms(found, [symbols[s] for s in self.loop.states])
 
     def push(self, slope: tuple[Term, ...], index: int, signs: dict[str, int], beta: Fraction) -> Form:
-        """β·∂V/∂e2·|e_i| on a cell."""
+        """β·∂V/∂e2·|e_i| on a cell, the error e_i at most a unit times the state."""
         weight = self.weights[index]
         bare = cell_polynomial(slope, self.loop.states, signs, {})
+        beta *= error_units(self.loop)[list(self.loop.states)[index]][1]
         raised = {tuple(k + weight * (j == index) for j, k in enumerate(e)): beta * c for e, c in bare.items()}
         return self.form(raised, self.m - self.weights[_PUSHED] + weight)
 

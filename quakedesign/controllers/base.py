@@ -1,8 +1,9 @@
 """What every law offers to the proof, and what one that acts on a fault offers besides."""
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
@@ -63,8 +64,8 @@ class LoopField:
     constants: tuple[sp.Symbol, ...]
     uncertain: tuple[sp.Symbol, ...]
     domain: str
-    roots: Mapping[sp.Symbol, sp.Symbol] = field(default_factory=dict)
-    units: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    roots: Mapping[sp.Symbol, sp.Symbol] = dataclasses.field(default_factory=dict)
+    units: Mapping[sp.Symbol, sp.Expr] = dataclasses.field(default_factory=dict)
 
     @property
     def degree(self) -> int:

@@ -3,7 +3,9 @@
 from typing import Any
 
 from quakedesign.sos.exact.answer import Answer, Positivity
-from quakedesign.sos.exact.witness import Block, Polynomial, Witness, proves
+from quakedesign.sos.exact.polynomial import Polynomial
+from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares, holds
+from quakedesign.sos.exact.statement import Statement, statement
 
 _SEARCH = {
     "prove": "engine",
@@ -15,16 +17,20 @@ _SEARCH = {
 
 __all__ = [
     "Answer",
-    "Block",
+    "Functional",
     "Membership",
+    "Point",
     "Polynomial",
     "Positivity",
     "Program",
-    "Witness",
+    "Square",
+    "Statement",
+    "SumOfSquares",
     "decide",
+    "holds",
     "largest",
     "prove",
-    "proves",
+    "statement",
 ]
 
 

@@ -49,8 +49,52 @@ def test_gains_without_a_certificate_are_an_answer_not_an_error(gains):
     assert qd.certify("cta", gains, lipschitz="0.1")[0] in (Verdict.UNDECIDED, Verdict.REFUTED)
 
 
-def test_a_law_with_nested_powers_is_undecided_for_now():
-    assert qd.certify("dia", (1, 20, 1, 0), lipschitz="0.3") == (Verdict.UNDECIDED, None)
+@pytest.mark.parametrize(
+    ("gains", "lipschitz"),
+    [
+        (("1", "20", "1", "0"), "0.3"),
+        (("2", "5", "1.44e-4", "0"), "1.3968e-4"),  # the paper's laboratory gains at 97 % of k_I3
+        (("1", "20", "1", "1/10"), "0.3"),
+    ],
+)
+def test_nested_powers_are_proved_over_the_range_of_beta(gains, lipschitz):
+    verdict, certificate = qd.certify("dia", gains, lipschitz=lipschitz, gain_range=(1, "1.425"))
+    assert verdict is Verdict.PROVED
+    assert certificate.check() is Verdict.PROVED
+    broken = dict(certificate.witnesses)
+    name = next(n for n in broken if n.startswith("decrease"))
+    broken[name] = replace(broken[name], cofactors=({(1, 0, 0, 0): F(1)},))
+    with pytest.raises(CertificateError):
+        replace(certificate, witnesses=broken).check()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lipschitz", ["1", "1.01", "3"])
+def test_the_integral_action_bounds_what_the_nested_law_withstands(lipschitz):
+    # d = k_I3 on e1 > 0 holds off ξ1' for ever
+    assert qd.certify("dia", (1, 20, 1, 0), lipschitz=lipschitz)[0] is not Verdict.PROVED
+
+
+def test_a_root_outside_its_range_is_refused():
+    certificate = qd.certify("dia", (2, 5, "1.44e-4", 0), lipschitz="1e-4")[1]
+    of, (low, high) = certificate.loop.roots["kappa"]
+    assert low**2 < certificate.loop.gains[of] < high**2
+    loop = replace(certificate.loop, roots={"kappa": (of, (high, high))})
+    with pytest.raises(CertificateError):
+        replace(certificate, loop=loop).check()
+
+
+def test_decay_bounds_the_settling_time():
+    from quakedesign.synthesis.finishing import with_largest_decay
+    from quakedesign.synthesis.scales import balance
+
+    certificate = qd.certify("cta", GAINS, lipschitz=1)[1]
+    faster = with_largest_decay(certificate, balance(certificate.loop))
+    assert faster.check() is Verdict.PROVED
+    assert F(1, 70) < faster.claims["decay"] < F(1, 40)  # κ = 1/66 is known for another V of the same gains
+    doubled = {**faster.claims, "decay": 2 * faster.claims["decay"]}
+    with pytest.raises(CertificateError):
+        replace(faster, claims=doubled).check()
 
 
 def test_the_sign_of_v_dot_agrees_with_an_independent_sampler(proof):

@@ -13,7 +13,7 @@ from math import comb
 
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, times
-from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.statement import Statement, parity, residue
 
 _MONOMIALS, _PAIRS = 2_000, 8_000_000
 
@@ -106,39 +106,13 @@ def parity_classes(statement: Statement, basis: tuple[Exponents, ...]) -> list[t
 
     The Gram matrix may be taken block diagonal in these classes (Löfberg 2009).
     """
-    echelon = _parity_echelon(statement)
+    echelon = statement.parities
     classes: dict[int, list[int]] = defaultdict(list)
     for index, b in enumerate(basis):
-        classes[_residue(b, echelon)].append(index)
+        classes[residue(parity(b), echelon)].append(index)
     return [tuple(c) for c in classes.values()]
 
 
 def invariant(statement: Statement, exponents: Exponents) -> bool:
     """Whether a monomial keeps its sign under every sign change that leaves the statement invariant."""
-    return _residue(exponents, _parity_echelon(statement)) == 0
-
-
-def _parity_echelon(statement: Statement) -> dict[int, int]:
-    """Echelon basis over GF(2) of the parities that occur, leading bit to vector."""
-    echelon: dict[int, int] = {}
-    for p in (statement.target, *statement.inequalities, *statement.equalities):
-        for e in p:
-            vector = _reduce(_bits(e), echelon)
-            if vector:
-                echelon[vector.bit_length()] = vector
-    return echelon
-
-
-def _residue(exponents: Exponents, echelon: dict[int, int]) -> int:
-    return _reduce(_bits(exponents), echelon)
-
-
-def _reduce(vector: int, echelon: dict[int, int]) -> int:
-    for lead in sorted(echelon, reverse=True):
-        if vector >> (lead - 1) & 1:
-            vector ^= echelon[lead]
-    return vector
-
-
-def _bits(exponents: Exponents) -> int:
-    return sum((x & 1) << i for i, x in enumerate(exponents))
+    return residue(parity(exponents), statement.parities) == 0

@@ -78,10 +78,34 @@ class Statement:
         """Whether the set is ℝⁿ or an orthant, so that a multiplier may vanish on a thin part of it."""
         return not self.equalities and all(self.is_variable(g) for g in self.inequalities)
 
+    @cached_property
+    def parities(self) -> dict[int, int]:
+        """Echelon basis over GF(2) of the parities of all exponents that occur, leading bit to vector."""
+        echelon: dict[int, int] = {}
+        for p in (self.target, *self.inequalities, *self.equalities):
+            for e in p:
+                vector = residue(parity(e), echelon)
+                if vector:
+                    echelon[vector.bit_length()] = vector
+        return echelon
+
     @staticmethod
     def is_variable(polynomial: Polynomial) -> bool:
         """Whether a polynomial is a positive multiple of one variable."""
         return len(polynomial) == 1 and all(sum(e) == 1 and c > 0 for e, c in polynomial.items())
+
+
+def parity(exponents: Exponents) -> int:
+    """Odd exponents as bits."""
+    return sum((x & 1) << i for i, x in enumerate(exponents))
+
+
+def residue(vector: int, echelon: dict[int, int]) -> int:
+    """Remainder of a vector modulo an echelon basis over GF(2)."""
+    for lead in sorted(echelon, reverse=True):
+        if vector >> (lead - 1) & 1:
+            vector ^= echelon[lead]
+    return vector
 
 
 def statement(

@@ -12,7 +12,7 @@ from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.faces import Block, at_kernels, at_real_zeros, at_zeros, modulo
 from quakedesign.sos.solve.moment import MomentProgram, Solution
 from quakedesign.sos.solve.points import local_minima, negative_point, polished_zeros, rational_zeros
-from quakedesign.sos.solve.rounding_exact import relations, rounded
+from quakedesign.sos.solve.rounding import relations, rounded
 from quakedesign.sos.solve.scaling import Scaled, decimal_units, scaled
 
 _STRICT = 1e-7

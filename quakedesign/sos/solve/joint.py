@@ -17,7 +17,7 @@ from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.decide import initial_blocks
 from quakedesign.sos.solve.faces import modulo
 from quakedesign.sos.solve.moment import MomentProgram, settings, useful
-from quakedesign.sos.solve.rounding_exact import relations
+from quakedesign.sos.solve.rounding import relations
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from quakedesign.sos.exact.polynomial import Exponents
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.decide import initial_blocks
 from quakedesign.sos.solve.moment import MomentProgram
-from quakedesign.sos.solve.rounding_exact import relations
+from quakedesign.sos.solve.rounding import relations
 
 
 class Membership:

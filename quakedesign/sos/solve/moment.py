@@ -14,7 +14,7 @@ from typing import Any
 from quakedesign.sos.exact.polynomial import Exponents
 
 SOLVER = "Clarabel"
-_LARGEST_MARGIN = 4.0  # keeps the programme bounded where every polynomial is in the cone, as on an empty set
+_LARGEST_MARGINS = (4.0, 1e-2, 1e-5)  # keep the programme bounded where every polynomial is in the cone
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,11 +96,17 @@ class MomentProgram:
         return all(e in self.index for e in target)
 
     def solve(self, target: Mapping[Exponents, float], accuracy: float = 1e-9) -> Solution | None:
-        """Largest margin for a target whose coefficients are about one; None if the solver fails."""
+        """Largest margin for a target whose coefficients are about one; None if the solver fails.
+
+        On a set without interior the largest margin may not be attained. Then a smaller one is asked for.
+        """
+        return next(filter(None, (self._solve(target, accuracy, most) for most in _LARGEST_MARGINS)), None)
+
+    def _solve(self, target: Mapping[Exponents, float], accuracy: float, most: float) -> Solution | None:
         import clarabel
         import numpy as np
 
-        cost = np.append(self.vector(target), _LARGEST_MARGIN)
+        cost = np.append(self.vector(target), most)
         if self._solver is None or self._accuracy != accuracy:
             slack = [(0, len(self.keys), 1.0), (1 + self.relation_count, len(self.keys), -1.0)]
             A, b = self._matrix(slack, equations=1 + self.relation_count, limits=1)

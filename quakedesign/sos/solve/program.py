@@ -12,10 +12,11 @@ from quakedesign.sos.exact.definiteness import positive_definite
 from quakedesign.sos.exact.polynomial import Exponents, combination, degree
 from quakedesign.sos.exact.reading import read
 from quakedesign.sos.exact.statement import Statement, statement
+from quakedesign.sos.solve.conic import solve
 from quakedesign.sos.solve.decide import initial_blocks
 from quakedesign.sos.solve.engine import decide
 from quakedesign.sos.solve.faces import Block
-from quakedesign.sos.solve.rounding_exact import relations
+from quakedesign.sos.solve.rounding import relations
 
 _ROOM = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 _BITS = (4, 8, 12, 18, 24, 32)
@@ -142,7 +143,7 @@ class Program:
             None says nothing about feasibility.
         """
         problem = self.problem()
-        if not _solved(problem):
+        if not solve(problem):
             return None
         best = float(problem.value)
         for room in _ROOM:
@@ -160,7 +161,7 @@ class Program:
         constraints = [*self._constraints(margin), margin <= 1]
         if self._objective:
             constraints.append(self._value(self._objective) >= best - room)
-        solved = _solved(cp.Problem(cp.Maximize(margin), constraints))
+        solved = solve(cp.Problem(cp.Maximize(margin), constraints))
         if not solved or margin.value is None or margin.value < 1e-11:
             return None
         for bits in _BITS:
@@ -336,18 +337,3 @@ def _definite(vector: Any, rows: list[list[dict]], margin: Any) -> Any:
         unit = tuple(int(i == k) for i in range(len(zero)))
         total = total + vector[k] * np.array([[float(entry.get(unit, 0)) for entry in row] for row in rows])
     return total - margin * np.eye(size) >> 0
-
-
-def _solved(problem: Any) -> bool:
-    """Run Clarabel; whether there is an answer worth looking at. Its status is no verdict."""
-    import warnings
-
-    import cvxpy as cp
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            problem.solve(solver=cp.CLARABEL)
-        except (cp.SolverError, ValueError, ArithmeticError):
-            return False
-    return problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)

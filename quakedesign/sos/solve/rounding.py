@@ -1,95 +1,163 @@
-"""From floating-point Gram matrices to exact witnesses."""
+"""From floating-point Gram matrices to an exact sum of squares: round, then put the exact residual back."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
+from typing import Any
 
 from quakedesign.rationals import nearest
-from quakedesign.sos.exact.witness import Block, Polynomial, Witness, expand, proves
-from quakedesign.sos.solve.cone import Cone
-from quakedesign.sos.solve.search import GramSearch
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, product, times
+from quakedesign.sos.exact.proofs import Square, SumOfSquares, identity_holds, residual
+from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.solve.faces import Block
+from quakedesign.sos.solve.moment import Solution
 
-_BITS = (12, 18, 24, 32, 44)
+_BITS = (4, 7, 10, 13, 16, 20, 24, 28, 33, 38, 44)
 
 
-def find_witness(polynomial: Polynomial, search: GramSearch, scale: Sequence[Fraction]) -> Witness | None:
-    """Exact witness for a form, or None.
+def rounded(
+    statement: Statement,
+    blocks: Sequence[Block],
+    solution: Solution,
+    holds: Callable[[Statement, SumOfSquares], bool] = identity_holds,
+) -> SumOfSquares | None:
+    """Exact proof near a floating-point one, with the coarsest rounding that works; None if none does.
 
     Parameters
     ----------
-    polynomial : mapping of exponents to Fraction
-        Form of the cone's degree.
-    search : GramSearch
-    scale : sequence of Fraction
-        The solver sees the form in ũ with u_i = scale_i·ũ_i; the witness is for u.
+    statement : Statement
+    blocks : sequence of Block
+        As solved.
+    solution : Solution
+    holds : callable
+        The exact decision.
 
     Returns
     -------
-    Witness or None
-        Verified by `proves`, with the coarsest rounding that works.
+    SumOfSquares or None
+        Checked.
     """
-    cone = search.cone
-    if not polynomial:
-        return Witness(multiplier={(0,) * cone.variables: Fraction(1)})
-    if all(len(entries) == 1 for entries in cone.positions.values()):
-        grams: list | None = [[[0.0] * len(basis) for _ in basis] for _, basis in cone.blocks]
-    else:
-        grams = search(scaled(polynomial, scale))
-    if grams is None:
-        return None
-    largest = max(abs(float(c)) for c in scaled(polynomial, scale).values())
+    system = _System(statement, blocks)
+    floats = system.flat(solution)
+    largest = max((len(b.basis) for b in blocks), default=1)
+    enough = largest / max(solution.margin, 2.0**-36)
     for bits in _BITS:
-        denominator = max(1, round(2**bits / largest)) if largest < 2**bits else 1
-        rounded = [[[nearest(float(v), denominator) for v in row] for row in gram] for gram in grams]
-        blocks = _absorb(scaled(polynomial, scale), cone, rounded)
-        back = tuple(_unscaled(b, scale) for b in blocks)
-        witness = Witness(multiplier={(0,) * cone.variables: Fraction(1)}, blocks=back)
-        if proves(polynomial, witness, orthant=cone.orthant):
-            return witness
+        if 2.0 ** (bits + 3) < enough:
+            continue
+        values = [nearest(float(v), 2**bits) for v in floats]
+        proof = system.proof(values)
+        correction = system.correction(residual(statement, proof.squares, proof.cofactors))
+        if correction is None:
+            return None
+        proof = system.proof([a + correction.get(i, 0) for i, a in enumerate(values)])
+        if holds(statement, proof):
+            return proof
     return None
 
 
-def scaled(
-    polynomial: Polynomial, scale: Sequence[Fraction], factor: Fraction = Fraction(1)
-) -> dict[tuple[int, ...], Fraction]:
-    """factor · P(scale ∘ u)."""
-    return {e: c * factor * monomial(scale, e) for e, c in polynomial.items()}
+def relations(statement: Statement) -> Iterator[tuple[int, Exponents, dict[Exponents, Fraction]]]:
+    """Equality, monomial and their product, for all products within the degree; among forms of just that degree."""
+    size = len(statement.variables)
+    for k, h in enumerate(statement.equalities):
+        most = statement.degree - degree(h)
+        for m in monomials(size, most, most if statement.graded else 0):
+            yield k, m, {times(m, e): c for e, c in h.items()}
 
 
-def monomial(values: Sequence[Fraction], exponents: Sequence[int]) -> Fraction:
-    """Π values_i^exponents_i."""
-    product = Fraction(1)
-    for v, e in zip(values, exponents, strict=True):
-        product *= Fraction(v) ** e
-    return product
+class _System:
+    """The linear system from Gram entries and cofactor coefficients to coefficients of the target."""
 
+    def __init__(self, statement: Statement, blocks: Sequence[Block]) -> None:
+        self.statement, self.blocks = statement, blocks
+        self.entries = [
+            (k, i, j) for k, b in enumerate(blocks) for i in range(len(b.basis)) for j in range(i, len(b.basis))
+        ]
+        self.relations = list(relations(statement))
+        self.columns = [self._column(*entry) for entry in self.entries] + [r for _, _, r in self.relations]
+        self.single = all(len(c) == 1 for c in self.columns)
+        self.pivots: Any = None
 
-def _absorb(polynomial: Polynomial, cone: Cone, rounded: list) -> list[Block]:
-    """Spread the exact residual evenly over the Gram entries of each monomial."""
-    blocks = [_block(times, basis, gram) for (times, basis), gram in zip(cone.blocks, rounded, strict=True)]
-    residual = dict(polynomial)
-    for block in blocks:
-        for e, c in expand(block).items():
-            residual[e] = residual.get(e, Fraction(0)) - c
-    for e, c in residual.items():
-        entries = cone.positions[e]
-        share = c / sum(1 if i == j else 2 for _, i, j in entries)
-        for k, i, j in entries if c else ():
-            rounded[k][i][j] += share
-            if i != j:
-                rounded[k][j][i] += share
-    return [_block(times, basis, gram) for (times, basis), gram in zip(cone.blocks, rounded, strict=True)]
+    def _column(self, k: int, i: int, j: int) -> dict[Exponents, Fraction]:
+        block = self.blocks[k]
+        left, right = block.basis[i], block.basis[j]
+        factor = Fraction(1 if i == j else 2)
+        if isinstance(left, tuple) and isinstance(right, tuple):
+            shift = times(left, right)
+            return {times(shift, e): factor * c for e, c in block.weight.items()}
+        parts: list[Polynomial] = [{b: Fraction(1)} if isinstance(b, tuple) else b for b in (left, right)]
+        return {e: factor * c for e, c in product(len(self.statement.variables), (*parts, block.weight)).items()}
 
+    def flat(self, solution: Solution) -> list[float]:
+        """All unknowns of a solution in order."""
+        grams = [float(solution.grams[k][i][j]) for k, i, j in self.entries]
+        return [*grams, *(float(c) for c in solution.cofactors)]
 
-def _block(times, basis, gram) -> Block:
-    upper = tuple(gram[i][j] for i in range(len(basis)) for j in range(i, len(basis)))
-    return Block(times=times, basis=basis, gram=upper)
+    def proof(self, values: Sequence[Fraction]) -> SumOfSquares:
+        """Unknowns as a proof, unchecked."""
+        squares, start = [], 0
+        for block in self.blocks:
+            count = len(block.basis) * (len(block.basis) + 1) // 2
+            gram = tuple(values[start : start + count])
+            squares.append(Square(product=block.product, basis=block.basis, gram=gram))
+            start += count
+        cofactors: list[dict[Exponents, Fraction]] = [{} for _ in self.statement.equalities]
+        for (k, m, _), value in zip(self.relations, values[start:], strict=True):
+            if value:
+                cofactors[k][m] = value
+        return SumOfSquares(squares=tuple(squares), cofactors=tuple(cofactors))
 
+    def correction(self, missing: Polynomial) -> dict[int, Fraction] | None:
+        """Change of the unknowns that produces the residual exactly; None if there is none."""
+        return self._spread(missing) if self.single else self._solve(missing)
 
-def _unscaled(block: Block, scale: Sequence[Fraction]) -> Block:
-    """Block for u from one for ũ = u/scale."""
-    factors = [1 / monomial(scale, b) for b in block.basis]
-    outer = 1 / monomial(scale, block.times)
-    size = len(factors)
-    pairs = ((i, j) for i in range(size) for j in range(i, size))
-    gram = tuple(q * factors[i] * factors[j] * outer for q, (i, j) in zip(block.gram, pairs, strict=True))
-    return Block(times=block.times, basis=block.basis, gram=gram)
+    def _spread(self, missing: Polynomial) -> dict[int, Fraction] | None:
+        feeding: dict[Exponents, list[int]] = {}
+        for i, column in enumerate(self.columns):
+            feeding.setdefault(next(iter(column)), []).append(i)
+        change: dict[int, Fraction] = {}
+        for e, c in missing.items():
+            if e not in feeding:
+                return None
+            total = sum((next(iter(self.columns[i].values())) for i in feeding[e]), start=Fraction(0))
+            for i in feeding[e] if total else ():
+                change[i] = c / total
+        return change
+
+    def _solve(self, missing: Polynomial) -> dict[int, Fraction] | None:
+        from flint import fmpq, fmpq_mat
+
+        if self.pivots is None:
+            self.pivots = self._choose()
+        rows, chosen, matrix = self.pivots
+        if any(e not in self.rows for e in missing):
+            return None
+        side = [missing.get(e, Fraction(0)) for e in rows]
+        if not rows:
+            return {} if not missing else None
+        answer = matrix.solve(fmpq_mat([[fmpq(v.numerator, v.denominator)] for v in side]))
+        values = [Fraction(int(v[0].p), int(v[0].q)) for v in answer.tolist()]
+        return dict(zip(chosen, values, strict=True))
+
+    def _choose(self):
+        """Independent rows and columns, by pivoted QR, with the exact square matrix between them."""
+        import numpy as np
+        from flint import fmpq, fmpq_mat
+        from scipy.linalg import qr
+
+        keys = sorted({e for c in self.columns for e in c})
+        self.rows = {e: i for i, e in enumerate(keys)}
+        dense = np.zeros((len(keys), len(self.columns)))
+        for j, column in enumerate(self.columns):
+            for e, c in column.items():
+                dense[self.rows[e], j] = float(c)
+        _, triangle, order = qr(dense, mode="economic", pivoting=True)
+        sizes = np.abs(np.diag(triangle))
+        rank = int((sizes > 1e-9 * max(sizes.max(initial=0), 1e-300)).sum())
+        chosen = [int(j) for j in order[:rank]]
+        _, _, order = qr(dense[:, chosen].T, mode="economic", pivoting=True)
+        rows = [keys[i] for i in order[:rank]]
+        exact = [[self.columns[j].get(e, Fraction(0)) for j in chosen] for e in rows]
+        return (
+            rows,
+            chosen,
+            fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in exact]) if rank else None,
+        )
