@@ -4,29 +4,34 @@ Usage: ``python proofs/check.py FILE...``. Every file gets one block: ``proved``
 statement that was verified, or ``invalid`` with one reason. Exit code 0: all proved; 1: not all; 2: an
 argument cannot be read.
 
-A factor |x_i|^a is kept as the integer exponent r_i*a of u_i = |x_i|^(1/r_i) and a flag: odd for the signed
-power, even for the absolute one. A polynomial maps tuples of exponents to nonzero fractions.
+A polynomial maps tuples of exponents to nonzero fractions. The sections are: reading, exact arithmetic and
+squares for both kinds of file; closed loops; plain polynomials; the command.
 """
 
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import accumulate, combinations_with_replacement, product
-from math import lcm, prod
+from functools import cache
+from itertools import accumulate, chain, product
+from math import comb, lcm, prod
 from pathlib import Path
 from typing import Any, NoReturn
 
 MAX_BYTES, MAX_NESTING = 4 * 2**20, 12
 MAX_STATES, MAX_WEIGHT, MAX_UNCERTAIN, MAX_NUMBERS = 6, 12, 8, 64
 MAX_TERMS, MAX_EXPONENT, MAX_OBLIGATIONS, MAX_BASIS = 200, 24, 4096, 200
+MAX_VARIABLES, MAX_CONSTRAINTS, MAX_PRODUCTS = 16, 32, 1024
+MAX_MONOMIALS, MAX_REDUCED, MAX_POLYNOMIAL = 2000, 400, 20_000
 # The following bound what a hostile file can cost; an honest one is far below.
 MAX_PARAMETERS = 32  # multiplied in one term
 MAX_BITS = 1990  # of a term's number times gains and constants: below any digit limit of Python
-MAX_DENOMINATOR_BITS = 2**14  # common denominator of a Gram matrix or of weights
-MAX_STEPS = 10**8  # operations on integers of 1024 bits, about a microsecond each
+MAX_DENOMINATOR_BITS = 2**14  # common denominator of a Gram matrix, of weights or of a polynomial
+MAX_STEPS = 3 * 10**7  # about a microsecond each
+KEPT = 300  # steps for a term that is kept, so that memory is bounded too
 
 RATIONAL = re.compile(r"-?(0|[1-9][0-9]{0,399})(/[1-9][0-9]{0,399})?")
 INTEGER = re.compile(r"0|[1-9][0-9]{0,2}")
@@ -34,12 +39,9 @@ NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 LAW = re.compile(r"[A-Za-z0-9_-]{1,40}")
 STRING = re.compile(r'"(?:[^"\\]++|\\.)*+"?', re.DOTALL)  # cannot fail once begun, hence linear
 
-LOOP_KEYS = ("format", "law", "gains", "constants", "states", "domain", "uncertain", "field")
-PROOF_KEYS = (*LOOP_KEYS, "V", "claims", "witnesses")
-
 Exponents = tuple[int, ...]
-Polynomial = dict[Exponents, Fraction]
-SignedSum = dict[tuple[tuple[str, ...], Exponents, tuple[bool, ...]], Fraction]
+Number = Fraction | int
+Polynomial = dict[Exponents, Number]  # integers where this saves time
 
 
 class Refused(Exception):
@@ -54,28 +56,6 @@ class Result:
     statement: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Term:
-    """Product of a number (gains and constants included), uncertain parameters and powers of the states."""
-
-    number: Fraction
-    uncertain: tuple[str, ...]
-    exponents: Exponents
-    odd: tuple[bool, ...]
-
-
-@dataclass(frozen=True)
-class Loop:
-    """The closed loop; `numbers` are its gains and constants."""
-
-    law: str
-    numbers: dict[str, Fraction]
-    weights: dict[str, int]
-    domain: str
-    uncertain: dict[str, tuple[Fraction, Fraction]]
-    field: dict[str, list[Term]]
-
-
 class Budget:
     """Steps left, so that every file ends in bounded time and memory."""
 
@@ -84,7 +64,7 @@ class Budget:
 
     def spend(self, steps: int, bits: int) -> None:
         """Count steps on integers of the given length; division is quadratic in it."""
-        self.left -= steps * (1 + (bits >> 10) ** 2)
+        self.left -= steps * (1 + (bits * bits >> 20))
         need(self.left >= 0, "the verification", "done in fewer steps; shorten terms or digits", MAX_STEPS)
 
 
@@ -93,19 +73,19 @@ class Budget:
 
 def need(condition: bool, where: str, expected: str, received: object) -> None:
     """Refuse the file unless the condition holds, in one line of ASCII."""
-    if not condition:
-        text = ascii(received)
-        raise Refused(f"{where} must be {expected}. Received {text if len(text) < 60 else text[:57] + '...'}")
+    if condition:
+        return
+    text = ascii(received)
+    raise Refused(f"{where} must be {expected}. Received {text if len(text) < 60 else text[:57] + '...'}")
 
 
 def refuse_number(text: str) -> NoReturn:
     """Refuse floats, NaN and infinities."""
-    need(False, "a number", "an integer or a rational in a string", text)
-    raise AssertionError
+    raise Refused(f"a number must be an integer or a rational in a string. Received {text[:50]!a}")
 
 
 def read_integer(text: str) -> int:
-    """Convert a non-negative integer; no integer of the format has more than six digits."""
+    """Convert a non-negative integer; no integer of the format has more than three digits."""
     need(INTEGER.fullmatch(text) is not None, "an integer", "0 or [1-9][0-9]* of at most 3 digits", text)
     return int(text)
 
@@ -127,13 +107,8 @@ def parse(text: str) -> Any:
     depth = max(accumulate((1 if bracket in "[{" else -1 for bracket in brackets), initial=0))
     need(depth <= MAX_NESTING, "nesting", f"at most {MAX_NESTING} deep", depth)
     try:
-        return json.loads(
-            text,
-            parse_float=refuse_number,
-            parse_constant=refuse_number,
-            parse_int=read_integer,
-            object_pairs_hook=read_pairs,
-        )
+        options: dict[str, Any] = {"parse_float": refuse_number, "parse_constant": refuse_number}
+        return json.loads(text, parse_int=read_integer, object_pairs_hook=read_pairs, **options)
     except (ValueError, RecursionError) as error:
         raise Refused(f"the file must be JSON: {ascii(str(error))[:80]}") from None
 
@@ -166,19 +141,203 @@ def read_rational(value: Any, where: str, *, positive: bool = False) -> Fraction
     return number
 
 
+def read_name(value: Any, where: str) -> str:
+    """Check a name."""
+    valid = type(value) is str and NAME.fullmatch(value) is not None
+    need(valid, f"a name in {where}", "[A-Za-z][A-Za-z0-9_]*, up to 40", value)
+    return value  # type: ignore[no-any-return]
+
+
 def read_exponents(value: Any, where: str, size: int, most: int) -> Exponents:
-    """Convert a list of integers, one for every state."""
+    """Convert a list of integers, one for every variable."""
     for entry in read_list(value, where, size, size):
         need(type(entry) is int and entry <= most, where, f"a list of integers up to {most}", entry)
     return tuple(value)
 
 
+def read_polynomial(value: Any, where: str, size: int, *, positive: bool = False) -> Polynomial:
+    """Read an object such as {"2,0": "1/3"}: exponents and nonzero or positive coefficients."""
+    polynomial: Polynomial = {}
+    need(len(read_object(value, where)) <= MAX_POLYNOMIAL, where, f"of at most {MAX_POLYNOMIAL} terms", len(value))
+    for key, text in value.items():
+        parts = key.split(",", size)
+        valid = len(parts) == size and all(INTEGER.fullmatch(part) for part in parts)
+        need(valid, where, "an object with keys such as '2,0,0', an integer for every variable", key)
+        number = read_rational(text, where, positive=positive)
+        need(number != 0, where, "without zeros", key)
+        polynomial[tuple(map(int, parts))] = number
+    return polynomial
+
+
+# ---------------------------------------------------------------- exact arithmetic and squares
+
+
+def length(number: Number) -> int:
+    """Bits of the longer one of numerator and denominator."""
+    return max(number.numerator.bit_length(), number.denominator.bit_length())
+
+
+def add(total: dict[Any, Any], key: Any, value: Any, budget: Budget) -> None:
+    """Add to one coefficient of a sum; a zero is dropped."""
+    before = total.pop(key, 0)
+    budget.spend(6, length(before) + length(value))  # a product of fractions and its sum cost six integer operations
+    if before + value:
+        total[key] = before + value
+
+
+def add_scaled(first: Polynomial, scale: Fraction, second: Polynomial, budget: Budget) -> Polynomial:
+    """Return first + scale * second."""
+    total = dict(first)
+    for exponents, number in second.items():
+        add(total, exponents, scale * number, budget)
+    return total
+
+
+def add_product(total: dict[Any, Any], first: dict[Any, Any], second: dict[Any, Any], budget: Budget) -> dict[Any, Any]:
+    """Add the product of two polynomials, with fractions or integers for coefficients, to a third."""
+    for (a, x), (b, y) in product(first.items(), second.items()):
+        add(total, times(a, b), x * y, budget)
+        need(len(total) <= MAX_POLYNOMIAL, "an expanded polynomial", f"of at most {MAX_POLYNOMIAL} terms", "more")
+    return total
+
+
+def times(first: Exponents, second: Exponents) -> Exponents:
+    """Multiply two monomials."""
+    return tuple(map(sum, zip(first, second, strict=True)))
+
+
+def to_integers(numbers: Collection[Number], where: str) -> tuple[list[int], int]:
+    """Return the numbers times their common denominator, and that."""
+    common = 1
+    for denominator in {number.denominator for number in numbers}:
+        common = lcm(common, denominator)
+        bits = common.bit_length()
+        need(bits <= MAX_DENOMINATOR_BITS, where, f"of common denominator < 2^{MAX_DENOMINATOR_BITS}", bits)
+    return [number.numerator * (common // number.denominator) for number in numbers], common
+
+
+def multiply(factors: list[Number], bases: Iterable[Fraction], exponents: Exponents, budget: Budget) -> Number:
+    """Multiply numbers and powers of numbers."""
+    for base, exponent in zip(bases, exponents, strict=True):
+        if exponent:
+            budget.spend(1, exponent * length(base))
+            factors = [*factors, base**exponent]
+    budget.spend(6 * len(factors), sum(map(length, factors)))
+    return prod(factors)
+
+
+def is_positive_definite(upper: list[list[int]], budget: Budget, *, or_singular: bool = False) -> bool:
+    """Decide whether a symmetric matrix is positive (or non-negative) definite, by fraction-free elimination (Bareiss).
+
+    Before step k every entry left is a minor of order k + 1, the pivot a leading one, so that `//` is exact. A
+    singular matrix is non-negative where a zero pivot has a zero row; leaving both out changes no other minor.
+    """
+    size, divisor = len(upper), 1
+    for k, row in enumerate(upper):
+        if row[k] <= 0:
+            if row[k] < 0 or not or_singular or any(row[k:]):
+                return False
+            continue
+        budget.spend(comb(size - k, 2), 2 * max(entry.bit_length() for rest in upper[k:] for entry in rest[k:]))
+        for i in range(k + 1, size):
+            for j in range(i, size):
+                upper[i][j] = (row[k] * upper[i][j] - row[i] * row[j]) // divisor
+        divisor = row[k]
+    return True
+
+
+def read_element(value: Any, where: str, size: int, mixed: bool) -> Polynomial:
+    """Read an element of a basis: a monomial or, in a mixed basis, any other polynomial."""
+    if not mixed or type(value) is list:
+        return {read_exponents(value, where, size, 999): 1}  # an integer, so that sums of monomials remain integers
+    element = read_polynomial(value, where, size)
+    need(list(element.values()) not in ([], [1]), where, "nonzero, and a list where it is a monomial", value)
+    return element
+
+
+def read_basis(value: Any, where: str, size: int, mixed: bool) -> list[Polynomial]:
+    """Read a basis; every element has a term of its own, so that no entry of it can change without effect."""
+    rows = read_list(value, where, 1, MAX_REDUCED if mixed else MAX_BASIS)
+    basis = [read_element(row, where, size, mixed) for row in rows]
+    uses = Counter(chain.from_iterable(basis))
+    for element in basis:
+        own = any(uses[exponents] == 1 and number > 0 for exponents, number in element.items())
+        need(own, where, "without repetitions, every element with a positive term in no other", list(element))
+    return basis
+
+
+def read_square(
+    value: Any, where: str, label: str, size: int, budget: Budget, *, mixed: bool = False
+) -> tuple[Any, list[Polynomial], Polynomial]:
+    """Read the entry under the label, the basis b, and expand b'Qb after checking that Q is positive definite."""
+    square = read_object(value, where, (label, "basis", "gram"))
+    basis = read_basis(square["basis"], f"{where} basis", size, mixed)
+    count = len(basis) * (len(basis) + 1) // 2
+    entries = read_list(square["gram"], f"{where} gram", count, count)
+    numbers, denominator = to_integers([read_rational(entry, f"{where} gram") for entry in entries], f"{where} gram")
+    remaining = iter(numbers)
+    upper = [[0] * i + [next(remaining) for _ in basis[i:]] for i in range(len(basis))]
+    expanded: Polynomial = {key: Fraction(number) / denominator for key, number in expand(basis, upper, budget).items()}
+    need(is_positive_definite(upper, budget), f"{where} gram", "positive definite", entries)
+    return square[label], basis, expanded
+
+
+def expand(basis: list[Polynomial], upper: list[list[int]], budget: Budget) -> Polynomial:
+    """Return b'Qb as the sum over i of b_i * (Q_ii b_i + 2 sum over j > i of Q_ij b_j)."""
+    total: Polynomial = {}
+    for i, first in enumerate(basis):
+        weighted: Polynomial = {}
+        for j in range(i, len(basis)):
+            for exponents, number in basis[j].items():
+                add(weighted, exponents, (1 if i == j else 2) * upper[i][j] * number, budget)
+        add_product(total, first, weighted, budget)
+    return total
+
+
+def check_identity(first: Polynomial, second: Polynomial, total: Polynomial, where: str, budget: Budget) -> None:
+    """Check that a product of two polynomials is a third."""
+    difference = add_scaled(add_product({}, first, second, budget), Fraction(-1), total, budget)
+    need(not difference, where, "exact in every monomial", min(difference, default=()))
+
+
+# ---------------------------------------------------------------- closed loops: reading and writing
+
+LOOP_KEYS = ("format", "law", "gains", "constants", "states", "domain", "uncertain", "field")
+PROOF_KEYS = (*LOOP_KEYS, "V", "claims", "witnesses")
+
+SignedSum = dict[tuple[tuple[str, ...], Exponents, tuple[bool, ...]], Fraction]
+
+
+@dataclass(frozen=True)
+class Term:
+    """Product of a number (gains and constants included), uncertain parameters and powers of the states.
+
+    A factor |x_i|^a is kept as the integer exponent r_i*a of u_i = |x_i|^(1/r_i) and a flag: odd for the
+    signed power, even for the absolute one.
+    """
+
+    number: Fraction
+    uncertain: tuple[str, ...]
+    exponents: Exponents
+    odd: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The closed loop; `numbers` are its gains and constants."""
+
+    law: str
+    numbers: dict[str, Fraction]
+    weights: dict[str, int]
+    domain: str
+    uncertain: dict[str, tuple[Fraction, Fraction]]
+    field: dict[str, list[Term]]
+
+
 def read_names(value: Any, where: str, least: int, most: int) -> dict[str, Any]:
     """Check the names of an object's members and their number."""
     need(least <= len(read_object(value, where)) <= most, where, f"{least} to {most} members", len(value))
-    for name in value:
-        need(NAME.fullmatch(name) is not None, f"a name in {where}", "[A-Za-z][A-Za-z0-9_]*, up to 40", name)
-    return value  # type: ignore[no-any-return]
+    return {read_name(name, where): entry for name, entry in value.items()}
 
 
 def read_range(value: Any, where: str) -> tuple[Fraction, Fraction]:
@@ -190,8 +349,7 @@ def read_range(value: Any, where: str) -> tuple[Fraction, Fraction]:
 
 def read_loop(document: dict[str, Any]) -> Loop:
     """Read everything that proofs and refutations share."""
-    version, law, domain = (document[key] for key in ("format", "law", "domain"))
-    need(type(version) is int and version == 1, "format", "the integer 1", version)
+    law, domain = document["law"], document["domain"]
     need(type(law) is str and LAW.fullmatch(law) is not None, "law", "1 to 40 of [A-Za-z0-9_-]", law)
     need(type(domain) is str and domain in ("cells", "reals"), "domain", "cells or reals", domain)
     parts = ("gains", 0, MAX_NUMBERS), ("constants", 0, MAX_NUMBERS), ("uncertain", 0, MAX_UNCERTAIN)
@@ -247,285 +405,6 @@ def read_terms(value: Any, where: str, loop: Loop) -> list[Term]:
     """Read a sum of terms."""
     entries = read_list(value, where, 0, MAX_TERMS)
     return [read_term(entry, f"{where} term {index}", loop) for index, entry in enumerate(entries, 1)]
-
-
-# ---------------------------------------------------------------- exact arithmetic
-
-
-def length(number: Fraction) -> int:
-    """Bits of the longer one of numerator and denominator."""
-    return max(number.numerator.bit_length(), number.denominator.bit_length())
-
-
-def add(total: dict[Any, Fraction], key: Any, value: Fraction, budget: Budget) -> None:
-    """Add to one coefficient of a sum; a zero is dropped."""
-    before = total.pop(key, Fraction(0))
-    budget.spend(1, length(before) + length(value))
-    if before + value:
-        total[key] = before + value
-
-
-def add_scaled(first: Polynomial, scale: Fraction, second: Polynomial, budget: Budget) -> Polynomial:
-    """Return first + scale * second."""
-    total = dict(first)
-    for exponents, number in second.items():
-        add(total, exponents, scale * number, budget)
-    return total
-
-
-def times(first: Exponents, second: Exponents) -> Exponents:
-    """Multiply two monomials."""
-    return tuple(map(sum, zip(first, second, strict=True)))
-
-
-def power_sum(indices: Iterable[int], size: int, degree: int) -> Polynomial:
-    """Return the sum of u_i^degree over some of the variables."""
-    return {tuple(degree * (i == j) for j in range(size)): Fraction(1) for i in indices}
-
-
-def to_integers(numbers: Sequence[Fraction], where: str) -> tuple[list[int], int]:
-    """Return the numbers times their common denominator, and that."""
-    common = 1
-    for denominator in {number.denominator for number in numbers}:
-        common = lcm(common, denominator)
-        bits = common.bit_length()
-        need(bits <= MAX_DENOMINATOR_BITS, where, f"of common denominator < 2^{MAX_DENOMINATOR_BITS}", bits)
-    return [number.numerator * (common // number.denominator) for number in numbers], common
-
-
-def is_positive_definite(upper: list[list[int]], budget: Budget) -> bool:
-    """Decide by the leading minors (Sylvester), from fraction-free elimination (Bareiss), in place.
-
-    Before step k every entry left is a minor of order k + 1, the pivot a leading one, so that `//` is exact.
-    """
-    size, divisor = len(upper), 1
-    for k, row in enumerate(upper):
-        if row[k] <= 0:
-            return False
-        budget.spend((size - k) ** 2, 2 * max(entry.bit_length() for rest in upper[k:] for entry in rest[k:]))
-        for i in range(k + 1, size):
-            for j in range(i, size):
-                upper[i][j] = (row[k] * upper[i][j] - row[i] * row[j]) // divisor
-        divisor = row[k]
-    return True
-
-
-# ---------------------------------------------------------------- proofs
-
-
-def read_function(value: Any, loop: Loop) -> list[Term]:
-    """Read V; the closed-cell argument and the affine ends need it C1 and without uncertain parameters."""
-    function = read_terms(value, "V", loop)
-    for index, term in enumerate(function, 1):
-        need(not term.uncertain, f"V term {index}", "without uncertain parameters", term.uncertain)
-        for weight, exponent, odd in zip(loop.weights.values(), term.exponents, term.odd, strict=True):
-            smooth = exponent >= weight if odd else exponent == 0 or exponent > weight
-            need(smooth, f"V term {index}", "C1: exponents s >= 1, a > 1", str(Fraction(exponent, weight)))
-    return function
-
-
-def derivative(term: Term, i: int, weight: int) -> Term:
-    """Differentiate one term: d[x]^a = a |x|^(a-1) and d|x|^a = a [x]^(a-1), so that the parity flips."""
-    number = term.number * Fraction(term.exponents[i], weight)
-    exponents = tuple(exponent - weight * (i == j) for j, exponent in enumerate(term.exponents))
-    return Term(number, (), exponents, tuple(odd != (i == j) for j, odd in enumerate(term.odd)))
-
-
-def time_derivative(function: list[Term], loop: Loop, budget: Budget) -> SignedSum:
-    """Sum the products of the partial derivatives of V with the field; odd times odd is even."""
-    total: SignedSum = {}
-    for i, (state, weight) in enumerate(loop.weights.items()):
-        slopes = [derivative(term, i, weight) for term in function if term.exponents[i]]
-        for slope, term in product(slopes, loop.field[state]):
-            odd = tuple(a != b for a, b in zip(slope.odd, term.odd, strict=True))
-            key = term.uncertain, times(slope.exponents, term.exponents), odd
-            add(total, key, slope.number * term.number, budget)
-    return total
-
-
-def restrict(function: SignedSum, signs: Exponents, values: dict[str, Fraction], budget: Budget) -> Polynomial:
-    """Write a function as a polynomial in u on one cell at one vertex (in x on reals, with all signs +)."""
-    total: Polynomial = {}
-    for (uncertain, exponents, odd), number in function.items():
-        sign = prod(sign for sign, flag in zip(signs, odd, strict=True) if flag)
-        add(total, exponents, sign * number * prod(values[name] for name in uncertain), budget)
-    return total
-
-
-def degree_of(form: Polynomial, name: str) -> int:
-    """Return the degree of a nonzero form."""
-    degrees = {sum(exponents) for exponents in form}
-    need(len(degrees) == 1 and 0 not in degrees, name, "a form of one degree >= 1", sorted(degrees))
-    return degrees.pop()
-
-
-def cells_of(choices: Iterable[Sequence[int]]) -> dict[str, Exponents]:
-    """Sign cells by label, from the admissible signs of every state."""
-    return {"".join("+" if sign > 0 else "-" for sign in signs): signs for signs in product(*choices)}
-
-
-def read_claims(value: Any, loop: Loop) -> dict[str, Fraction]:
-    """Read the claims in the order of their obligations: positive, bounds, then decrease or rate."""
-    bounds = [f"bound_{state}" for state in loop.weights if f"bound_{state}" in read_object(value, "claims")]
-    keys = "positive", *bounds, "decrease" if loop.domain == "cells" else "rate"
-    given = read_object(value, "claims", keys)
-    return {key: read_rational(given[key], f"claims {key}", positive=True) for key in keys}
-
-
-def obligations(
-    function: SignedSum, rate: SignedSum, claims: dict[str, Fraction], loop: Loop, budget: Budget
-) -> Iterator[tuple[str, int, Polynomial]]:
-    """Yield the name, the degree of V or dV/dt, and the polynomial P >= 0, in the order of the format."""
-    size, on_cells, (*lower, last) = len(loop.weights), loop.domain == "cells", claims
-    cells = {f" {k}": v for k, v in cells_of([(1, -1)] * size).items()} if on_cells else {"": (1,) * size}
-    vertices = list(product(*(dict.fromkeys(ends) for ends in loop.uncertain.values())))
-    count = len(cells) * (len(lower) + len(vertices))
-    need(count <= MAX_OBLIGATIONS, "obligations", f"at most {MAX_OBLIGATIONS}", count)
-    for claim, (cell, signs) in product(lower, cells.items()):
-        value = restrict(function, signs, {}, budget)
-        degree = degree_of(value, "V")
-        need(on_cells or degree % 2 == 0, "V", "of even degree on reals", degree)
-        chosen = [i for i, state in enumerate(loop.weights) if claim in ("positive", f"bound_{state}")]
-        yield claim + cell, degree, add_scaled(value, -claims[claim], power_sum(chosen, size, degree), budget)
-    for (cell, signs), vertex in product(cells.items(), vertices):
-        values = dict(zip(loop.uncertain, vertex, strict=True))
-        name = last + cell + "".join(f" {key}={value}" for key, value in values.items())
-        fall = add_scaled({}, Fraction(-1), restrict(rate, signs, values, budget), budget)
-        if on_cells:
-            degree = degree_of(fall, f"dV/dt at {name}")
-            powers = power_sum(range(size), size, degree)
-            yield name, degree, add_scaled(fall, -claims[last], powers, budget)
-        else:
-            value = restrict(function, signs, {}, budget)
-            yield name, 0, add_scaled(fall, -2 * claims[last], value, budget)
-
-
-def read_multiplier(value: Any, where: str, loop: Loop) -> Polynomial:
-    """Read a polynomial with positive coefficients; on the reals it must be the constant 1."""
-    multiplier: Polynomial = {}
-    for key, number in read_object(value, where).items():
-        parts = key.split(",")
-        valid = len(parts) == len(loop.weights) and all(INTEGER.fullmatch(part) for part in parts)
-        need(valid, where, "an object with keys such as '2,0,0', an integer for every state", key)
-        multiplier[tuple(map(int, parts))] = read_rational(number, where, positive=True)
-    need(bool(multiplier), where, "nonempty", value)
-    return multiplier
-
-
-def add_square(total: Polynomial, value: Any, where: str, loop: Loop, budget: Budget) -> None:
-    """Add u^times b'Qb, after checking that Q is positive definite."""
-    square, size = read_object(value, where, ("times", "basis", "gram")), len(loop.weights)
-    factor = read_exponents(square["times"], f"{where} times", size, 1 if loop.domain == "cells" else 0)
-    rows = read_list(square["basis"], f"{where} basis", 1, MAX_BASIS)
-    basis = [read_exponents(row, f"{where} basis", size, 999) for row in rows]
-    need(len(set(basis)) == len(basis), f"{where} basis", "without repetitions", rows)
-    pairs = list(combinations_with_replacement(range(len(basis)), 2))
-    entries = read_list(square["gram"], f"{where} gram", len(pairs), len(pairs))
-    numbers, denominator = to_integers([read_rational(entry, f"{where} gram") for entry in entries], where)
-    upper = [[0] * len(basis) for _ in basis]
-    expanded: dict[Exponents, int] = {}
-    for (i, j), number in zip(pairs, numbers, strict=True):
-        upper[i][j] = number
-        exponents = times(factor, times(basis[i], basis[j]))
-        expanded[exponents] = expanded.get(exponents, 0) + number * (1 if i == j else 2)
-    for exponents, number in expanded.items():
-        add(total, exponents, Fraction(number, denominator), budget)
-    need(is_positive_definite(upper, budget), f"{where} gram", "positive definite", entries)
-
-
-def check_witness(name: str, polynomial: Polynomial, value: Any, loop: Loop, budget: Budget) -> None:
-    """Check multiplier * P = sum of u^times b'Qb."""
-    where, one = f"witness of {name}:", {(0,) * len(loop.weights): Fraction(1)}
-    witness = read_object(value, where, ("obligation", "multiplier", "squares"))
-    need(witness["obligation"] == name, where, "the next witness", witness["obligation"])
-    multiplier = read_multiplier(witness["multiplier"], f"{where} multiplier", loop)
-    trivial = loop.domain == "reals" or not polynomial  # so that no number of the file is without effect
-    need(multiplier == one or not trivial, f"{where} multiplier", "1 on reals or for P = 0", multiplier)
-    squares = read_list(witness["squares"], f"{where} squares", 0, 0 if not polynomial else MAX_BYTES)
-    left: Polynomial = {}
-    for (a, scale), (b, number) in product(multiplier.items(), polynomial.items()):
-        add(left, times(a, b), scale * number, budget)
-    right: Polynomial = {}
-    for index, square in enumerate(squares, 1):
-        add_square(right, square, f"{where} square {index}", loop, budget)
-    difference = add_scaled(left, Fraction(-1), right, budget)
-    need(not difference, f"{where} identity", "exact in every monomial", min(difference, default=()))
-
-
-def prove(document: dict[str, Any], loop: Loop, budget: Budget) -> Result:
-    """Verify a proof."""
-    for term in (term for terms in loop.field.values() for term in terms):  # else the ends would not decide
-        unique = len(set(term.uncertain)) == len(term.uncertain)
-        need(unique, "field", "affine in every uncertain parameter", term.uncertain)
-    function, potential = read_function(document["V"], loop), SignedSum()
-    for term in function:
-        add(potential, ((), term.exponents, term.odd), term.number, budget)
-    claims, rate = read_claims(document["claims"], loop), time_derivative(function, loop, budget)
-    witnesses = iter(read_list(document["witnesses"], "witnesses", 0, MAX_OBLIGATIONS))
-    seen, degrees = set(), dict[str, int]()
-    for name, degree, polynomial in obligations(potential, rate, claims, loop, budget):
-        first = degrees.setdefault("dV/dt" if name.split()[0] in ("decrease", "rate") else "V", degree)
-        need(degree == first, f"degree at {name}", f"{first} as before", degree)
-        key = frozenset(polynomial.items())
-        if key not in seen:
-            seen.add(key)
-            check_witness(name, polynomial, next(witnesses, "none"), loop, budget)
-    need(next(witnesses, None) is None, "witnesses", f"{len(seen)} in number", len(document["witnesses"]))
-    lines = describe_claims(loop, claims, degrees["V"], degrees["dV/dt"])
-    return Result("proved", (*describe(loop), f"V = {sum_text(function, loop)}", *lines))
-
-
-# ---------------------------------------------------------------- refutations
-
-
-def read_values(value: Any, where: str, names: Iterable[str]) -> dict[str, Fraction]:
-    """Read one rational for every name, in the order of the names."""
-    numbers = read_object(value, where, names)
-    return {name: read_rational(numbers[name], f"{where} {name}") for name in names}
-
-
-def refute(document: dict[str, Any], loop: Loop, budget: Budget) -> Result:
-    """Verify that a point is an equilibrium of Filippov's inclusion."""
-    need(loop.domain == "cells", "the domain of a refutation", "cells", loop.domain)
-    refutation = read_object(document["refutation"], "refutation", ("parameters", "point", "weights"))
-    values = read_values(refutation["parameters"], "parameters", loop.uncertain)
-    for name, (low, high) in loop.uncertain.items():
-        need(low <= values[name] <= high, f"parameter {name}", "in its range", str(values[name]))
-    point = read_values(refutation["point"], "point", loop.weights)
-    need(any(point.values()), "point", "away from the origin", refutation["point"])
-    cells = cells_of([(1,) if v > 0 else (-1,) if v < 0 else (1, -1) for v in point.values()])
-    weights = read_values(refutation["weights"], "weights", cells)
-    need(min(weights.values()) >= 0, "weights", "non-negative", refutation["weights"])
-    shares, total = to_integers(list(weights.values()), "weights")
-    need(sum(shares) == total, "weights", "of sum 1", refutation["weights"])
-    mixture = list(zip(shares, cells.values(), strict=True))
-    for state, terms in loop.field.items():
-        balance: dict[str, Fraction] = {}
-        for term in terms:
-            add(balance, state, limit_of(term, values, list(point.values()), mixture, budget), budget)
-        need(not balance, f"the weighted limit of d{state}/dt", "zero", "another number")
-    return Result("refuted", (*describe(loop), *describe_equilibrium(loop, values, point, weights)))
-
-
-def limit_of(
-    term: Term,
-    values: dict[str, Fraction],
-    point: list[Fraction],
-    mixture: list[tuple[int, Exponents]],
-    budget: Budget,
-) -> Fraction:
-    """Sum share * limit over the cells: the absolute powers are common, the signs are those of the cell."""
-    flags = [index for index, odd in enumerate(term.odd) if odd]
-    share = sum(share * prod(cell[index] for index in flags) for share, cell in mixture)
-    factors = [term.number, Fraction(share), *(values[name] for name in term.uncertain)]
-    for v, exponent in zip(point, term.exponents, strict=True):
-        budget.spend(1, exponent * length(v))
-        factors.append(abs(v) ** exponent)
-    budget.spend(len(factors), sum(map(length, factors)))
-    return prod(factors, start=Fraction(1))
-
-
-# ---------------------------------------------------------------- the statement in words
 
 
 def term_text(term: Term, loop: Loop) -> str:
@@ -598,32 +477,487 @@ def describe_equilibrium(
     ]
 
 
+# ---------------------------------------------------------------- closed loops: proofs
+
+
+def read_function(value: Any, loop: Loop) -> list[Term]:
+    """Read V; the closed-cell argument and the affine ends need it C1 and without uncertain parameters."""
+    function = read_terms(value, "V", loop)
+    for index, term in enumerate(function, 1):
+        need(not term.uncertain, f"V term {index}", "without uncertain parameters", term.uncertain)
+        for weight, exponent, odd in zip(loop.weights.values(), term.exponents, term.odd, strict=True):
+            smooth = exponent >= weight if odd else exponent == 0 or exponent > weight
+            need(smooth, f"V term {index}", "C1: exponents s >= 1, a > 1", str(Fraction(exponent, weight)))
+    return function
+
+
+def time_derivative(function: list[Term], loop: Loop, budget: Budget) -> SignedSum:
+    """Sum the products of the partial derivatives of V with the field.
+
+    d[x]^a = a |x|^(a-1) and d|x|^a = a [x]^(a-1): the parity of x flips. Odd times odd is even.
+    """
+    total: SignedSum = {}
+    for (i, (state, weight)), term in product(enumerate(loop.weights.items()), function):
+        for other in loop.field[state] if term.exponents[i] else ():
+            pairs = enumerate(zip(term.exponents, other.exponents, term.odd, other.odd, strict=True))
+            powers = [(a + b - weight * (i == j), (c != d) != (i == j)) for j, (a, b, c, d) in pairs]
+            exponents, odd = zip(*powers, strict=True)
+            number = term.number * other.number * Fraction(term.exponents[i], weight)
+            add(total, (other.uncertain, exponents, odd), number, budget)
+    return total
+
+
+def restrict(function: SignedSum, signs: Exponents, values: dict[str, Fraction], budget: Budget) -> Polynomial:
+    """Write a function as a polynomial in u on one cell at one vertex (in x on reals, with all signs +)."""
+    total: Polynomial = {}
+    for (uncertain, exponents, odd), number in function.items():
+        sign = prod(sign for sign, flag in zip(signs, odd, strict=True) if flag)
+        add(total, exponents, sign * number * prod(values[name] for name in uncertain), budget)
+    return total
+
+
+def degree_of(form: Polynomial, name: str) -> int:
+    """Return the degree of a nonzero form."""
+    degrees = {sum(exponents) for exponents in form}
+    need(len(degrees) == 1 and 0 not in degrees, name, "a form of one degree >= 1", sorted(degrees))
+    return degrees.pop()
+
+
+def cells_of(choices: Iterable[Sequence[int]]) -> dict[str, Exponents]:
+    """Sign cells by label, from the admissible signs of every state."""
+    return {"".join("+" if sign > 0 else "-" for sign in signs): signs for signs in product(*choices)}
+
+
+def read_claims(value: Any, loop: Loop) -> dict[str, Fraction]:
+    """Read the claims in the order of their obligations: positive, bounds, then decrease or rate."""
+    bounds = [f"bound_{state}" for state in loop.weights if f"bound_{state}" in read_object(value, "claims")]
+    keys = "positive", *bounds, "decrease" if loop.domain == "cells" else "rate"
+    given = read_object(value, "claims", keys)
+    return {key: read_rational(given[key], f"claims {key}", positive=True) for key in keys}
+
+
+def power_sum(indices: Iterable[int], size: int, degree: int) -> Polynomial:
+    """Return the sum of u_i^degree over some of the variables."""
+    return {tuple(degree * (i == j) for j in range(size)): Fraction(1) for i in indices}
+
+
+def obligations(
+    function: SignedSum, rate: SignedSum, claims: dict[str, Fraction], loop: Loop, budget: Budget
+) -> Iterator[tuple[str, int, Polynomial]]:
+    """Yield the name, the degree of V or dV/dt, and the polynomial P >= 0, in the order of the format."""
+    size, on_cells, (*lower, last) = len(loop.weights), loop.domain == "cells", claims
+    cells = {f" {k}": v for k, v in cells_of([(1, -1)] * size).items()} if on_cells else {"": (1,) * size}
+    vertices = list(product(*(dict.fromkeys(ends) for ends in loop.uncertain.values())))
+    count = len(cells) * (len(lower) + len(vertices))
+    need(count <= MAX_OBLIGATIONS, "obligations", f"at most {MAX_OBLIGATIONS}", count)
+    for claim, (cell, signs) in product(lower, cells.items()):
+        value = restrict(function, signs, {}, budget)
+        degree = degree_of(value, "V")
+        need(on_cells or degree % 2 == 0, "V", "of even degree on reals", degree)
+        chosen = [i for i, state in enumerate(loop.weights) if claim in ("positive", f"bound_{state}")]
+        yield claim + cell, degree, add_scaled(value, -claims[claim], power_sum(chosen, size, degree), budget)
+    for (cell, signs), vertex in product(cells.items(), vertices):
+        values = dict(zip(loop.uncertain, vertex, strict=True))
+        name = last + cell + "".join(f" {key}={value}" for key, value in values.items())
+        fall = add_scaled({}, Fraction(-1), restrict(rate, signs, values, budget), budget)
+        if on_cells:
+            degree = degree_of(fall, f"dV/dt at {name}")
+            powers = power_sum(range(size), size, degree)
+            yield name, degree, add_scaled(fall, -claims[last], powers, budget)
+        else:
+            value = restrict(function, signs, {}, budget)
+            yield name, 0, add_scaled(fall, -2 * claims[last], value, budget)
+
+
+def check_witness(name: str, polynomial: Polynomial, value: Any, loop: Loop, budget: Budget) -> None:
+    """Check multiplier * P = sum of u^times b'Qb."""
+    where, size, on_cells = f"witness of {name}:", len(loop.weights), loop.domain == "cells"
+    witness = read_object(value, where, ("obligation", "multiplier", "squares"))
+    need(witness["obligation"] == name, where, "the next witness", witness["obligation"])
+    multiplier = read_polynomial(witness["multiplier"], f"{where} multiplier", size, positive=True)
+    need(bool(multiplier), f"{where} multiplier", "nonempty", multiplier)
+    one = multiplier == {(0,) * size: 1}  # so that no number of the file is without effect
+    need(one or (on_cells and bool(polynomial)), f"{where} multiplier", "1 on reals or for P = 0", multiplier)
+    squares = read_list(witness["squares"], f"{where} squares", 0, 0 if not polynomial else MAX_BYTES)
+    right: Polynomial = {}
+    for index, square in enumerate(squares, 1):
+        label, _, expanded = read_square(square, f"{where} square {index}", "times", size, budget)
+        factor = read_exponents(label, f"{where} square {index} times", size, 1 if on_cells else 0)
+        add_product(right, {factor: 1}, expanded, budget)
+    check_identity(multiplier, polynomial, right, f"{where} identity", budget)
+
+
+def prove(document: dict[str, Any], loop: Loop, budget: Budget) -> Result:
+    """Verify a proof."""
+    for term in (term for terms in loop.field.values() for term in terms):  # else the ends would not decide
+        unique = len(set(term.uncertain)) == len(term.uncertain)
+        need(unique, "field", "affine in every uncertain parameter", term.uncertain)
+    function, potential = read_function(document["V"], loop), SignedSum()
+    for term in function:
+        add(potential, ((), term.exponents, term.odd), term.number, budget)
+    claims, rate = read_claims(document["claims"], loop), time_derivative(function, loop, budget)
+    witnesses = iter(read_list(document["witnesses"], "witnesses", 0, MAX_OBLIGATIONS))
+    seen, degrees = set(), dict[str, int]()
+    for name, degree, polynomial in obligations(potential, rate, claims, loop, budget):
+        first = degrees.setdefault("dV/dt" if name.split()[0] in ("decrease", "rate") else "V", degree)
+        need(degree == first, f"degree at {name}", f"{first} as before", degree)
+        key = frozenset(polynomial.items())
+        if key not in seen:
+            seen.add(key)
+            check_witness(name, polynomial, next(witnesses, "none"), loop, budget)
+    need(next(witnesses, None) is None, "witnesses", f"{len(seen)} in number", len(document["witnesses"]))
+    lines = describe_claims(loop, claims, degrees["V"], degrees["dV/dt"])
+    return Result("proved", (*describe(loop), f"V = {sum_text(function, loop)}", *lines))
+
+
+# ---------------------------------------------------------------- closed loops: refutations
+
+
+def read_values(value: Any, where: str, names: Iterable[str]) -> dict[str, Fraction]:
+    """Read one rational for every name, in the order of the names."""
+    numbers = read_object(value, where, names)
+    return {name: read_rational(numbers[name], f"{where} {name}") for name in names}
+
+
+def refute(document: dict[str, Any], loop: Loop, budget: Budget) -> Result:
+    """Verify that a point is an equilibrium of Filippov's inclusion."""
+    need(loop.domain == "cells", "the domain of a refutation", "cells", loop.domain)
+    refutation = read_object(document["refutation"], "refutation", ("parameters", "point", "weights"))
+    values = read_values(refutation["parameters"], "parameters", loop.uncertain)
+    for name, (low, high) in loop.uncertain.items():
+        need(low <= values[name] <= high, f"parameter {name}", "in its range", str(values[name]))
+    point = read_values(refutation["point"], "point", loop.weights)
+    need(any(point.values()), "point", "away from the origin", refutation["point"])
+    cells = cells_of([(1,) if v > 0 else (-1,) if v < 0 else (1, -1) for v in point.values()])
+    weights = read_values(refutation["weights"], "weights", cells)
+    need(min(weights.values()) >= 0, "weights", "non-negative", refutation["weights"])
+    shares, total = to_integers(weights.values(), "weights")
+    need(sum(shares) == total, "weights", "of sum 1", refutation["weights"])
+    mixture = list(zip(shares, cells.values(), strict=True))
+    for state, terms in loop.field.items():
+        balance: dict[str, Number] = {}
+        for term in terms:
+            add(balance, state, limit_of(term, values, list(point.values()), mixture, budget), budget)
+        need(not balance, f"the weighted limit of d{state}/dt", "zero", "another number")
+    return Result("refuted", (*describe(loop), *describe_equilibrium(loop, values, point, weights)))
+
+
+def limit_of(
+    term: Term, values: dict[str, Fraction], point: list[Fraction], mixture: list[tuple[int, Exponents]], budget: Budget
+) -> Number:
+    """Sum share * limit over the cells: the absolute powers are common, the signs are those of the cell."""
+    flags = [index for index, odd in enumerate(term.odd) if odd]
+    share = sum(share * prod(cell[index] for index in flags) for share, cell in mixture)
+    factors: list[Number] = [term.number, share, *(values[name] for name in term.uncertain)]
+    return multiply(factors, map(abs, point), term.exponents, budget)
+
+
+# ---------------------------------------------------------------- polynomials: reading and writing
+
+STATEMENT_KEYS = ("format", "variables", "polynomial", "inequalities", "equalities", "products", "degree", "multiplier")
+
+Product = tuple[int, ...]  # of inequalities, by their indices
+Expander = Callable[[Product], Polynomial]
+
+
+@dataclass(frozen=True)
+class Statement:
+    """multiplier * polynomial = sum of products of inequalities * sums of squares + cofactors * equalities."""
+
+    variables: list[str]
+    polynomial: Polynomial
+    multiplier: Polynomial
+    inequalities: list[Polynomial]
+    equalities: list[Polynomial]
+    products: list[Product]
+    degree: int
+
+
+def read_polynomials(value: Any, where: str, size: int, least: int, most: int) -> list[Polynomial]:
+    """Read a list of polynomials."""
+    return [read_polynomial(entry, where, size) for entry in read_list(value, where, least, most)]
+
+
+def read_product(value: Any, where: str, count: int) -> Product:
+    """Read an increasing list of indices of inequalities."""
+    for index in read_list(value, where, 0, count):
+        need(type(index) is int and index < count, where, f"a list of indices below {count}", index)
+    need(value == sorted(set(value)), where, "increasing", value)
+    return tuple(value)
+
+
+def read_statement(document: dict[str, Any]) -> Statement:
+    """Read everything that the three kinds of proof share."""
+    entries = read_list(document["variables"], "variables", 1, MAX_VARIABLES)
+    variables, degree, size = [read_name(name, "variables") for name in entries], document["degree"], len(entries)
+    need(len(set(variables)) == size, "variables", "different from each other", variables)
+    need(type(degree) is int, "degree", "an integer", degree)
+    polynomial, multiplier = (read_polynomial(document[key], key, size) for key in ("polynomial", "multiplier"))
+    inequalities = read_polynomials(document["inequalities"], "inequalities", size, 0, MAX_CONSTRAINTS)
+    most = MAX_CONSTRAINTS - len(inequalities)
+    equalities = read_polynomials(document["equalities"], "equalities", size, 0, most)
+    need(all((multiplier, *inequalities, *equalities)), "multiplier, inequalities and equalities", "nonzero", "0")
+    different = {frozenset(inequality.items()) for inequality in inequalities}
+    need(len(different) == len(inequalities), "inequalities", "different from each other", "a repetition")
+    entries = read_list(document["products"], "products", 1, MAX_PRODUCTS)
+    products = [read_product(entry, "products", len(inequalities)) for entry in entries]
+    valid = () in products and len(set(products)) == len(products)
+    need(valid, "products", "different from each other, the empty one among them", entries)
+    return Statement(variables, polynomial, multiplier, inequalities, equalities, products, degree)
+
+
+def product_expander(statement: Statement, budget: Budget) -> Expander:
+    """Return a function that expands a product of inequalities, and remembers it."""
+
+    @cache
+    def expand_product(chosen: Product) -> Polynomial:
+        if not chosen:
+            return {(0,) * len(statement.variables): Fraction(1)}
+        total = add_product({}, expand_product(chosen[:-1]), statement.inequalities[chosen[-1]], budget)
+        budget.spend(KEPT * len(total), 0)
+        return total
+
+    return expand_product
+
+
+def terms_text(polynomial: Polynomial, statement: Statement, form: str = "{0}*{1}", joint: str = " + ") -> str:
+    """Write a polynomial, e.g. ``1*x^2 + -2/3*x + 1``, or the values of a functional."""
+    terms = []
+    for exponents, number in sorted(polynomial.items(), reverse=True):
+        powers = zip(statement.variables, exponents, strict=True)
+        monomial = "*".join(f"{name}^{power}" if power > 1 else name for name, power in powers if power)
+        terms.append(form.format(number, monomial or "1").removesuffix("*1"))
+    return joint.join(terms) or "0"
+
+
+def describe_statement(statement: Statement) -> list[str]:
+    """Describe what the verdict is about."""
+    products = ("*".join(f"[{index}]" for index in chosen) or "1" for chosen in statement.products)
+    limits = [f"[{i}] = {terms_text(entry, statement)} >= 0" for i, entry in enumerate(statement.inequalities)]
+    limits += [f"{terms_text(entry, statement)} = 0" for entry in statement.equalities]
+    return [
+        f"variables, all real: {', '.join(statement.variables)}",
+        f"polynomial: {terms_text(statement.polynomial, statement)}",
+        *(f"set: {limit}" for limit in limits or ["all points"]),
+        f"multiplier: {terms_text(statement.multiplier, statement)}",
+        f"products: {', '.join(products)}; degree: {statement.degree}",
+    ]
+
+
+# ---------------------------------------------------------------- polynomials: proofs
+
+
+def sum_squares(
+    value: Any, where: str, statement: Statement, expanded: Expander, budget: Budget
+) -> tuple[Polynomial, bool]:
+    """Sum the squares times their products, and tell whether 1 is in the basis of one without inequalities."""
+    total, size, positive = dict[Exponents, Number](), len(statement.variables), False
+    for index, entry in enumerate(read_list(value, where, 0, MAX_BYTES), 1):
+        place = f"{where} square {index}"
+        label, basis, square = read_square(entry, place, "product", size, budget, mixed=True)
+        chosen = read_product(label, f"{place} product", len(statement.inequalities))
+        need(chosen in statement.products, f"{place} product", "one of the products", label)
+        add_product(total, expanded(chosen), square, budget)
+        positive |= not chosen and {(0,) * size: 1} in basis
+    return total, positive
+
+
+def check_multiplier(value: Any, statement: Statement, expanded: Expander, budget: Budget) -> None:
+    """Check that the multiplier is non-negative on the set, and positive where this may have no interior."""
+    one, limits = (0,) * len(statement.variables), statement.inequalities
+    units = [e for g in limits for e, number in g.items() if len(g) == 1 and sum(e) == 1 and number > 0]
+    signed = {exponents.index(1) for exponents in units}
+    if read_list(value, "sos multiplier", 0, MAX_BYTES):
+        total, positive = sum_squares(value, "sos multiplier", statement, expanded, budget)
+        check_identity({one: Fraction(1)}, statement.multiplier, total, "sos multiplier identity", budget)
+    else:
+        positive = one in statement.multiplier
+        for exponents, number in statement.multiplier.items():
+            even = all(exponent % 2 == 0 or i in signed for i, exponent in enumerate(exponents))
+            need(number > 0 and even, "multiplier", "of squares, or of positive even terms", exponents)
+    orthant = len(units) == len(limits) and not statement.equalities
+    need(positive or orthant, "multiplier", "positive everywhere on this set, by a term or square of 1", "another")
+
+
+def prove_squares(value: Any, statement: Statement, budget: Budget) -> list[str]:
+    """Verify that multiplier * polynomial is a sum of non-negative terms and terms that vanish on the set."""
+    proof, count = read_object(value, "sos", ("squares", "cofactors", "multiplier")), len(statement.equalities)
+    expanded = product_expander(statement, budget)
+    check_multiplier(proof["multiplier"], statement, expanded, budget)
+    total, _ = sum_squares(proof["squares"], "sos", statement, expanded, budget)
+    cofactors = read_polynomials(proof["cofactors"], "sos cofactors", len(statement.variables), count, count)
+    for cofactor, equality in zip(cofactors, statement.equalities, strict=True):
+        add_product(total, cofactor, equality, budget)
+    check_identity(statement.multiplier, statement.polynomial, total, "sos identity", budget)
+    return ["conclusion: the polynomial is >= 0 on the set (the degree of the identity is not verified)"]
+
+
+# ---------------------------------------------------------------- polynomials: refutations
+
+Coded = dict[int, int]  # integer coefficients by monomials, each one an integer, so that their products are sums
+DIGIT = 12  # bits of an exponent in a coded monomial; the largest exponent, of multiplier * polynomial, is 1998
+
+
+def coded(polynomial: Polynomial, where: str) -> Coded:
+    """Return a positive multiple with integer coefficients."""
+    codes = (sum(exponent << DIGIT * i for i, exponent in enumerate(exponents)) for exponents in polynomial)
+    return dict(zip(codes, to_integers(polynomial.values(), where)[0], strict=True))
+
+
+def monomials(size: int, degree: int) -> list[int]:
+    """Return all coded monomials up to a degree, none if it is negative."""
+    partial = [(0, degree)] if degree >= 0 else []
+    for i in range(size):
+        partial = [(m + (a << DIGIT * i), left - a) for m, left in partial for a in range(left + 1)]
+    return [m for m, _ in partial]
+
+
+def apply(functional: Coded, monomial: int, polynomial: Coded, budget: Budget) -> int:
+    """Return L(monomial * polynomial)."""
+    total = 0
+    for m, number in polynomial.items():
+        value = functional.get(monomial + m, 0)
+        budget.spend(1, value.bit_length() + number.bit_length())
+        total += number * value
+    return total
+
+
+def check_equalities(functional: Coded, statement: Statement, budget: Budget) -> set[int]:
+    """Check that L is zero on all multiples of equalities within the degree, and return their monomials."""
+    covered, size = set[int](), len(statement.variables)
+    for equality in statement.equalities:
+        factor, room = coded(equality, "an equality"), statement.degree - max(map(sum, equality))
+        budget.spend(comb(size + max(room, 0), size) * len(factor), 0)
+        for m in monomials(size, room):
+            zero = apply(functional, m, factor, budget) == 0
+            need(zero, "the functional", "zero on all multiples of the equalities", "another number")
+            covered.update(m + t for t in factor)
+    return covered
+
+
+def reduce(bases: dict[Product, list[int]], factors: dict[Product, Coded], kept: set[int]) -> dict[Product, set[int]]:
+    """Drop monomials whose diagonal Gram entries must be zero, as long as there are any.
+
+    Where only positive diagonal entries contribute to a monomial that is not kept, they add up to zero: each is
+    zero, and its row with it. What hinders can only become less, so the order does not matter.
+    """
+    hindering: Counter[int] = Counter()  # by monomial, the number of all other contributions
+    diagonal: dict[int, list[tuple[Product, int]]] = defaultdict(list)
+    for chosen, basis in bases.items():
+        for (t, number), (i, b) in product(factors[chosen].items(), enumerate(basis)):
+            hindering.update(map((t + b).__add__, basis[i + (number > 0) :]))
+            if number > 0:
+                diagonal[t + b + b].append((chosen, b))
+    alive = {chosen: set(basis) for chosen, basis in bases.items()}
+    droppable = [e for e in diagonal if not hindering[e] and e not in kept]
+    while droppable:
+        for chosen, b in diagonal[droppable.pop()]:
+            if b not in alive[chosen]:
+                continue
+            for (t, number), other in product(factors[chosen].items(), alive[chosen]):
+                if other != b or number < 0:
+                    e = t + b + other
+                    hindering[e] -= 1
+                    if not hindering[e] and e in diagonal and e not in kept:
+                        droppable.append(e)
+            alive[chosen].remove(b)
+    return alive
+
+
+def survivors(statement: Statement, kept: set[int], budget: Budget) -> Iterator[tuple[Product, Coded, list[int]]]:
+    """Yield the products within the degree, expanded, with the monomials of their squares after reduction."""
+    size, degrees = len(statement.variables), [max(map(sum, entry)) for entry in statement.inequalities]
+    rooms = {chosen: statement.degree - sum(degrees[i] for i in chosen) for chosen in statement.products}
+    counts = {chosen: comb(size + room // 2, size) for chosen, room in rooms.items() if room >= 0}
+    need(counts[()] <= MAX_MONOMIALS, "a basis before reduction", f"of at most {MAX_MONOMIALS} monomials", counts[()])
+    expanded = product_expander(statement, budget)
+    factors = {chosen: coded(expanded(chosen), "a product") for chosen in counts}
+    budget.spend(sum(comb(count + 1, 2) * len(factors[chosen]) for chosen, count in counts.items()), 0)
+    bases = {chosen: monomials(size, rooms[chosen] // 2) for chosen in counts}
+    for chosen, basis in reduce(bases, factors, kept).items():
+        need(len(basis) <= MAX_REDUCED, "a reduced basis", f"of at most {MAX_REDUCED} monomials", len(basis))
+        yield chosen, factors[chosen], sorted(basis)
+
+
+def blocks(upper: list[list[int]]) -> Iterator[list[list[int]]]:
+    """Split a symmetric matrix, given by its upper triangle, into connected blocks."""
+    left = list(range(len(upper)))
+    while left:
+        block = [left.pop(0)]
+        for i in block:  # grows while it is read
+            linked = {j for j in left if upper[min(i, j)][max(i, j)]}
+            block += linked
+            left = [j for j in left if j not in linked]
+        yield [[upper[min(i, j)][max(i, j)] for j in block] for i in block]
+
+
+def refute_by_functional(value: Any, statement: Statement, budget: Budget) -> list[str]:
+    """Verify that L is negative at multiplier * polynomial and non-negative at all sums of the statement."""
+    proof, size = read_object(value, "not-sos", ("functional",)), len(statement.variables)
+    values = read_polynomial(proof["functional"], "functional", size)
+    left = add_product({}, statement.multiplier, statement.polynomial, budget)
+    functional, target = coded(values, "functional"), coded(left, "multiplier times polynomial")
+    negative = apply(functional, 0, target, budget) < 0
+    need(negative, "the functional", "negative at multiplier times polynomial", "another number")
+    kept = check_equalities(functional, statement, budget) | set(target)
+    for chosen, factor, basis in survivors(statement, kept, budget):
+        upper = [[0] * i + [apply(functional, b + c, factor, budget) for c in basis[i:]] for i, b in enumerate(basis)]
+        valid = all(is_positive_definite(block, budget, or_singular=True) for block in blocks(upper))
+        need(valid, f"the moment matrix of product {list(chosen)}", "non-negative definite", "another one")
+    return [
+        f"functional, zero on all other monomials: {terms_text(values, statement, 'L({1}) = {0}', ', ')}",
+        "conclusion: multiplier times polynomial is no sum, of terms up to the degree, of products times sums of "
+        "squares and multiples of the equalities",
+    ]
+
+
+def evaluate(polynomial: Polynomial, point: list[Fraction], budget: Budget) -> Number:
+    """Return the value of a polynomial at a point."""
+    total: dict[str, Number] = {}
+    for exponents, number in polynomial.items():
+        add(total, "value", multiply([number], point, exponents, budget), budget)
+    return total.get("value", 0)
+
+
+def refute_by_point(value: Any, statement: Statement, budget: Budget) -> list[str]:
+    """Verify that the polynomial is negative at a point of the set."""
+    entries = read_object(value, "negative", ("point",))["point"]
+    count = len(statement.variables)
+    point = [read_rational(entry, "point") for entry in read_list(entries, "point", count, count)]
+    inside = all(evaluate(inequality, point, budget) >= 0 for inequality in statement.inequalities)
+    need(inside, "the point", "one where every inequality holds", entries)
+    inside = all(evaluate(equality, point, budget) == 0 for equality in statement.equalities)
+    need(inside, "the point", "one where every equality holds", entries)
+    need(evaluate(statement.polynomial, point, budget) < 0, "the polynomial", "negative at the point", entries)
+    return [
+        f"point: {named(dict(zip(statement.variables, point, strict=True)))}",
+        "conclusion: the polynomial is < 0 at this point of the set, so that no degree and no positive multiplier help",
+    ]
+
+
+def check_polynomial(document: dict[str, Any], budget: Budget) -> Result:
+    """Verify a file about a plain polynomial."""
+    kinds = {"sos": prove_squares, "not-sos": refute_by_functional, "negative": refute_by_point}
+    given = [kind for kind in kinds if kind in document] or ["sos"]
+    read_object(document, "the file", (*STATEMENT_KEYS, given[0]))
+    statement = read_statement(document)
+    lines = kinds[given[0]](document[given[0]], statement, budget)
+    return Result("proved" if given == ["sos"] else "refuted", (*describe_statement(statement), *lines))
+
+
 # ---------------------------------------------------------------- the command
 
 
 def check(text: str) -> Result:
-    """Verify the text of a certificate file.
-
-    Parameters
-    ----------
-    text : str
-        JSON as FORMAT.md specifies it.
-
-    Returns
-    -------
-    Result
-        Verdict ``proved`` or ``refuted``, and the statement it is about.
-
-    Raises
-    ------
-    Refused
-        If a rule of the format is broken or a witness fails; this says nothing about the claim itself.
-    """
+    """Verify the text of a file; it is Refused if a rule is broken, which says nothing about the claim itself."""
     document, budget = read_object(parse(text), "the file"), Budget()
+    version = document.get("format")
+    need(type(version) is int and version == 1, "format", "the integer 1", version)
+    if "polynomial" in document:
+        return check_polynomial(document, budget)
     is_refutation = "refutation" in document
     read_object(document, "the file", (*LOOP_KEYS, "refutation") if is_refutation else PROOF_KEYS)
-    loop = read_loop(document)
-    return refute(document, loop, budget) if is_refutation else prove(document, loop, budget)
+    return (refute if is_refutation else prove)(document, read_loop(document), budget)
 
 
 def read_file(name: str) -> str:
