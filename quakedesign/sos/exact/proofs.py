@@ -1,5 +1,6 @@
 """The three kinds of proof about a statement, each decided in rational arithmetic without a solver."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -173,10 +174,42 @@ def _definite(square: Square) -> bool:
 def _expanded(statement: Statement, square: Square):
     """(Π g_i)·bᵀQb in the ring."""
     size = len(statement.variables)
-    if square.product not in statement.products:
-        raise ValueError("the product of a square is not one of the statement.")
+    if square.product not in statement.products or not _has_own_monomials(square.basis):
+        raise ValueError("the product of a square is not one of the statement, or its basis is not in echelon form.")
     weight = element(statement.weight(square.product), size)
     return weight * element(expand(square.basis, square.gram), size)
+
+
+def _has_own_monomials(basis: Sequence[Element]) -> bool:
+    """Whether every element has a monomial with positive coefficient that no other has, so that each number counts."""
+    if all(isinstance(b, tuple) for b in basis):
+        return True
+    polynomials = [as_polynomial(b) for b in basis]
+    uses = Counter(e for p in polynomials for e in p)
+    return all(any(uses[e] == 1 and c > 0 for e, c in p.items()) for p in polynomials)
+
+
+def in_echelon_form(square: Square) -> Square:
+    """The same square with a basis in which every element has a monomial of its own."""
+    if _has_own_monomials(square.basis):
+        return square
+    from flint import fmpq, fmpq_mat
+
+    polynomials = [as_polynomial(b) for b in square.basis]
+    support = sorted({e for p in polynomials for e in p})
+    size = len(polynomials)
+    rows = [
+        [p.get(e, Fraction(0)) for e in support] + [Fraction(i == j) for j in range(size)]
+        for i, p in enumerate(polynomials)
+    ]
+    reduced, _ = fmpq_mat([[fmpq(c.numerator, c.denominator) for c in row] for row in rows]).rref()
+    table = [[Fraction(int(v.p), int(v.q)) for v in row] for row in reduced.tolist()]
+    change = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row[len(support) :]] for row in table]).inv()
+    gram = fmpq_mat([[fmpq(q.numerator, q.denominator) for q in row] for row in full_matrix(square.gram, size)])
+    moved = (change.transpose() * gram * change).tolist()
+    basis = tuple(as_element(dict(zip(support, row, strict=False))) for row in table)
+    upper = tuple(Fraction(int(moved[i][j].p), int(moved[i][j].q)) for i in range(size) for j in range(i, size))
+    return Square(product=square.product, basis=basis, gram=upper)
 
 
 def expand(basis: Sequence[Element], gram: Sequence[Fraction]) -> dict[Exponents, Fraction]:

@@ -43,6 +43,8 @@ class Statement:
             raise PolynomialError(f"every polynomial must be in the {size} different variables {self.variables}.")
         if not self.multiplier or not all(self.inequalities) or not all(self.equalities):
             raise PolynomialError("multiplier, inequalities and equalities must not be zero. Drop a zero one.")
+        if len({tuple(sorted(g.items())) for g in self.inequalities}) < len(self.inequalities):
+            raise PolynomialError("inequalities must differ from each other. Received one twice. Drop it.")
         allowed = range(len(self.inequalities))
         well_formed = all(i in allowed for s in self.products for i in s) and all(
             tuple(sorted(set(s))) == s for s in self.products
@@ -134,6 +136,7 @@ def statement(
         Unless given, the smallest even degree that holds multiplier · polynomial and every constraint.
     """
     size = len(variables)
+    inequalities = tuple({tuple(sorted(g.items())): g for g in inequalities}.values())
     factor = constant(size) if multiplier is None else dict(multiplier)
     target = product(size, (factor, polynomial))
     least = max(degree(p) for p in (target, *inequalities, *equalities))

@@ -9,7 +9,7 @@ from typing import Any
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.polynomial import Polynomial, combination, degree, from_sympy, product, square_factor
-from quakedesign.sos.exact.proofs import Proof, SumOfSquares, as_element, as_polynomial
+from quakedesign.sos.exact.proofs import Proof, SumOfSquares, as_element, as_polynomial, in_echelon_form
 from quakedesign.sos.exact.statement import Statement, statement
 
 _GROWTH = (0, 2)
@@ -130,7 +130,7 @@ def _by_square_factor(asked: Statement) -> SumOfSquares | None:
         return None
     count = len(asked.variables)
     squares = tuple(
-        replace(s, basis=tuple(as_element(product(count, (root, as_polynomial(b)))) for b in s.basis))
+        in_echelon_form(replace(s, basis=tuple(as_element(product(count, (root, as_polynomial(b)))) for b in s.basis)))
         for s in inner.squares
     )
     cofactors = tuple(product(count, (root, root, q)) for q in inner.cofactors)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.sos.exact.definiteness import nonnegative_definite, positive_definite
-from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares, holds
+from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares, holds, in_echelon_form
 from quakedesign.sos.exact.statement import statement
 
 ONE = Fraction(1)
@@ -20,9 +20,17 @@ def plain(polynomial, **options):
 
 def test_a_sum_of_squares_by_hand_holds_in_monomials_and_on_a_face():
     monomials = Square(basis=((1, 0), (0, 1)), gram=(ONE, -ONE, Fraction(2)))
-    face = Square(basis=(DIFFERENCE, (0, 1)), gram=(ONE, Fraction(0), ONE))
-    for square in (monomials, face):
-        assert holds(plain(X2_2XY_2Y2), SumOfSquares(squares=(square,)))
+    face = Square(basis=(DIFFERENCE,), gram=(ONE,)), Square(basis=((0, 1),), gram=(ONE,))
+    for squares in ((monomials,), face):
+        assert holds(plain(X2_2XY_2Y2), SumOfSquares(squares=squares))
+
+
+def test_an_element_without_a_monomial_of_its_own_is_refused():
+    """Else x + 1 beside 1 could change its 1 without losing the identity."""
+    crowded = Square(basis=(DIFFERENCE, (0, 1)), gram=(ONE, Fraction(0), ONE))
+    assert not holds(plain(X2_2XY_2Y2), SumOfSquares(squares=(crowded,)))
+    moved = in_echelon_form(crowded)
+    assert holds(plain(X2_2XY_2Y2), SumOfSquares(squares=(moved,)))
 
 
 def test_a_semidefinite_gram_matrix_is_refused_but_its_face_holds():
