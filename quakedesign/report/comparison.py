@@ -3,17 +3,18 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import isqrt
 from typing import Any
 
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
-from quakedesign.certificates.premises import Domain, certified_lipschitz
+from quakedesign.certificates.premises import Domain, Variant, certified_lipschitz
 from quakedesign.controllers import SlidingMode, published
 from quakedesign.fault import Fault
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis import Design, assess
-from quakedesign.synthesis.riccati import vertex_poles
+from quakedesign.synthesis.linear.scaled_design import vertex_poles
 from quakedesign.synthesis.sampling import largest_sampling_time, on_trajectory
 
 
@@ -34,6 +35,8 @@ class Entry:
         Largest T_s [s] for which the run would stay inside the premise on |h'|; None when not asked or not found.
     growth_per_step : float or None
         For a linear law: growth of the fastest mode per step of the run [-]; below 1 is stable.
+    variants : tuple of Variant
+        For a designed sliding mode: what is certified of the same gains with every named feed-forward.
     """
 
     label: str
@@ -42,6 +45,7 @@ class Entry:
     run: Trajectory | None
     largest_step: float | None = None
     growth_per_step: float | None = None
+    variants: tuple[Variant, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Keys of DESIGN.md; exact quantities as texts, measured ones as numbers, SI."""
@@ -52,6 +56,7 @@ class Entry:
             "certificate": None,
             "premises": [p.to_dict() for p in found.premises],
             "domain": found.domain.to_dict() if found.domain else None,
+            "feedforward": {v.feedforward.name: v.to_dict() for v in self.variants},
             "headline": headline(self),
             "largest_sampling_time": self.largest_step,
             "growth_per_step": self.growth_per_step,
@@ -145,7 +150,8 @@ def _entry(origin: str, design: Design, tell: Callable[[str, float], None]) -> E
     label = f"{design.title} ({origin})"
     if design.controller is None:
         return Entry(label=label, origin=origin, design=design, run=None)
-    run = simulate(design.fault, design.controller, progress=lambda done: tell(label, done))
+    kept = samples(design.fault)
+    run = simulate(design.fault, design.controller, samples=kept, progress=lambda done: tell(label, done))
     if not isinstance(design.controller, SlidingMode):
         poles = vertex_poles(sectors(design.fault), list(design.controller.gains.values()))
         growth = amplification(poles, run.provenance["step"], run.provenance["method"])
@@ -155,10 +161,27 @@ def _entry(origin: str, design: Design, tell: Callable[[str, float], None]) -> E
     if design.verdict is not Verdict.PROVED or premise is None:
         return Entry(label=label, origin=origin, design=design, run=run)
     judged, step = design.with_premise(premise), None
+    variants: tuple[Variant, ...] = ()
     if origin == "designed":
         tell(f"{label}: largest sampling time", 0.0)
         step = largest_sampling_time(design.fault, design.controller, bound)
-    return Entry(label=label, origin=origin, design=judged, run=run, largest_step=step)
+        tell(f"{label}: feed-forward", 0.0)
+        variants = design.feedforward_variants()
+    return Entry(label=label, origin=origin, design=judged, run=run, largest_step=step, variants=variants)
+
+
+def samples(fault: Fault, most: int = 2000) -> int:
+    """Number of instants to keep of a run, so that the steps between two are a prime number, or one.
+
+    Chatter that repeats after few steps is then met in all its phases; every second thousandth step may meet one alone.
+    """
+    steps = int(fault.reference.operation_time / fault.sampling_time + 1e-6)
+    strides = ((count, -(-steps // count)) for count in range(most, 0, -1))
+    return next((count for count, stride in strides if stride == 1 or _prime(stride)), most)
+
+
+def _prime(number: int) -> bool:
+    return number > 1 and all(number % divisor for divisor in range(2, isqrt(number) + 1))
 
 
 def _lipschitz(design: Design) -> Fraction:
@@ -190,10 +213,33 @@ def headline(entry: Entry) -> str:
 
 
 def domain_sentence(domain: Domain) -> str:
-    """Where the premise on |h'| is certified together with the control's own part."""
+    """Where the certificate speaks although the control itself moves h, and what limits it."""
+    which = (
+        "certified domain" if domain.feedforward == "none" else f"certified domain, {domain.feedforward} feed-forward"
+    )
     if domain.level == 0:
-        return "certified domain: empty, the control's own part of h' exceeds the bound (ERRATA 16)"
-    return f"certified domain: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s"
+        return f"{which}: empty, because of {domain.limited_by or 'the control itself'} (ERRATA 16)"
+    return (
+        f"{which}: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s; it admits any one of "
+        f"|e1| <= {domain.start_slip_error:.2g} m, |e2| <= {domain.start_slip_rate_error:.2g} m/s, "
+        f"|h(0)| <= {domain.start_perturbation:.2g} m/s² at the start; limited by {domain.limited_by}"
+    )
+
+
+def feedforward_rows(variants: Iterable[Variant]) -> list[tuple[str, ...]]:
+    """One row a feed-forward under `FEEDFORWARD_COLUMNS`."""
+    found = []
+    for variant in variants:
+        ratios = {p.name: p.ratio for p in variant.premises}
+        values = [ratios.get("along_reference"), ratios.get("level_set")]
+        domain = variant.domain
+        values += [domain.slip_error, domain.slip_rate_error] if domain else [None, None]
+        found.append((variant.feedforward.name, *("–" if v is None else f"{v:.2g}" for v in values)))
+    return found
+
+
+FEEDFORWARD_COLUMNS = ("feed-forward", "along_reference", "level_set", "domain |e1| [m]", "domain |e2| [m/s]")
+"""The two premises are ratios required/certified; the gains are the same in every row."""
 
 
 def _happened(run: Trajectory | None) -> list[str]:
@@ -215,7 +261,7 @@ def _holds(premises: Iterable[Any], name: str) -> bool:
 
 _SAID = {
     "along_reference": "the reference and the disturbance alone leave the premise on |h'| {:.3g}-fold",
-    "level_set": "from a start at an unknown phase of the disturbance |h'| is not certified ({:.3g}-fold)",
+    "level_set": "a start at an unknown phase of the disturbance is not certified ({:.3g}-fold)",
     "on_trajectory": "this run leaves the premise on |h'| {:.3g}-fold",
     "control_coefficient": "β leaves its certified range {:.3g}-fold",
     "friction_slope": "the friction slope exceeds the certified sector {:.3g}-fold",

@@ -4,164 +4,109 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from quakedesign.report.comparison import Comparison, Entry
-    from quakedesign.simulation import Trajectory
+from quakedesign.report.closed_loop_figures import pressure, states
+from quakedesign.report.drawing import (
+    NATURAL,
+    SMALL,
+    band,
+    bar_look,
+    clock,
+    figure,
+    finish,
+    known,
+    length,
+    runs_of,
+    scaled,
+    style,
+)
 
-_COLOURS = {"cta": "#0072B2", "dia": "#009E73", "elqr": "#D55E00"}
-_STYLES = {"published": (0, (4, 2)), "designed": "solid"}
+if TYPE_CHECKING:
+    from quakedesign.report.comparison import Comparison
+    from quakedesign.simulation import Trajectory
 
 
 def figures(comparison: "Comparison") -> dict[str, Any]:
     """Figures by name: ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``."""
-    drawn = {"uncontrolled": _uncontrolled(comparison)}
-    if any(e.run is not None for e in comparison.entries):
+    drawn = {"uncontrolled": uncontrolled(comparison)}
+    if runs_of(comparison.entries):
         drawn |= {
-            "states": _states(comparison),
-            "pressure": _pressure(comparison),
-            "errors": _errors(comparison),
-            "metrics": _metrics(comparison),
+            "states": states(comparison),
+            "pressure": pressure(comparison),
+            "errors": errors(comparison),
+            "metrics": metrics(comparison),
         }
     return drawn
 
 
-def _figure(rows: int, height: float, columns: int = 1) -> tuple[Any, Any]:
-    from matplotlib.figure import Figure
-
-    drawing = Figure(figsize=(8, height), layout="constrained", dpi=150)
-    axes = drawing.subplots(rows, columns, sharex=columns == 1, squeeze=False).ravel()
-    for axis in axes:
-        axis.grid(visible=True, alpha=0.3)
-    return drawing, axes
-
-
-def _runs(comparison: "Comparison") -> "list[tuple[Entry, Trajectory]]":
-    return [(e, e.run) for e in comparison.entries if e.run is not None]
-
-
-def _known(values: np.ndarray | None) -> np.ndarray:
-    """Values of a controlled run, which always has a reference."""
-    assert values is not None
-    return values
-
-
-def _style(entry: "Entry") -> dict[str, Any]:
-    return {
-        "color": _COLOURS.get(entry.design.name, "#555555"),
-        "linestyle": _STYLES[entry.origin],
-        "linewidth": 1.4 if entry.origin == "designed" else 1.1,
-        "label": entry.label,
-    }
-
-
-def _hours(values: np.ndarray) -> np.ndarray:
-    return values / 3600
-
-
-def _length(largest: float) -> tuple[float, str]:
-    return (1e-3, "mm") if largest < 0.1 else (1.0, "m")
-
-
-def _uncontrolled(comparison: "Comparison") -> Any:
+def uncontrolled(comparison: "Comparison") -> Any:
+    """Slip and slip rate of the natural earthquake, and where the statics let it rest."""
     run, fault = comparison.uncontrolled, comparison.fault
-    drawing, (slip, rate) = _figure(2, 4.6)
-    size, unit = _length(float(run.slip.max()))
-    slip.plot(run.time, run.slip / size, color="black")
+    drawing, ((slip,), (rate,)) = figure(2, 4.2)
+    size, unit = length(float(run.slip.max()))
+    last = end(run)
+    divisor, name = clock(last)
+    slip.set_xlim(-0.03 * last / divisor, last / divisor)
+    slip.plot(run.time / divisor, run.slip / size, color=NATURAL)
     slip.axhline(fault.rest_slip / size, color="grey", linestyle=":", label="next rest slip (statics)")
     slip.set_ylabel(f"slip [{unit}]")
-    slip.legend(loc="lower right")
-    rate.plot(run.time, run.slip_rate, color="black")
+    slip.legend(loc="lower right", fontsize=SMALL)
+    rate.plot(run.time / divisor, run.slip_rate, color=NATURAL)
     rate.set_ylabel("slip rate [m/s]")
-    rate.set_xlabel("time [s]")
-    drawing.suptitle(f"{fault.name} without control: magnitude {fault.magnitude:.2f}")
-    return drawing
+    rate.set_xlabel(f"time [{name}]")
+    return finish(drawing, f"{fault.name} without control: magnitude {fault.magnitude:.2f}", [run])
 
 
-def _states(comparison: "Comparison") -> Any:
-    drawing, (slip, rate) = _figure(2, 5.6)
-    runs = _runs(comparison)
-    first = runs[0][1]
-    hours, reference, reference_rate = _hours(first.time), _known(first.reference), np.abs(_known(first.reference_rate))
-    size, unit = _length(float(reference.max()))
+def end(*runs: "Trajectory") -> float:
+    """Time [s] until which earthquakes are shown: somewhat longer than the last takes to complete its slip."""
+    settled = [run.time[int(np.argmax(np.abs(run.slip) >= 0.995 * np.abs(run.slip).max()))] for run in runs]
+    return float(min(1.4 * max(settled), min(run.time[-1] for run in runs))) or float(runs[0].time[-1])
+
+
+def errors(comparison: "Comparison") -> Any:
+    """Size of both tracking errors over time, as envelopes."""
+    drawing, ((slip,), (rate,)) = figure(2, 5.2)
+    runs = runs_of(comparison.entries)
+    divisor, unit = clock(max(float(run.time[-1]) for _, run in runs))
     for entry, run in runs:
-        slip.plot(_hours(run.time), run.slip / size, **_style(entry))
-        rate.plot(*_envelope(_hours(run.time), np.abs(run.slip_rate)), **_style(entry))
-    slip.plot(hours, reference / size, color="black", linestyle=":", label="reference")
-    peak = comparison.uncontrolled.metrics.peak_slip_rate
-    if peak:
-        rate.axhline(peak, color="black", linestyle="--", label="uncontrolled peak")
-    rate.plot(hours, reference_rate, color="black", linestyle=":", label="reference")
-    rate.set_yscale("log")
-    rate.set_ylim(bottom=float(reference_rate.max()) * 1e-2)
-    slip.set_ylabel(f"slip [{unit}]")
-    rate.set_ylabel("|slip rate| [m/s]")
-    rate.set_xlabel("time [h]")
-    drawing.legend(*rate.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
-    drawing.suptitle(f"{comparison.fault.name}: states in closed loop (slip rate: largest of every 40 samples)")
-    return drawing
-
-
-def _pressure(comparison: "Comparison") -> Any:
-    runs = _runs(comparison)
-    drawing, axes = _figure(len(runs), 1.1 + 1.25 * len(runs))
-    size, unit = (1e6, "MPa") if comparison.fault.effective_normal_stress > 1e6 else (1e3, "kPa")
-    for axis, (entry, run) in zip(axes, runs, strict=True):
-        axis.plot(
-            _hours(run.time),
-            run.pressure / size,
-            **_style(entry) | {"linestyle": "solid", "linewidth": 0.6},
-        )
-        axis.set_title(entry.label, fontsize=9)
-        axis.set_ylabel(f"p [{unit}]")
-    axes[-1].set_xlabel("time [h]")
-    drawing.suptitle(f"{comparison.fault.name}: fluid pressure")
-    return drawing
-
-
-def _errors(comparison: "Comparison") -> Any:
-    drawing, (slip, rate) = _figure(2, 6)
-    for entry, run in _runs(comparison):
         for axis, values in ((slip, run.slip_error), (rate, run.slip_rate_error)):
-            time, envelope = _envelope(_hours(run.time), np.abs(_known(values)))
-            axis.plot(time, envelope, **_style(entry))
+            middle, _, largest = band(run.time / divisor, np.abs(known(values)))
+            axis.plot(middle, np.maximum(largest, 1e-300), **style(entry))
     for axis, label in ((slip, "|slip error| [m]"), (rate, "|slip-rate error| [m/s]")):
         axis.set_yscale("log")
         axis.set_ylabel(label)
-    rate.set_xlabel("time [h]")
-    drawing.legend(*slip.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
-    drawing.suptitle(f"{comparison.fault.name}: tracking errors (largest of every 40 samples)")
-    return drawing
+    rate.set_xlabel(f"time [{unit}]")
+    made = [run for _, run in runs]
+    title = f"{comparison.fault.name}: tracking errors"
+    return finish(drawing, title, made, "largest of 40 kept samples", legend=slip)
 
 
-def _envelope(time: np.ndarray, values: np.ndarray, width: int = 40) -> tuple[np.ndarray, np.ndarray]:
-    count = len(values) // width
-    largest = values[: count * width].reshape(count, width).max(axis=1)
-    return time[: count * width].reshape(count, width).mean(axis=1), np.maximum(largest, 1e-300)
+_SHOWN = {
+    "max_slip_error": "max |slip error|",
+    "max_slip_rate_error": "max |slip-rate error|",
+    "rms_pressure": "RMS pressure",
+    "pressure_total_variation": "total variation of pressure",
+}
 
 
-def _metrics(comparison: "Comparison") -> Any:
-    shown = {
-        "max_slip_error": "max |slip error| [m]",
-        "max_slip_rate_error": "max |slip-rate error| [m/s]",
-        "rms_pressure": "RMS pressure [Pa]",
-        "pressure_total_variation": "total variation of pressure [Pa]",
-    }
-    drawing, axes = _figure(2, 6.5, columns=2)
-    settled = [(e, run.metrics) for e, run in _runs(comparison) if run.metrics.max_slip_error is not None]
-    entries = [e for e, _ in settled]
-    for axis, (name, label) in zip(axes, shown.items(), strict=True):
-        values = [getattr(figures, name) for _, figures in settled]
-        bars = axis.barh(range(len(entries)), values, color=[_COLOURS.get(e.design.name, "#555555") for e in entries])
-        for bar, entry in zip(bars, entries, strict=True):
-            bar.set_alpha(0.45 if entry.origin == "published" else 1.0)
-        axis.bar_label(bars, [f"{v:.2e}" for v in values], fontsize=7, padding=2)
-        axis.set_yticks(range(len(entries)), [e.label for e in entries], fontsize=7)
-        axis.invert_yaxis()
-        axis.set_xlabel(label)
-        if name != "rms_pressure" and min(values, default=1) > 0:
+def metrics(comparison: "Comparison") -> Any:
+    """Bars of four metrics in their units."""
+    drawing, axes = figure(2, 4.8, columns=2, sharey=True)
+    settled = [(e, run) for e, run in runs_of(comparison.entries) if run.metrics.max_slip_error is not None]
+    for axis, (name, title) in zip(axes.ravel(), _SHOWN.items(), strict=True):
+        values = [getattr(run.metrics, name) for _, run in settled]
+        unit = settled[0][1].metrics.unit(name) if settled else "-"
+        size, unit = scaled(max(values), unit) if unit == "Pa" and any(values) else (1.0, unit)
+        values = [value / size for value in values]
+        for place, ((entry, _), value) in enumerate(zip(settled, values, strict=True)):
+            axis.barh(place, value, **bar_look(entry))
+            axis.annotate(f" {value:.3g}", (value, place), va="center", fontsize=SMALL - 1)
+        axis.set_yticks(range(len(settled)), [e.label for e, _ in settled])
+        axis.set_xlabel(f"{title} [{unit}]")
+        if name != "rms_pressure" and min(values, default=0) > 0:
             axis.set_xscale("log")
-            axis.set_xlim(right=max(values) * 30)
+            axis.set_xlim(min(values) / 3, max(values) * 10)
         else:
-            axis.set_xlim(right=max(values, default=1) * 1.35)
-    drawing.suptitle(f"{comparison.fault.name}: comparison after a quarter of the task")
-    return drawing
+            axis.set_xlim(right=max(values, default=1) * 1.3 or 1)
+    axes[0, 0].invert_yaxis()
+    title = f"{comparison.fault.name}: comparison after a quarter of the task"
+    return finish(drawing, title, [run for _, run in settled])

@@ -7,12 +7,16 @@ import tempfile
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from quakedesign.certificates import certificate_text
 from quakedesign.errors import OutputError
 from quakedesign.report.comparison import Comparison
 from quakedesign.report.facts import fault_dict, fault_sentences
+from quakedesign.report.numbers import csv_text, printed, table
+
+if TYPE_CHECKING:
+    from quakedesign.report.paper_study import PaperStudy
 
 _PACKAGES = ("quakedesign", "sympy", "cvxpy", "clarabel", "casadi", "numpy", "scipy", "control", "python-flint")
 
@@ -35,10 +39,17 @@ def prepare(out: Path, *, force: bool) -> None:
         )
 
 
-def results(comparison: Comparison) -> dict[str, Any]:
-    """Everything of a comparison that JSON can hold, with the keys of DESIGN.md and the versions of all libraries."""
+def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
+    """Everything of a comparison that JSON can hold, with the keys of DESIGN.md and the versions of all libraries.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    stored : bool
+        Name the files of certificates; None stands for them where nothing is written.
+    """
     found = {"fault": fault_dict(comparison.fault), **comparison.to_dict()}
-    for origin, group in (("designed", "controllers"), ("published", "published")):
+    for origin, group in (("designed", "controllers"), ("published", "published")) if stored else ():
         for entry in comparison.of(origin):
             if entry.design.certificate is not None:
                 found[group][entry.design.name]["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
@@ -46,12 +57,34 @@ def results(comparison: Comparison) -> dict[str, Any]:
     return found
 
 
+def study_results(study: "PaperStudy") -> dict[str, Any]:
+    """Results of the comparison, and of a study: ``induced``, ``figures``, ``numbers`` and ``printed``."""
+    from quakedesign.report.paper_figures import PAPER
+
+    induced = study.induced
+    told = {"metrics": induced.metrics.to_dict(), "events": dict(induced.events), "run": dict(induced.provenance)}
+    drawn = {name: {"file": f"figures/{name}.png", "paper": PAPER.get(name)} for name in study.figures()}
+    compared = study.comparison
+    return {
+        **results(compared),
+        "induced": told,
+        "figures": drawn,
+        "numbers": table(compared, {"induced": induced}),
+        "printed": printed(compared),
+    }
+
+
 def _file(origin: str, name: str) -> str:
     return f"{name}.json" if origin == "designed" else f"{origin}-{name}.json"
 
 
 def write_folder(
-    comparison: Comparison, out: Path, *, force: bool, tell: Callable[[str, float], None] = lambda _what, _done: None
+    comparison: Comparison,
+    out: Path,
+    *,
+    force: bool,
+    study: "PaperStudy | None" = None,
+    tell: Callable[[str, float], None] = lambda _what, _done: None,
 ) -> dict[str, Any]:
     """Write certificates, figures, results and the page into a folder that appears whole.
 
@@ -61,6 +94,8 @@ def write_folder(
     out : Path
     force : bool
         Replace a folder of earlier results.
+    study : PaperStudy, optional
+        Of the same comparison: its figures instead of the comparison's, and ``numbers.csv``.
     tell : callable
         Progress.
 
@@ -74,11 +109,14 @@ def write_folder(
     OutputError
     """
     prepare(out, force=force)
-    found = results(comparison)
+    found = study_results(study) if study else results(comparison)
+    drawn = study.figures() if study else comparison.figures()
     try:
         partial = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.absolute().parent))
         try:
-            _fill(partial, comparison, found, tell)
+            _fill(partial, comparison, found, drawn, tell)
+            if study:
+                (partial / "numbers.csv").write_text(csv_text(found["numbers"]), encoding="utf-8")
             partial.chmod(0o755)
             _swap(partial, out)
         finally:
@@ -88,7 +126,13 @@ def write_folder(
     return found
 
 
-def _fill(folder: Path, comparison: Comparison, found: dict[str, Any], tell: Callable[[str, float], None]) -> None:
+def _fill(
+    folder: Path,
+    comparison: Comparison,
+    found: dict[str, Any],
+    drawn: dict[str, Any],
+    tell: Callable[[str, float], None],
+) -> None:
     from quakedesign.report.page import page_html
 
     for name in ("certificates", "figures"):
@@ -97,7 +141,6 @@ def _fill(folder: Path, comparison: Comparison, found: dict[str, Any], tell: Cal
         if entry.design.certificate is not None:
             path = folder / "certificates" / _file(entry.origin, entry.design.name)
             path.write_text(certificate_text(entry.design.certificate), encoding="utf-8")
-    drawn = comparison.figures()
     for i, (name, drawing) in enumerate(drawn.items()):
         tell(f"figure {name}", i / len(drawn))
         drawing.savefig(folder / "figures" / f"{name}.png", metadata={"Software": None})

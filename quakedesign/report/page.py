@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.report.comparison import domain_sentence, headline
+from quakedesign.report.comparison import FEEDFORWARD_COLUMNS, domain_sentence, feedforward_rows, headline
 from quakedesign.report.tables import COLUMNS, FOOTNOTE, rows
 
 if TYPE_CHECKING:
@@ -34,7 +34,11 @@ evaluated in every Runge–Kutta stage.</p><h2>What is proved, and under which p
 <td>{{ "%.4g"|format(p.required) }} {{ p.unit }}</td><td>{{ "%.4g"|format(p.certified) }} {{ p.unit }}</td>
 <td>{{ "–" if p.ratio is none else "%.3g"|format(p.ratio) }}</td><td>{{ "yes" if p.holds else "no" }}</td></tr>
 {% endfor %}</tbody></table>
-{% if e.design.domain %}<p>{{ domain(e.design.domain) }}.</p>{% endif %}{% endfor %}
+{% if e.design.domain %}<p>{{ domain(e.design.domain) }}.</p>{% endif %}
+{% if e.variants %}<p>The same gains with what is known of the fault added to the control (ratios of the premises):</p>
+<table><thead><tr>{% for c in known_columns %}<th>{{ c }}</th>{% endfor %}</tr></thead><tbody>
+{% for row in known_rows(e.variants) %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}</tbody></table>{% endif %}{% endfor %}
 <h2>Figures</h2>{% for name in figures %}<p><img src="figures/{{ name }}.png" alt="{{ name }}"></p>{% endfor %}
 <p>Certificates: <code>certificates/*.json</code>; re-check with <code>quakedesign check</code>.</p></body></html>
 """
@@ -65,6 +69,8 @@ def page_html(comparison: "Comparison", facts: Iterable[str], figures: Iterable[
             entries=comparison.entries,
             headline=headline,
             domain=domain_sentence,
+            known_columns=FEEDFORWARD_COLUMNS,
+            known_rows=feedforward_rows,
             footnote=FOOTNOTE,
             number=lambda v: f"{float(v):.6g}",
             figures=list(figures),

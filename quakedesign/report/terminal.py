@@ -6,12 +6,19 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 from rich.table import Table
 
-from quakedesign.report.comparison import Comparison, domain_sentence, headline
+from quakedesign.report.comparison import (
+    FEEDFORWARD_COLUMNS,
+    Comparison,
+    domain_sentence,
+    feedforward_rows,
+    headline,
+)
 from quakedesign.report.facts import fault_sentences
 from quakedesign.report.tables import COLUMNS, FOOTNOTE, rows
 
 if TYPE_CHECKING:
     from quakedesign.certificates.premises import Premise
+    from quakedesign.report.comparison import Entry
     from quakedesign.simulation import Trajectory
 
 
@@ -28,6 +35,8 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
             console.print(f"  {_line(premise)}", markup=False)
         if entry.design.domain is not None:
             console.print(f"  {domain_sentence(entry.design.domain)}", markup=False)
+        if entry.variants:
+            _print_feedforward(entry, console)
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     for i, (column, width) in enumerate(zip(COLUMNS, (17, 9, 8, 8, 8, 8, 8, 4), strict=True)):
         table.add_column(escape(column), justify="left" if i < 2 else "right", width=width)
@@ -36,6 +45,16 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
     console.print("\n[bold]closed loop[/bold], errors after a quarter of the task")
     console.print(table, soft_wrap=False)
     console.print(FOOTNOTE, markup=False)
+
+
+def _print_feedforward(entry: "Entry", console: Any) -> None:
+    """What the same gains are certified for with every named feed-forward."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 2))
+    for i, column in enumerate(FEEDFORWARD_COLUMNS):
+        table.add_column(escape(column), justify="left" if i < 1 else "right")
+    for row in feedforward_rows(entry.variants):
+        table.add_row(*row)
+    console.print(table)
 
 
 def _line(premise: "Premise") -> str:

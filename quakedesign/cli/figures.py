@@ -1,0 +1,96 @@
+"""Commands that show all controllers of a fault side by side: in a table, and in the figures of the paper."""
+
+from pathlib import Path
+
+from quakedesign.cli.design import compared, controllers, positive
+from quakedesign.cli.shared import Force, Json, app, console, print_json, progress
+
+
+@app.command
+def compare(fault: str, /, *, controller: str = "all", box: str | None = None, json: Json = False) -> int:
+    """Design, prove, simulate and compare with the published gains as `design` does, and write nothing.
+
+    Exit code as `design`: 0 if every designed controller is proved and its premise along the reference holds.
+
+    Parameters
+    ----------
+    fault
+        Preset or path of a .toml file.
+    controller
+        Law to design: cta, elqr or all.
+    box
+        Uncertainty box: paper or ten-percent.
+    json
+        Print JSON with the keys of design's results.json.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.report.folder import results
+    from quakedesign.report.numbers import printed, printed_lines, table
+
+    names, found = controllers(controller), load_fault(fault, box=box)
+    with progress() as tell:
+        comparison = compared(found, names, tell)
+    if json:
+        beside = {"numbers": table(comparison), "printed": printed(comparison)}
+        print_json({**results(comparison, stored=False), **beside})
+    else:
+        from quakedesign.report.terminal import print_comparison
+
+        print_comparison(comparison, console())
+        for line in printed_lines(printed(comparison)):
+            print(line)
+    return 0 if positive(comparison) else 1
+
+
+@app.command
+def figures(
+    fault: str,
+    /,
+    *,
+    controller: str = "all",
+    box: str | None = None,
+    out: Path | None = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Draw the figures of the paper that show simulations, for any fault, published gains beside designed ones.
+
+    Writes a folder as `design` does, with these figures in addition, and their numbers in numbers.csv and results.json.
+
+    Parameters
+    ----------
+    fault
+        Preset or path of a .toml file.
+    controller
+        Law to design: cta, elqr or all.
+    box
+        Uncertainty box: paper or ten-percent.
+    out
+        Folder to write; ./quakedesign-FAULT unless given.
+    force
+        Replace a folder of earlier results.
+    json
+        Print results.json on stdout.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.report.folder import prepare, write_folder
+
+    names, found = controllers(controller), load_fault(fault, box=box)
+    folder = out or Path(f"quakedesign-{found.name}")
+    prepare(folder, force=force)
+    from quakedesign.report.numbers import printed_lines
+    from quakedesign.report.paper_study import paper_study
+
+    with progress() as tell:
+        comparison = compared(found, names, tell)
+        study = paper_study(comparison, progress=tell)
+        results = write_folder(comparison, folder, force=force, study=study, tell=tell)
+    if json:
+        print_json(results)
+        return 0
+    for drawn in results["figures"].values():
+        print(f"{folder}/{drawn['file']}" + (f": {drawn['paper']} of the paper" if drawn["paper"] else ""))
+    for line in printed_lines(results["printed"]):
+        print(line)
+    console().print(f"\nwritten: {folder}/ (also results.json, numbers.csv, report.html, certificates)")
+    return 0

@@ -1,0 +1,67 @@
+"""A controller as C, and what the command line says about it."""
+
+from pathlib import Path
+from typing import Any
+
+from quakedesign.controllers import Controller
+from quakedesign.fault import Fault
+from quakedesign.report.estimation import differentiator_premise, sensor
+from quakedesign.simulation import export_controller, simulation_scheme
+from quakedesign.simulation.export import HEADER, SOURCE
+from quakedesign.simulation.measurement import EXACT
+from quakedesign.simulation.sensing import OutputFeedback
+
+
+def export_answer(
+    fault: Fault,
+    law: Controller,
+    folder: Path,
+    *,
+    step: float | None = None,
+    scheme: str = "explicit",
+    differentiator_bound: float | None = None,
+    filter_order: int = 0,
+    force: bool = False,
+) -> dict[str, Any]:
+    """Export a controller; return its facts, files and, with a differentiator, the premise of that.
+
+    Parameters
+    ----------
+    fault, law, folder, step, force
+        As in `quakedesign.simulation.export_controller`.
+    scheme : str
+    differentiator_bound : float, optional
+        λ_d [m/s²] of a differentiator with n_d = 1; the law then is told its estimates.
+    filter_order : int
+        n_f of it.
+
+    Returns
+    -------
+    dict
+        ``step, measurement, memory, facts, files, premises``.
+
+    Raises
+    ------
+    ParameterError, OutputError
+    """
+    period = fault.sampling_time if step is None else step
+    seen = sensor(period, EXACT, differentiator_bound, filter_order)
+    chosen = simulation_scheme(scheme, **({"measurement": seen} if seen.noisy else {}))
+    found = export_controller(fault, law, folder, step=step, scheme=chosen, force=force)
+    estimating = isinstance(seen, OutputFeedback)
+    premises = [differentiator_premise(fault, law, seen, scheme=scheme)] if estimating else []
+    files = [str(folder / name) for name in (HEADER, SOURCE)]
+    return found.to_dict() | {"files": files, "premises": [p.to_dict() for p in premises]}
+
+
+def export_lines(answer: dict[str, Any]) -> list[str]:
+    """The same for people."""
+    measured = ", ".join(f"{name} [{unit}]" for name, unit in answer["measurement"].items())
+    lines = [f"written: {', '.join(answer['files'])}", f"every {answer['step']:g} s: {measured} to pressure [Pa]"]
+    lines += [f"  {name}: {value}" for name, value in answer["facts"].items()]
+    lines += [
+        f"premise {p['name']} {'holds' if p['holds'] else 'FAILS'}: required {p['required']:.4g} {p['unit']}, "
+        f"given {p['certified']:.4g} {p['unit']}; {p['note']}"
+        for p in answer["premises"]
+    ]
+    return lines

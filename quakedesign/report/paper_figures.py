@@ -1,0 +1,178 @@
+"""Figures of the paper that show simulations, drawn anew for any fault, published gains beside designed ones.
+
+Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Control, sections II-D and IV. Its figures of
+the laboratory show experiments; here the laboratory fault is simulated like any other.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from quakedesign.report.closed_loop_figures import pressure
+from quakedesign.report.drawing import (
+    INDUCED,
+    NATURAL,
+    SMALL,
+    bar_look,
+    clock,
+    figure,
+    finish,
+    length,
+    named,
+    runs_of,
+    scaled,
+    style,
+)
+from quakedesign.report.figures import end, figures
+from quakedesign.report.numbers import BARS, BASIS, baseline, relative
+
+if TYPE_CHECKING:
+    from quakedesign.report.comparison import Comparison, Entry
+    from quakedesign.report.paper_study import PaperStudy
+
+PAPER = {
+    "friction-law": "fig:mu",
+    "earthquakes": "fig:sim",
+    "uncontrolled": "fig:earthquakesim, fig:earthquakelab",
+    "states": "fig:x1, fig:xe",
+    "pressure": "fig:p1, fig:pe",
+    "friction-coefficient": "fig:pe",
+    "errors-and-power": "fig:simindex, fig:labindex",
+}
+"""Label of the figure of the paper, in its source, that each of ours is about."""
+
+
+def paper_figures(study: "PaperStudy") -> dict[str, Any]:
+    """Figures of a study by name: those of a comparison, and the paper's (`PAPER`).
+
+    Those in closed loop are there if anything ran, the bars if an e-LQR did.
+    """
+    comparison = study.comparison
+    drawn = {"friction-law": friction_law(comparison), "earthquakes": earthquakes(study), **figures(comparison)}
+    if runs_of(comparison.entries):
+        drawn["pressure"] = pressure(comparison, study.close_ups)
+        drawn["friction-coefficient"] = friction_coefficient(comparison)
+    if baseline(comparison) is not None:
+        drawn["errors-and-power"] = errors_and_power(comparison)
+    return drawn
+
+
+def friction_law(comparison: "Comparison") -> Any:
+    """Friction coefficient against slip, and the slope at which the spring unloads."""
+    from quakedesign.simulation.closed_loop import ClosedLoop
+
+    fault, run = comparison.fault, comparison.uncontrolled
+    slips = np.linspace(0, 1.1 * max(float(run.slip.max()), fault.reference.target_slip), 400)
+    coefficient = ClosedLoop(fault).friction
+    values = np.array([float(coefficient([slip, 0])) for slip in slips])
+    spring = values[0] - fault.specific_stiffness / (fault.authority * fault.effective_normal_stress) * slips
+    size, unit = length(float(slips[-1]))
+    drawing, ((axis,),) = figure(1, 3.0)
+    axis.plot(slips / size, values, color=NATURAL, label=f"{fault.friction.name} at rest")
+    axis.plot(slips / size, spring, color="grey", linestyle="--", linewidth=1, label="unloading of the spring")
+    axis.set_ylim(bottom=max(0.0, 2 * values.min() - values.max()))
+    axis.set_xlabel(f"slip [{unit}]")
+    axis.set_ylabel("friction coefficient [-]")
+    axis.legend(fontsize=SMALL)
+    return finish(drawing, f"{fault.name}: friction law of the simulations", [], "from the law itself, not from a run")
+
+
+def earthquakes(study: "PaperStudy") -> Any:
+    """Slip and slip rate of the natural and of the induced earthquake."""
+    fault, natural, induced = study.comparison.fault, study.comparison.uncontrolled, study.induced
+    drawing, ((slip,), (rate,)) = figure(2, 4.4)
+    size, unit = length(float(induced.slip.max()))
+    divisor, name = clock(end(natural, induced))
+    amount, pascal = scaled(float(induced.pressure[0]), "Pa")
+    for run, shade, line, label in (
+        (natural, NATURAL, "solid", "natural, p = 0"),
+        (induced, INDUCED, (0, (4, 2)), f"induced, p = {induced.pressure[0] / amount:.4g} {pascal}"),
+    ):
+        slip.plot(run.time / divisor, run.slip / size, color=shade, linestyle=line, label=label)
+        rate.plot(run.time / divisor, run.slip_rate, color=shade, linestyle=line)
+    slip.set_xlim(-0.03 * (last := end(natural, induced)) / divisor, last / divisor)
+    slip.set_ylabel(f"slip [{unit}]")
+    slip.legend(loc="lower right", fontsize=SMALL)
+    rate.set_ylabel("slip rate [m/s]")
+    rate.set_xlabel(f"time [{name}]")
+    return finish(drawing, f"{fault.name}: natural and induced earthquake", [natural, induced])
+
+
+def friction_coefficient(comparison: "Comparison") -> Any:
+    """Friction coefficient over time in closed loop; all laws that follow the reference share one curve."""
+    drawing, ((axis,),) = figure(1, 3.2)
+    runs = runs_of(comparison.entries)
+    divisor, unit = clock(max(float(run.time[-1]) for _, run in runs))
+    for place, (entry, run) in enumerate(runs):
+        width = 1.2 * (len(runs) - place)
+        axis.plot(run.time / divisor, run.friction, **style(entry) | {"linewidth": width, "linestyle": "solid"})
+    low, high = comparison.fault.friction.bounds
+    for bound, name, side in ((low, "smallest", "top"), (high, "largest", "bottom")):
+        axis.axhline(float(bound), color="grey", linestyle=":", linewidth=1)
+        axis.annotate(f"{name} {float(bound):.4g}", (1, float(bound)), xycoords=("axes fraction", "data"),
+                      ha="right", va=side, fontsize=SMALL - 1, color="#444444")  # fmt: skip
+    axis.margins(y=0.12)
+    axis.set_xlabel(f"time [{unit}]")
+    axis.set_ylabel("friction coefficient [-]")
+    title = f"{comparison.fault.name}: friction coefficient in closed loop"
+    return finish(drawing, title, [run for _, run in runs], legend=axis)
+
+
+def errors_and_power(comparison: "Comparison") -> Any:
+    """Mean squared and largest errors and RMS pressure over those of the e-LQR, in five panels."""
+    basis = baseline(comparison)
+    assert basis is not None
+    ratios = [(entry, relative(entry.run, basis.run)) for entry, _ in runs_of(comparison.entries)]
+    shown = [(entry, found) for entry, found in ratios if all(found[name] is not None for name in BARS)]
+    drawing, axes = figure(2, 4.6, 3, sharey=True)
+    for axis, (name, title) in zip(axes.ravel(), BARS.items(), strict=False):
+        _bars(axis, shown, name, title)
+    axes[0, 0].invert_yaxis()
+    _notes(axes[1, 2], basis)
+    return finish(
+        drawing,
+        f"{comparison.fault.name}: errors and average power, over those of the {basis.label}",
+        [run for _, run in runs_of(entry for entry, _ in shown)],
+    )
+
+
+def _bars(axis: Any, shown: "list[tuple[Entry, dict[str, Any]]]", name: str, title: str) -> None:
+    """One panel; on a logarithmic axis bars start at 1, so that better and worse point to different sides."""
+    values = [found[name] for _, found in shown]
+    logarithmic = name != "rms_pressure" and min(values) > 0
+    start = 1.0 if logarithmic else 0.0
+    for place, ((entry, _), value) in enumerate(zip(shown, values, strict=True)):
+        axis.barh(place, value - start, left=start, **bar_look(entry))
+        outside = max(value, start) if logarithmic else value
+        axis.annotate(f" {value:.3g}", (outside, place), va="center", fontsize=SMALL - 1)
+    axis.axvline(1, color="black", linewidth=0.8)
+    axis.set_yticks(range(len(shown)), [entry.label for entry, _ in shown])
+    named(axis, title)
+    axis.set_xlabel("over e-LQR [-]")
+    if logarithmic:
+        axis.set_xscale("log")
+        low, high = min(*values, 1.0), max(*values, 1.0)
+        axis.set_xlim(low / 2, high * (high / low) ** 0.45 * 4)
+    else:
+        axis.set_xlim(0, 1.4 * max(*values, 1.0))
+
+
+def _notes(axis: Any, basis: "Entry") -> None:
+    """What 1 stands for, in the free panel."""
+    run = basis.run
+    assert run is not None
+    lines = [f"1 stands for {basis.label}:", ""]
+    for name, title in BARS.items():
+        lines.append(
+            f"{title.replace(chr(10), ' ')}: {getattr(run.metrics, name):.3g} {_superscript(run.metrics.unit(name))}"
+        )
+    lines += ["", f"t > {run.metrics.settled_from:.6g} s; hatched: published gains"]
+    axis.axis("off")
+    axis.text(0, 0.95, "\n".join(lines), transform=axis.transAxes, va="top", fontsize=SMALL - 1, wrap=True)
+
+
+def _superscript(unit: str) -> str:
+    return unit.replace("^2", "²")
+
+
+__all__ = ["BASIS", "PAPER", "paper_figures"]

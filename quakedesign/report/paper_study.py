@@ -1,0 +1,71 @@
+"""What the figures of the paper need beside a comparison: the induced earthquake, and a closer look at every law."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+from typing import Any
+
+from quakedesign.report.comparison import Comparison
+from quakedesign.simulation import Trajectory, natural_earthquake, simulate
+
+INDUCING_SHARE = 0.1
+"""Constant pressure over σ'_n of the induced earthquake: 5 MPa on the paper's fault at 50 MPa."""
+PERIODS = 16
+"""Length of a close-up in natural periods."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperStudy:
+    """Runs of all figures.
+
+    Attributes
+    ----------
+    comparison : Comparison
+    induced : Trajectory
+        Without control, under a constant pressure of a tenth of the effective normal stress.
+    close_ups : mapping of str to Trajectory
+        By label of the entry: its first `PERIODS` natural periods with every step kept.
+    """
+
+    comparison: Comparison
+    induced: Trajectory
+    close_ups: Mapping[str, Trajectory]
+
+    def figures(self) -> dict[str, Any]:
+        """Matplotlib figures by name, drawn once."""
+        return self._drawn
+
+    @cached_property
+    def _drawn(self) -> dict[str, Any]:
+        from quakedesign.report.paper_figures import paper_figures
+
+        return paper_figures(self)
+
+
+def paper_study(comparison: Comparison, *, progress: Callable[[str, float], None] | None = None) -> PaperStudy:
+    """Make the short runs that the figures of the paper need beside a comparison.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    progress : callable, optional
+        Called with what is being done and the fraction done [-].
+
+    Returns
+    -------
+    PaperStudy
+    """
+    tell, fault = progress or (lambda _what, _done: None), comparison.fault
+    tell("induced earthquake", 0.0)
+    induced = natural_earthquake(fault, INDUCING_SHARE * fault.effective_normal_stress)
+    length = min(PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
+    close_ups = {}
+    for entry in comparison.entries:
+        if entry.run is not None:
+            tell(f"{entry.label}: close-up", 0.0)
+            step = entry.run.provenance["step"]
+            close_ups[entry.label] = simulate(
+                fault, entry.design.controller, duration=max(length, step), step=step, samples=int(length / step) + 1
+            )
+    return PaperStudy(comparison=comparison, induced=induced, close_ups=close_ups)

@@ -1,0 +1,56 @@
+"""A sampling report on a terminal and in a folder."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from quakedesign.output import whole_folder, write_whole
+from quakedesign.report.sampling import COLUMNS, FOOTNOTE, SamplingReport, order_rows, study_rows
+
+
+def write_sampling(report: SamplingReport, folder: Path) -> dict[str, Any]:
+    """Write ``results.json`` and ``figures/*.png`` into a folder that appears whole; return what the former holds.
+
+    Raises
+    ------
+    OutputError
+    """
+    found = report.to_dict()
+    with whole_folder(folder) as partial:
+        (partial / "figures").mkdir()
+        for name, drawing in report.figures().items():
+            drawing.savefig(partial / "figures" / f"{name}.png", metadata={"Software": None})
+        write_whole(partial / "results.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
+    return found
+
+
+def print_sampling(report: SamplingReport, console: Any) -> None:
+    """Table of the schemes, and one of every study."""
+    console.print(f"[bold]{report.fault.name}[/bold], T_s = {report.fault.sampling_time:g} s")
+    console.print(_table(COLUMNS, [row.cells() for row in report.rows], texts=2), soft_wrap=False)
+    for row in report.rows:
+        if {"diverged", "opening"} & set(row.run.events):
+            console.print(f"{row.label}, {row.scheme}: {dict(row.run.events)}", markup=False)
+    console.print(FOOTNOTE, markup=False)
+    for name, study in report.studies.items():
+        console.print(f"\n[bold]{escape(study.title)}[/bold]")
+        levels = f"largest errors at {study.label} {study.levels[0]:.3g} … {study.levels[-1]:.3g} {study.unit}".rstrip()
+        if name == "orders":
+            levels = (
+                f"error ~ T_s^order for T_s = {study.levels[-1]:.3g} … {study.levels[0]:.3g} s, errors at the latter"
+            )
+        console.print(levels, markup=False)
+        head, rows = order_rows(study) if name == "orders" else study_rows(study)
+        console.print(_table(head, rows, texts=1 if name == "orders" else 2), soft_wrap=False)
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], *, texts: int) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    for i, column in enumerate(head):
+        table.add_column(escape(column), justify="left" if i < texts else "right")
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table

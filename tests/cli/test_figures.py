@@ -1,0 +1,78 @@
+"""The commands that show all controllers side by side."""
+
+import csv
+import importlib.resources
+import json
+import subprocess
+import sys
+
+import pytest
+
+from quakedesign.cli import main
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main(list(arguments))
+    out, err = capsys.readouterr()
+    return stop.value.code, out, err
+
+
+@pytest.fixture
+def short(tmp_path):
+    """The laboratory fault, stable and with a task of a second, as a file of the user's."""
+    text = (importlib.resources.files("quakedesign.fault") / "presets" / "lab-fault.toml").read_text()
+    text = text.replace("drop = 0.17", "drop = 0.01").replace('"lab-fault"', '"short"').replace("1 hour", "1 s")
+    path = tmp_path / "short.toml"
+    path.write_text(text)
+    return path
+
+
+def test_compare_prints_the_keys_of_design_and_writes_nothing(short, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = run(capsys, "compare", str(short), "--controller", "elqr", "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert {"fault", "controllers", "published", "uncontrolled", "versions", "numbers", "printed"} == set(found)
+    assert found["controllers"]["elqr"]["certificate"] is None
+    assert found["controllers"]["elqr"]["verdict"] == "proved"
+    assert [p.name for p in tmp_path.iterdir()] == ["short.toml"]
+
+
+def test_figures_writes_one_folder_and_says_what_is_in_it(short, capsys, tmp_path):
+    folder = tmp_path / "drawn"
+    code, out, err = run(capsys, "figures", str(short), "--controller", "elqr", "--out", str(folder))
+    assert (code, err) == (0, "")
+    assert f"{folder}/figures/earthquakes.png: fig:sim of the paper" in out
+    written = [line.split(":")[0] for line in out.splitlines() if line.startswith(f"{folder}/figures/")]
+    assert sorted(written) == sorted(str(path) for path in (folder / "figures").iterdir())
+    assert json.loads((folder / "results.json").read_text())["numbers"][-1]["mise_slip_over_elqr"] == 1
+    code, _, err = run(capsys, "figures", str(short), "--out", str(folder))
+    assert code == 2
+    assert "--force" in err
+
+
+@pytest.mark.parametrize("command", ["compare", "figures"])
+@pytest.mark.parametrize("wrong", [("nowhere",), ("lab-fault", "--controller", "pid"), ("lab-fault", "--box", "huge")])
+def test_bad_input_is_one_line_and_code_two(command, wrong, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, command, *wrong)
+    assert (code, out) == (2, "")
+    assert len([line for line in err.splitlines() if line.strip()]) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_all_figures_of_the_laboratory_fault(tmp_path):
+    command = [sys.executable, "-m", "quakedesign", "figures", "lab-fault", "--json"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=500)
+    assert done.returncode == 0, done.stderr
+    found, folder = json.loads(done.stdout), tmp_path / "quakedesign-lab-fault"
+    assert all((folder / drawn["file"]).stat().st_size > 20_000 for drawn in found["figures"].values())
+    with open(folder / "numbers.csv", newline="") as stream:
+        rows = {row["run"]: row for row in csv.DictReader(stream)}
+    assert len(rows) == 7
+    # section IV-A, said of the real fault, which is similar: sliding modes follow the slip better, the e-LQR its rate
+    for law in ("2-CTA (published)", "2-DIA (published)"):
+        assert float(rows[law]["mise_slip_over_elqr"]) < 1 < float(rows[law]["mise_slip_rate_over_elqr"])
+        assert float(rows[law]["rms_pressure_over_elqr"]) == pytest.approx(1, abs=0.05)
