@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import numpy as np
 
 MANIFEST, BATCHES = "campaign.json", "batches"
+_RESULTS = ("results.json", "samples.csv", "distribution.png", "sample-*.nc", "steps-*.so")
+_NAMED = 5
 
 
 def plain(value: Any) -> Any:
@@ -50,6 +52,12 @@ def differences(one: Any, other: Any, name: str = "") -> list[str]:
     return [] if one == other else [name]
 
 
+def _told(names: list[str]) -> str:
+    """Some of the names; what follows from the others is left out."""
+    chosen = [name or "everything" for name in names if name != "arithmetic"] or names
+    return ", ".join(chosen[:_NAMED]) + " and more" * (len(chosen) > _NAMED)
+
+
 @dataclass(frozen=True)
 class Ledger:
     """Answers of a campaign on disk: the vector at the end of a sample, by the vector at its start.
@@ -74,7 +82,7 @@ class Ledger:
         inputs : mapping
             Everything that determines the digits of every sample, as `plain` gives it.
         renew : bool
-            Delete another campaign that the folder holds.
+            Delete another campaign that the folder holds; the same one goes on.
 
         Raises
         ------
@@ -85,14 +93,15 @@ class Ledger:
         """
         text = json.dumps(inputs, indent=1, sort_keys=True, allow_nan=False)
         ledger = cls(folder, hashlib.sha256(text.encode()).hexdigest())
-        if renew and (folder / MANIFEST).is_file():
+        changed = ledger._changes(json.loads(text)) if (folder / MANIFEST).exists() else None
+        if changed is None:
+            ledger._require_nothing_else()
+        elif changed and renew:
             ledger._clear()
-        if (folder / MANIFEST).exists():
-            ledger._require_same(json.loads(text))
-        elif folder.exists() and any(folder.iterdir()):
-            raise OutputError(
-                f"the folder of a campaign must be new, empty, or that of this campaign. Received {folder}, "
-                "which holds something else. Choose another one."
+        elif changed:
+            raise SimulationError(
+                f"the campaign in {folder} must be this one to go on. Received one that differs in {_told(changed)}. "
+                "Choose another folder, or replace it by force."
             )
         ledger._create()
         write_whole(folder / MANIFEST, text + "\n")
@@ -106,21 +115,29 @@ class Ledger:
 
     def _clear(self) -> None:
         shutil.rmtree(self.folder / BATCHES, ignore_errors=True)
-        for path in self.folder.glob("steps-*.so"):
+        for path in (path for name in (*_RESULTS, MANIFEST) for path in self.folder.glob(name)):
             path.unlink(missing_ok=True)
-        (self.folder / MANIFEST).unlink()
 
-    def _require_same(self, inputs: Any) -> None:
+    def _require_nothing_else(self) -> None:
+        """Refuse a folder without manifest, unless that is only because a campaign was killed at its beginning."""
+        try:
+            names = [path.name for path in self.folder.iterdir()] if self.folder.exists() else []
+        except OSError as error:
+            raise OutputError(f"{self.folder} must be a folder: {error.strerror}. Choose another one.") from None
+        others = [name for name in names if name != BATCHES and not name.startswith(f".{MANIFEST}.")]
+        if others:
+            raise OutputError(
+                f"the folder of a campaign must be new, empty, or that of this campaign. Received {self.folder}, "
+                f"which holds {others[0]}. Choose another one."
+            )
+
+    def _changes(self, inputs: Any) -> list[str]:
+        """Names of what differs from the campaign that the folder holds."""
         try:
             held = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             held = None
-        changed = differences(held, inputs)
-        if changed:
-            raise SimulationError(
-                f"the campaign in {self.folder} must be this one to go on. Received one that differs in "
-                f"{', '.join(filter(None, changed)) or 'everything'}. Choose another folder, or replace it by force."
-            )
+        return differences(held, inputs)
 
     def read(self) -> "dict[bytes, np.ndarray]":
         """Vectors at the end by the bytes of those at the start; files that are not whole are passed over.

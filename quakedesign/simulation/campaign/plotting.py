@@ -53,6 +53,7 @@ def _distribution(axis: Any, campaign: "Campaign", name: str) -> None:
     if len(finite) and finite[0] > 0 and finite[-1] > _DECADES * finite[0]:
         axis.set_xscale("log")
     axis.set_xlabel(f"{name.replace('_', ' ')} [{StickMetrics.unit(name) or '-'}]")
-    axis.set_ylabel("share of samples [-]")
+    if axis.get_subplotspec().is_first_col():
+        axis.set_ylabel("share of samples [-]")
     axis.set_ylim(0, 1.02)
     axis.grid(visible=True, alpha=0.3)

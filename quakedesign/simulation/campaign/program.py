@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.output import write_whole
@@ -144,22 +145,23 @@ def _virtual_machine(program: Program) -> Mover:
 
     rungs = ladder(ca.Function.deserialize(program.function))
     advancer = Advancer.of(Backend(rungs, "virtual-machine", ""), [0.0] * program.size)
+    alone = Lock()  # threads share the advancer
 
     def move(vectors: "np.ndarray", steps: int) -> None:
-        for row in vectors:
-            if row[program.diverged] >= 0:
-                continue
-            advancer.vector[:] = row
-            advancer.advance(steps)
-            if advancer.vector[program.diverged] >= 0:
-                _to_divergence(advancer, row, program.diverged)
-            row[:] = advancer.vector
+        with alone:
+            for row in vectors:
+                if not row[program.diverged] >= 0:
+                    row[:] = _moved(advancer, row, steps, program.diverged)
 
     return move
 
 
-def _to_divergence(advancer: Advancer, start: "np.ndarray", diverged: int) -> None:
-    """Again from the start, step by step, to the one at which divergence is noticed, as in machine code."""
+def _moved(advancer: Advancer, start: "np.ndarray", steps: int, diverged: int) -> "np.ndarray":
+    """Vector after a number of steps, or after the one at which divergence is noticed, as in machine code."""
     advancer.vector[:] = start
-    while not advancer.vector[diverged] >= 0:
-        advancer.advance(1)
+    advancer.advance(steps)
+    if advancer.vector[diverged] >= 0:
+        advancer.vector[:] = start
+        while not advancer.vector[diverged] >= 0:
+            advancer.advance(1)
+    return advancer.vector

@@ -1,12 +1,16 @@
 """What a campaign returns: quantiles, the worst samples, and every sample again by its index."""
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError
+from quakedesign.output import write_whole
 from quakedesign.simulation.campaign.problem import Outcome, Problem
 from quakedesign.simulation.campaign.search import Worst
 from quakedesign.simulation.campaign.space import UNITS
@@ -126,7 +130,7 @@ class Campaign:
         number = index.removeprefix("search-")
         if not (index.startswith("search-") and number.isdecimal() and int(number) < len(looked_at)):
             raise ParameterError(
-                f"index must be a whole number, or search-0 … search-{len(looked_at) - 1}. Got {index!r}."
+                f"index must be a whole number, or search-0 … search-{len(looked_at) - 1}. Received {index!r}."
             )
         return self.problem.trajectory(looked_at[int(number)], samples)
 
@@ -167,6 +171,25 @@ class Campaign:
         }
         columns |= {f"{m} [{StickMetrics.unit(m) or '-'}]": self.values(m) for m in self.metrics}
         return pd.DataFrame(columns, index=pd.Index(range(len(numbers)), name="sample"))
+
+    def save(self, folder: str | Path) -> None:
+        """Write ``results.json``, ``samples.csv`` and ``distribution.png`` into a folder, each whole.
+
+        Raises
+        ------
+        OutputError
+            When a file cannot be written.
+        """
+        drawn = BytesIO()
+        self.plot().savefig(drawn, format="png", dpi=150, metadata={"Software": None})
+        text = json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n"
+        contents = {
+            "results.json": text,
+            "samples.csv": self.to_pandas().to_csv(),
+            "distribution.png": drawn.getvalue(),
+        }
+        for name, content in contents.items():
+            write_whole(Path(folder) / name, content)
 
     def plot(self) -> Any:
         """Return a matplotlib Figure of the distribution of the metrics."""

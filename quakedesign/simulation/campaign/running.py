@@ -1,6 +1,5 @@
 """A campaign from beginning to end, or from where it was left."""
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
@@ -11,7 +10,6 @@ from typing import TYPE_CHECKING
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.output import write_whole
 from quakedesign.simulation.campaign.crews import Cluster, Crew, Given, Processes
 from quakedesign.simulation.campaign.dispatch import dispatch
 from quakedesign.simulation.campaign.ledger import Ledger
@@ -31,7 +29,7 @@ if TYPE_CHECKING:
 
 BATCH_STEPS = 20_000_000  # of all samples of a batch together: what is lost when a worker dies, some half a minute
 LARGEST_BATCH = 64
-BATCHES_PER_WORKER = 4
+BATCHES_PER_WORKER = 8
 ROUNDS = 12
 
 Tell = Callable[[str, float], None]
@@ -99,7 +97,7 @@ def run_campaign(
     samples : int
         Number of samples; number i depends on the seed and on i alone.
     folder : str or Path
-        New, empty, or that of this campaign. Figure and table are written into it as well.
+        New, empty, or that of this campaign. It holds one file for each batch that is done.
     metric : str, optional
         Look for the worst value of this metric, starting from the worst sample and the corners of the box.
     rounds : int
@@ -113,7 +111,7 @@ def run_campaign(
     batch : int, optional
         Samples in a batch; as many as take about half a minute, unless given.
     renew : bool
-        Delete another campaign that the folder holds.
+        Delete another campaign that the folder holds; the same one goes on.
     tell : callable
         Called with what is being done and the fraction done [-].
 
@@ -138,7 +136,7 @@ def run_campaign(
         chosen = [problem.sample(i) for i in range(samples)]
         outcomes = runner.outcomes(chosen, list(map(str, range(samples))), "samples")
         worst = runner.search(outcomes, metric, rounds) if metric else None
-    found = Campaign(
+    return Campaign(
         problem=problem,
         outcomes=tuple(outcomes),
         failures=tuple(runner.failures),
@@ -146,8 +144,6 @@ def run_campaign(
         search=worst,
         seconds=perf_counter() - began,
     )
-    _write(found, Path(folder))
-    return found
 
 
 def _crew(workers: int | None, scheduler: str | None, executor: Executor | None) -> Crew:
@@ -210,11 +206,11 @@ class _Runner:
         shared = -(-count // (BATCHES_PER_WORKER * self._crew.width))
         return max(1, min(LARGEST_BATCH, shared, BATCH_STEPS // self._problem.setting.steps))
 
-    def search(self, outcomes: Sequence[Outcome | None], metric: str, rounds: int) -> Worst:
-        """Worst sample by a metric, from the worst one known and the corners on."""
+    def search(self, outcomes: Sequence[Outcome | None], metric: str, rounds: int) -> Worst | None:
+        """Worst sample by a metric, from the worst one known and the corners on; None where all failed."""
         known = [(i, outcome) for i, outcome in enumerate(outcomes) if outcome]
         if not known:
-            raise ParameterError("a search needs at least one sample that did not fail. Received none.")
+            return None
         require_metric(metric, metric_names([outcome for _, outcome in known]))
         first = max(known, key=lambda pair: badness(pair[1], metric))[0]
         counter = 0
@@ -228,20 +224,3 @@ class _Runner:
 
         start, seed = self._problem.point(first), self._problem.sample(first).noise_seed
         return search(self._problem.space, metric, evaluate, [start], noise_seed=seed, rounds=rounds)
-
-
-def _write(campaign: Campaign, folder: Path) -> None:
-    """Answer, table and figure, each whole."""
-    from io import BytesIO
-
-    text = json.dumps(campaign.to_dict(), indent=1, allow_nan=False)
-    write_whole(folder / "results.json", text + "\n")
-    write_whole(folder / "samples.csv", campaign.to_pandas().to_csv())
-    drawn = BytesIO()
-    campaign.plot().savefig(drawn, format="png", dpi=150, metadata={"Software": None})
-    write_whole(folder / "distribution.png", drawn.getvalue())
-
-
-def folder_of(fault: Fault) -> Path:
-    """Folder of a campaign unless told."""
-    return Path(f"quakedesign-{fault.name}-campaign")

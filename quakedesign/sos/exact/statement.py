@@ -119,6 +119,7 @@ def statement(
     multiplier: Polynomial | None = None,
     products: bool | None = None,
     degree_bound: int | None = None,
+    more: int = 0,
 ) -> Statement:
     """Statement with the usual choices.
 
@@ -134,13 +135,15 @@ def statement(
         products of inequalities that are variables (orthant), each alone of the others.
     degree_bound : int, optional
         Unless given, the smallest even degree that holds multiplier · polynomial and every constraint.
+    more : int
+        Added to the degree bound.
     """
     size = len(variables)
     inequalities = tuple({tuple(sorted(g.items())): g for g in inequalities}.values())
     factor = constant(size) if multiplier is None else dict(multiplier)
     target = product(size, (factor, polynomial))
     least = max(degree(p) for p in (target, *inequalities, *equalities))
-    bound = degree_bound if degree_bound is not None else least + least % 2
+    bound = (degree_bound if degree_bound is not None else least + least % 2) + more
     plain = [i for i, g in enumerate(inequalities) if Statement.is_variable(g)]
     others = [i for i in range(len(inequalities)) if i not in plain]
     if products is None:

@@ -18,7 +18,7 @@ from quakedesign.sos.solve.scaling import Scaled, decimal_units, scaled
 _STRICT = 1e-7
 _ROUNDS = 4
 _ACCURACIES = (1e-9, 1e-12)
-_KERNELS = ((1e-6, 1e-5), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
+_KERNELS = ((1e-6, 1e-5), (1e-6, 1e-7), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
 
 
 @dataclass

@@ -3,16 +3,26 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from math import comb
 from time import perf_counter
 from typing import Any
 
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.answer import Answer, Positivity
-from quakedesign.sos.exact.polynomial import Polynomial, combination, degree, from_sympy, product, square_factor
+from quakedesign.sos.exact.polynomial import (
+    Polynomial,
+    combination,
+    constant,
+    degree,
+    from_sympy,
+    product,
+    square_factor,
+)
 from quakedesign.sos.exact.proofs import Proof, SumOfSquares, as_element, as_polynomial, in_echelon_form
 from quakedesign.sos.exact.statement import Statement, statement
 
 _GROWTH = (0, 2)
+_LARGEST_RETRY = 60  # monomials in a basis, so that a second attempt ends in seconds
 
 
 def prove(
@@ -61,7 +71,7 @@ def prove(
     exact = _with_margin(exact, margin, len(names))
     growth = _GROWTH if (inequalities or equalities) and degree_bound is None else (0,)
     answer: Answer | None = None
-    for chosen in _multipliers(exact, factor, inequalities, equalities):
+    for chosen in _multipliers(exact, factor, inequalities, equalities, len(names)):
         for more in growth:
             asked = statement(
                 names,
@@ -71,17 +81,10 @@ def prove(
                 multiplier=chosen,
                 products=products,
                 degree_bound=degree_bound,
+                more=more,
             )
-            if more:
-                asked = statement(
-                    names,
-                    exact,
-                    inequalities=inequalities,
-                    equalities=equalities,
-                    multiplier=chosen,
-                    products=products,
-                    degree_bound=asked.degree + more,
-                )
+            if answer is not None and comb(asked.degree // 2 + len(names), len(names)) > _LARGEST_RETRY:
+                continue
             found = decide(asked)
             if found.verdict in (Positivity.SOS, Positivity.NEGATIVE):
                 return replace(found, seconds=perf_counter() - start)
@@ -121,11 +124,12 @@ def decide(asked: Statement) -> Answer:
 
 def _by_square_factor(asked: Statement) -> SumOfSquares | None:
     """Proof for s²·r from one for r, where the polynomial has a square factor; None if that leads to none."""
-    root, rest = square_factor(asked.polynomial, len(asked.variables))
+    root, rest = square_factor(asked.target, len(asked.variables))
     size = degree(root)
     if not size or 2 * size > asked.degree:
         return None
-    inner = decide(replace(asked, polynomial=rest, degree=asked.degree - 2 * size)).proof
+    one = constant(len(asked.variables))
+    inner = decide(replace(asked, polynomial=rest, multiplier=one, degree=asked.degree - 2 * size)).proof
     if not isinstance(inner, SumOfSquares):
         return None
     count = len(asked.variables)
@@ -166,11 +170,10 @@ def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:
     return combination([(Fraction(1), polynomial), (-amount, powers)])
 
 
-def _multipliers(polynomial, factor, inequalities, equalities):
+def _multipliers(polynomial, factor, inequalities, equalities, size: int):
     """Multipliers to try: the given one, or one and growing powers."""
     if factor != "auto":
         return [factor]
-    size = len(next(iter(polynomial), (0,)))
     top = degree(polynomial)
     form = all(sum(e) == top for e in polynomial)
     orthant = inequalities and not equalities and all(Statement.is_variable(g) for g in inequalities)

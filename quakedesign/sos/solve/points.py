@@ -9,6 +9,7 @@ from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.faces import simplest
 
 _SEED = 20240607
+_FAR = 1e6  # from there on a minimum is taken to be at infinity
 _SIMPLE = (Fraction(0), Fraction(1), Fraction(-1), Fraction(1, 2), Fraction(2))
 
 
@@ -178,10 +179,13 @@ def _constrained(statement: Statement, hints, starts: int) -> Iterator[list[floa
                     constraints=constraints,
                     options={"ftol": 1e-14, "maxiter": 200},
                 )
-        except (ValueError, FloatingPointError):
+        except (ValueError, FloatingPointError, OverflowError):
             continue
-        if np.all(np.isfinite(answer.x)):
+        reach = float(np.abs(answer.x).max())
+        if reach < _FAR:
             yield answer.x.tolist()
+        elif np.isfinite(reach):
+            yield from ((answer.x / reach * far).tolist() for far in (1e1, 1e2, 1e4))
 
 
 def negative_point(

@@ -59,7 +59,7 @@ def relations(statement: Statement) -> Iterator[tuple[int, Exponents, dict[Expon
     size = len(statement.variables)
     for k, h in enumerate(statement.equalities):
         most = statement.degree - degree(h)
-        for m in monomials(size, most, most if statement.graded else 0):
+        for m in monomials(size, most, max(most, 0) if statement.graded else 0):
             yield k, m, {times(m, e): c for e, c in h.items()}
 
 

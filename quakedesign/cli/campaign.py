@@ -1,0 +1,159 @@
+"""The command that runs many samples of one closed loop."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.cli.shared import Force, Gains, Json, app, console, print_json, progress
+
+if TYPE_CHECKING:
+    from quakedesign.simulation.campaign import Campaign, Problem
+
+
+@app.command
+def campaign(
+    fault: str,
+    /,
+    *,
+    samples: int,
+    controller: str = "cta",
+    gains: Gains = ("published",),
+    scheme: str = "explicit",
+    step: float | None = None,
+    duration: float | None = None,
+    plant: str = "smooth",
+    box: str | None = None,
+    slip_noise: float = 0.0,
+    rate_noise: float = 0.0,
+    initial_slip: float = 0.0,
+    initial_rate: float = 0.0,
+    seed: int = 0,
+    search: str | None = None,
+    rerun: str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    out: Path | None = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Run many samples over the uncertainty box, disturbances, noise and initial states, and report how bad they get.
+
+    Every batch that is done is kept in the folder: interrupted or killed, the same command goes on and gives the same
+    answer. Exit code 0 if all samples have a result (one that diverges has), 1 if a batch failed.
+
+    Parameters
+    ----------
+    fault
+        Preset or path of a .toml file.
+    samples
+        Number of samples.
+    controller
+        none, cta, dia or elqr.
+    gains
+        published, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+    scheme
+        explicit, implicit, semi-implicit or compensated (sampled control), or continuous.
+    step
+        Length of one step in s; the fault's sampling time unless given.
+    duration
+        Of every run in s; the operation time unless given.
+    plant
+        smooth or coulomb.
+    box
+        Uncertainty box: paper or ten-percent.
+    slip_noise
+        Standard deviation of the measured slip in m.
+    rate_noise
+        Standard deviation of the measured slip rate in m/s.
+    initial_slip
+        Largest slip at the start in m.
+    initial_rate
+        Largest slip rate at the start in m/s.
+    seed
+        Of samples and noise.
+    search
+        Metric whose worst value is searched for, such as max_slip_rate_error.
+    rerun
+        Index of a sample to run again and store as NetCDF in the folder.
+    workers
+        Number of processes; one per core unless given.
+    scheduler
+        Address of a dask.distributed scheduler to use instead.
+    out
+        Folder; ./quakedesign-FAULT-campaign unless given.
+    force
+        Replace another campaign in the folder.
+    json
+        Print JSON.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.report.single import chosen_controller
+    from quakedesign.simulation.campaign import campaign_problem, run_campaign
+    from quakedesign.simulation.measurement import Measurement
+    from quakedesign.simulation.schemes import simulation_scheme
+
+    found = load_fault(fault, box=box)
+    noise = Measurement(slip_noise=slip_noise, rate_noise=rate_noise)
+    problem = campaign_problem(
+        found,
+        None if controller == "none" else chosen_controller(found, controller, gains),
+        scheme=simulation_scheme(scheme, **({"measurement": noise} if noise.noisy else {})),
+        step=step,
+        duration=duration,
+        plant=plant,
+        initial_slip=initial_slip,
+        initial_slip_rate=initial_rate,
+        seed=seed,
+    )
+    folder = out or Path(f"quakedesign-{found.name}-campaign")
+    chosen: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
+    try:
+        with progress() as tell:
+            done = run_campaign(problem, samples, folder, tell=tell, **chosen)
+            done.save(folder)
+            answer = done.to_dict() | _again(done, rerun, folder)
+    except KeyboardInterrupt:
+        print(f"quakedesign: interrupted; the same command goes on from {folder}.", file=sys.stderr)
+        return 130
+    if json:
+        print_json(answer)
+    else:
+        _print(problem, done, answer, folder)
+    return 1 if done.failures else 0
+
+
+def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
+    """Run one sample again and store it."""
+    if index is None:
+        return {}
+    run = done.trajectory(int(index) if index.isdecimal() else index)
+    path = run.save(folder / f"sample-{index}.nc")
+    return {"rerun": {"index": index, "file": str(path), "metrics": run.metrics.to_dict(), "events": dict(run.events)}}
+
+
+def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], folder: Path) -> None:
+    from rich.table import Table
+
+    from quakedesign.simulation.metrics import StickMetrics
+
+    out = console()
+    happened = ", ".join(f"{len(found)} {name.replace('_', ' ')}" for name, found in done.events.items() if found)
+    law = problem.controller.title if problem.controller else "no control"
+    out.print(f"{problem.fault.name}, {law}: {answer['samples']} samples, {answer['resumed']} of them from files")
+    out.print(f"events (samples): {happened or 'none'}", markup=False)
+    levels = ("0.05", "0.5", "0.95", "1")
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    for column in ("metric", "unit", "5 %", "50 %", "95 %", "worst", "samples"):
+        table.add_column(column, no_wrap=column != "samples")
+    for name, found in answer["quantiles"].items():
+        values = ("diverges" if found[level] is None else f"{found[level]:.2g}" for level in levels)
+        worst = ", ".join(str(entry["index"]) for entry in answer["worst"][name][:3])
+        table.add_row(name, StickMetrics.unit(name) or "-", *values, worst)
+    out.print(table, soft_wrap=False)
+    for told in (answer["search"],) if answer["search"] else ():
+        value = "diverges" if told["value"] is None else f"{told['value']:.6g} {StickMetrics.unit(told['metric'])}"
+        out.print(f"search: {told['metric']} = {value} in {told['index']} of {told['looked_at']} samples", markup=False)
+    for failure in answer["failures"]:
+        span = f"{failure['samples'][0]} … {failure['samples'][-1]}"
+        out.print(f"failed: samples {span}: {failure['reason']}", markup=False)
+    out.print(f"written: {folder}/ (results.json, samples.csv, distribution.png)", markup=False)

@@ -1,0 +1,135 @@
+"""Deaths and errors of workers: who is charged, and what is kept."""
+
+from concurrent.futures import BrokenExecutor, CancelledError, Future
+
+import pytest
+
+from quakedesign.errors import SimulationError
+from quakedesign.simulation.campaign.crews import Crew, Given, Processes, SerialExecutor
+from quakedesign.simulation.campaign.dispatch import ATTEMPTS, dispatch
+
+
+class Frail(Crew):
+    """Workers that answer in turn, all of whom die as soon as a deadly batch is among those under way."""
+
+    width = 3
+
+    def __init__(self, deadly=(), deaths=10**6):
+        self.deadly, self.deaths, self.renewals, self.under_way = set(deadly), deaths, 0, []
+
+    def submit(self, task, *arguments):
+        future = Future()
+        self.under_way.append((future, task, arguments))
+        if len(self.under_way) == self.width or arguments[0] >= 100:
+            self._work()
+        return future
+
+    def _work(self):
+        dies = self.deaths > 0 and any(arguments[0] in self.deadly for _, _, arguments in self.under_way)
+        self.deaths -= dies
+        for future, task, arguments in self.under_way:
+            if dies:
+                future.set_exception(BrokenExecutor())
+                continue
+            try:
+                future.set_result(task(*arguments))
+            except (Exception, CancelledError) as error:
+                future.set_exception(error)
+        self.under_way = []
+
+    def renew(self):
+        self.renewals += 1
+
+
+class Alone(Frail):
+    """The same with one batch under way at a time."""
+
+    width = 1
+
+
+def run(crew, task, count):
+    found = {}
+    failed = dispatch(task, {i: (i,) for i in range(count)}, crew, found.__setitem__)
+    return found, failed
+
+
+def test_all_answers_are_kept():
+    found, failed = run(Given(SerialExecutor()), lambda i: i * i, 10)
+    assert found == {i: i * i for i in range(10)}
+    assert not failed
+
+
+def test_a_death_that_does_not_come_back_costs_nothing():
+    crew = Alone(deadly={4}, deaths=1)
+    found, failed = run(crew, abs, 9)
+    assert found == {i: i for i in range(9)}
+    assert (failed, crew.renewals) == ({}, 1)
+
+
+def test_a_deadly_batch_alone_is_given_up():
+    found, failed = run(Alone(deadly={4}), abs, 9)
+    assert sorted(found) == [0, 1, 2, 3, 5, 6, 7, 8]
+    assert list(failed) == [4]
+    assert "a worker died" in failed[4]
+
+
+def test_its_neighbours_are_innocent():
+    class Pool(Frail):
+        def submit(self, task, *arguments):
+            future = super().submit(task, *arguments)
+            if self.renewals and self.under_way:
+                self._work()  # suspects come one at a time
+            return future
+
+    found, failed = run(Pool(deadly={1}), abs, 9)
+    assert sorted(found) == [0, 2, 3, 4, 5, 6, 7, 8]
+    assert list(failed) == [1]
+
+
+def test_workers_that_never_live_are_given_up():
+    crew = Alone(deadly=set(range(50)))
+    found, failed = run(crew, abs, 50)
+    assert not found
+    assert sorted(failed) == list(range(50))
+    assert crew.renewals < 10
+
+
+@pytest.mark.parametrize("error", [ValueError("no number"), CancelledError()])
+def test_an_error_is_tried_again_and_reported(error):
+    tried = []
+
+    def task(i):
+        tried.append(i)
+        if i == 2:
+            raise error
+        return i
+
+    found, failed = run(Alone(), task, 4)
+    assert sorted(found) == [0, 1, 3]
+    assert tried.count(2) == ATTEMPTS
+    assert type(error).__name__ in failed[2]
+
+
+def test_an_executor_of_the_user_is_not_replaced():
+    class Broken(SerialExecutor):
+        def submit(self, task, /, *arguments, **named):
+            raise BrokenExecutor
+
+    with pytest.raises(SimulationError, match="executor must keep its workers"):
+        run(Given(Broken()), abs, 2)
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, True])
+def test_a_number_of_workers_that_is_none(count):
+    from quakedesign.errors import ParameterError
+
+    with pytest.raises(ParameterError, match="workers must be a whole number"):
+        Processes(count)
+
+
+def test_a_scheduler_that_does_not_answer(monkeypatch):
+    from quakedesign.simulation.campaign import crews
+
+    monkeypatch.setattr(crews, "_PATIENCE", "100ms")
+    with pytest.raises(SimulationError, match="a scheduler must answer"):
+        crews.Cluster("tcp://127.0.0.1:9")

@@ -1,0 +1,89 @@
+"""Disturbance and start of a sample are what they are called."""
+
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.linalg import expm
+
+from quakedesign.controllers import published
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.simulation import Load, Variation, simulate
+from quakedesign.simulation.campaign import campaign_problem
+from quakedesign.simulation.campaign.space import Sample
+from quakedesign.simulation.campaign.worker import advance
+
+LAB = load_fault("lab-fault", box="ten-percent")
+LAW = published("lab-fault")["elqr"]
+
+
+def test_amplitude_and_phase_are_those_of_a_perturbation_written_out():
+    share, phase, own = 0.4, 2.5, LAB.disturbance
+    wave = sp.Float(share * own.amplitude) * sp.sin(own.frequency * sp.Symbol("time") + sp.Float(phase))
+    calm = LAB.with_disturbance(replace(own, amplitude=0.0))
+    written = simulate(calm, LAW, duration=0.2, load=Load(perturbation=wave), variation=Variation())
+    varied = simulate(LAB, LAW, duration=0.2, variation=Variation(amplitude=share, phase=phase))
+    assert np.allclose(varied.slip, written.slip, rtol=1e-8, atol=1e-12 * np.max(np.abs(written.slip)))
+    assert varied.energy.disturbance == pytest.approx(written.energy.disturbance, rel=1e-7)
+    assert varied.provenance["variation_phase"] == phase
+
+
+@pytest.mark.parametrize("wrong", [{"amplitude": 1.1}, {"phase": -0.1}, {"phase": 6.3}])
+def test_a_disturbance_outside_the_class_is_refused(wrong):
+    with pytest.raises(ParameterError, match=f"{next(iter(wrong))} of a variation must be 0 to"):
+        simulate(LAB, LAW, duration=0.01, variation=Variation(**wrong))
+
+
+def test_a_start_away_from_rest_keeps_the_energy_budget():
+    problem = campaign_problem(LAB, LAW, step=1e-4, duration=0.05, load=Load(drift=1e-3))
+    sample = Sample(variation=Variation(), initial_slip=2e-4, initial_slip_rate=0.03, noise_seed=0)
+    run = problem.trajectory(sample, 50)
+    assert (run.slip[0], run.slip_rate[0]) == (2e-4, 0.03)
+    kinetic = LAB.mass * (run.slip_rate[-1] ** 2 - 0.03**2) / 2
+    assert run.energy.kinetic == pytest.approx(kinetic)
+    assert run.energy.relative_residual < 1e-7
+
+
+def test_divergence_is_that_of_the_sampled_linear_loop():
+    """Without weakening the loop is linear; it diverges if the spectral radius under zero-order hold exceeds one."""
+    problem = campaign_problem(LAB, LAW, duration=4.0, initial_slip=1e-4)
+    ranges = problem.space.ranges | {"weakening": (0.0, 0.0)}
+    problem = replace(problem, space=replace(problem.space, ranges=MappingProxyType(ranges)))
+    samples = [problem.sample(i) for i in range(32)]
+    ends = advance(problem.program, [problem.start(s) for s in samples], problem.setting.steps)
+    radii = np.array([spectral_radius(sample.variation) for sample in samples])
+    found = np.array([outcome.diverged for outcome in problem.outcomes(ends)])
+    clear = (radii < 1) | (radii > 1.012)  # 1.012^4000 is 5e20
+    assert min(sum(found[clear]), sum(~found[clear])) > 3
+    assert np.array_equal(found[clear], radii[clear] > 1)
+
+
+def spectral_radius(variation):
+    k, eta = variation.stiffness * LAB.specific_stiffness, variation.damping * LAB.specific_damping
+    gain = LAB.friction.residual * LAB.authority * variation.authority
+    field = np.array([[0, 1, 0], [LAB.disturbance.slip_growth - k, -eta, gain], [0, 0, 0]])
+    step, (k1, k2, k3, k4) = LAB.sampling_time, (float(v) for v in LAW.gains.values())
+    held = expm(field * step)
+    feedback = -np.array([[k1, k2, k3, k4]])
+    plant = np.hstack([held[:2, :2], np.zeros((2, 2))]) + held[:2, 2:] @ feedback
+    integrals = np.array([[step, 0, 1, 0], [0, 0, step, 1]])
+    return max(abs(np.linalg.eigvals(np.vstack([plant, integrals]))))
+
+
+def test_an_index_that_is_none():
+    problem = campaign_problem(LAB, LAW)
+    for index in (-1, 1.0, True, 2**30):
+        with pytest.raises(ParameterError, match="index must be a whole number"):
+            problem.sample(index)
+
+
+def test_what_a_campaign_cannot_do_is_refused():
+    with pytest.raises(ParameterError, match="method must be one of"):
+        campaign_problem(LAB, LAW, method="cvodes")
+    with pytest.raises(ParameterError, match="seed"):
+        campaign_problem(LAB, LAW, seed=-1)
+    with pytest.raises(ParameterError, match="plant must be one of"):
+        campaign_problem(LAB, LAW, plant="none").sample(0) and campaign_problem(LAB, LAW, plant="none").program

@@ -1,0 +1,88 @@
+"""Quantiles and worst samples, with divergence and failures among them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from quakedesign.controllers import published
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.simulation.campaign import Campaign, Outcome, campaign_problem
+from quakedesign.simulation.campaign.result import LEVELS, Failure
+
+PROBLEM = campaign_problem(load_fault("lab-fault"), published("lab-fault")["elqr"], duration=0.1)
+RANDOM = np.random.default_rng(0)
+
+
+def outcome(value):
+    if value is None:
+        return Outcome(figures={}, events={"diverged": 0.1})
+    return Outcome(figures={"max_slip_error": value, "min_pressure": -value}, events={})
+
+
+def campaign(values, **more):
+    found = [None if value is math.nan else outcome(value) for value in values]
+    return Campaign(problem=PROBLEM, outcomes=tuple(found), **more)
+
+
+@pytest.mark.parametrize("count", [1, 2, 19, 20, 100])
+def test_quantiles_are_those_of_the_inverse_distribution_function(count):
+    values = RANDOM.lognormal(size=count).tolist()
+    found = campaign(values).quantiles()
+    oracle = np.quantile(values, LEVELS, method="inverted_cdf")
+    assert list(found["max_slip_error"].values()) == oracle.tolist()
+    assert list(found["min_pressure"].values()) == (-oracle).tolist()
+
+
+def test_diverged_samples_are_the_worst_and_quantiles_say_so():
+    found = campaign([3.0, None, 1.0, math.nan, 2.0])
+    assert found.worst("max_slip_error") == found.worst("min_pressure") == [1, 0, 4, 2]
+    levels = found.quantiles((0.5, 0.75, 1.0))
+    assert levels["max_slip_error"] == {"0.5": 2.0, "0.75": 3.0, "1": None}
+    assert levels["min_pressure"] == {"0.5": -2.0, "0.75": -3.0, "1": None}
+    assert found.events["diverged"] == [1]
+    told = found.to_dict()["worst"]["max_slip_error"][0]
+    assert (told["index"], told["value"], told["sample"]) == (1, None, PROBLEM.sample(1).numbers)
+
+
+def test_the_answer_has_the_promised_keys_and_is_json():
+    import json
+
+    failure = Failure(samples=("3",), reason="a worker died")
+    answer = campaign([3.0, None, 1.0, math.nan], failures=(failure,), resumed=2).to_dict()
+    assert {"samples", "worst", "quantiles", "failures", "resumed"} <= set(answer)
+    assert json.loads(json.dumps(answer, allow_nan=False))["failures"] == [
+        {"samples": ["3"], "reason": "a worker died"}
+    ]
+    assert (answer["samples"], answer["resumed"]) == (4, 2)
+
+
+def test_nothing_but_divergence():
+    found = campaign([None, None])
+    assert found.to_dict()["quantiles"] == {}
+    assert found.to_dict()["events"]["diverged"]["count"] == 2
+    with pytest.raises(ParameterError, match="metric must be one of none"):
+        found.values("max_slip_error")
+    assert found.plot().axes
+
+
+def test_the_table_has_units_and_all_samples():
+    table = campaign([3.0, None, 1.0, math.nan]).to_pandas()
+    assert table["max_slip_error [m]"].tolist()[:3] == [3.0, math.inf, 1.0]
+    assert math.isnan(table["max_slip_error [m]"][3])
+    assert table["phase [rad]"][2] == PROBLEM.sample(2).variation.phase
+
+
+def test_the_figure_shows_the_share_of_all_samples():
+    axis = campaign([1.0, 2.0, None, 100.0]).plot().axes[0]
+    heights = axis.lines[0].get_ydata()
+    assert heights.tolist() == [0.25, 0.5, 0.75]
+    assert axis.get_xscale() == "log"
+    assert "[m]" in axis.get_xlabel()
+
+
+@pytest.mark.parametrize("index", ["7", "search-0", "search-x"])
+def test_a_sample_of_the_search_that_there_is_not(index):
+    with pytest.raises(ParameterError, match="index must be"):
+        campaign([1.0]).trajectory(index)
