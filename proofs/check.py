@@ -24,6 +24,7 @@ from typing import Any, NoReturn
 MAX_BYTES, MAX_NESTING = 4 * 2**20, 12
 MAX_STATES, MAX_WEIGHT, MAX_UNCERTAIN, MAX_NUMBERS = 6, 12, 8, 64
 MAX_TERMS, MAX_EXPONENT, MAX_OBLIGATIONS, MAX_BASIS = 200, 24, 4096, 200
+MAX_ROOTS, MAX_LIFTS, MAX_INPUTS, MAX_SETS, MAX_OUTPUTS = 4, 4, 8, 12, 8
 MAX_VARIABLES, MAX_CONSTRAINTS, MAX_PRODUCTS = 16, 32, 1024
 MAX_MONOMIALS, MAX_REDUCED, MAX_POLYNOMIAL = 2000, 400, 20_000
 # The following bound what a hostile file can cost; an honest one is far below.
@@ -302,35 +303,43 @@ def check_identity(first: Polynomial, second: Polynomial, total: Polynomial, whe
 
 # ---------------------------------------------------------------- closed loops: reading and writing
 
-LOOP_KEYS = ("format", "law", "gains", "constants", "states", "domain", "uncertain", "field")
+LOOP_KEYS = ("format", "law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field")
 PROOF_KEYS = (*LOOP_KEYS, "V", "claims", "witnesses")
+BOUND_KEYS = (*LOOP_KEYS, "inputs", "outputs", "witnesses")
 
-SignedSum = dict[tuple[tuple[str, ...], Exponents, tuple[bool, ...]], Fraction]
+Powers = tuple[Number, ...]
+SignedSum = dict[tuple[tuple[str, ...], Powers, tuple[bool, ...]], Fraction]
 
 
 @dataclass(frozen=True)
 class Term:
-    """Product of a number (gains and constants included), uncertain parameters and powers of the states.
+    """Product of a number (gains and constants included), uncertain parameters and powers of states and lifts.
 
     A factor |x_i|^a is kept as the integer exponent r_i*a of u_i = |x_i|^(1/r_i) and a flag: odd for the
-    signed power, even for the absolute one.
+    signed power, even for the absolute one. For a lift, which comes after the states, a itself is kept.
     """
 
     number: Fraction
     uncertain: tuple[str, ...]
-    exponents: Exponents
+    exponents: Powers
     odd: tuple[bool, ...]
+    written: str = ""  # in the file, where the number is zero, so that no change of it goes unseen
 
 
 @dataclass(frozen=True)
 class Loop:
-    """The closed loop; `numbers` are its gains and constants."""
+    """The closed loop; `numbers` are its gains and constants, `uncertain` has the roots at its end.
+
+    `roots` maps to the number under the root, `lifts` to the terms of the argument.
+    """
 
     law: str
     numbers: dict[str, Fraction]
     weights: dict[str, int]
     domain: str
     uncertain: dict[str, tuple[Fraction, Fraction]]
+    roots: dict[str, str]
+    lifts: dict[str, list[Term]]
     field: dict[str, list[Term]]
 
 
@@ -347,35 +356,78 @@ def read_range(value: Any, where: str) -> tuple[Fraction, Fraction]:
     return low, high
 
 
+def read_root(value: Any, where: str, numbers: dict[str, Fraction]) -> tuple[str, tuple[Fraction, Fraction]]:
+    """Read a positive square root: the name of its square and the ends of a range that contains it."""
+    square, *ends = read_list(value, where, 3, 3)
+    need(type(square) is str and square in numbers, where, "the root of a gain or constant", square)
+    low, high = read_range(ends, f"range of {where}")
+    need(numbers[square] > 0, where, "the root of a positive number", square)
+    need(low >= 0 and low**2 <= numbers[square] <= high**2, f"range of {where}", "one that contains the root", ends)
+    return square, (low, high)
+
+
+def pad_terms(terms: list[Term], size: int) -> list[Term]:
+    """Write terms with zero powers of the lifts that do not occur in them."""
+    rests = [size - len(term.odd) for term in terms]
+    return [
+        replace(term, exponents=(*term.exponents, *[0] * rest), odd=(*term.odd, *[False] * rest))
+        for term, rest in zip(terms, rests, strict=True)
+    ]
+
+
+def read_lifts(value: dict[str, Any], loop: Loop) -> dict[str, list[Term]]:
+    """Read the arguments of nested powers, each of states and of the lifts before it.
+
+    Terms with a gain or constant zero are disregarded; the others must not vary at a given state.
+    """
+    lifts: dict[str, list[Term]] = {}
+    for lift, entries in value.items():
+        where = f"lift {lift}"
+        lifts[lift] = read_terms(entries, where, replace(loop, lifts=lifts))
+        for name in chain.from_iterable(term.uncertain for term in lifts[lift] if term.number):
+            low, high = loop.uncertain[name]
+            need(low == high, where, "without parameters that vary", name)
+    return {lift: pad_terms(terms, len(loop.weights) + len(lifts)) for lift, terms in lifts.items()}
+
+
 def read_loop(document: dict[str, Any]) -> Loop:
-    """Read everything that proofs and refutations share."""
+    """Read everything that closed loops share."""
     law, domain = document["law"], document["domain"]
     need(type(law) is str and LAW.fullmatch(law) is not None, "law", "1 to 40 of [A-Za-z0-9_-]", law)
     need(type(domain) is str and domain in ("cells", "reals"), "domain", "cells or reals", domain)
-    parts = ("gains", 0, MAX_NUMBERS), ("constants", 0, MAX_NUMBERS), ("uncertain", 0, MAX_UNCERTAIN)
-    gains, constants, uncertain = (read_names(document[key], key, least, most) for key, least, most in parts)
+    parts = ("gains", MAX_NUMBERS), ("constants", MAX_NUMBERS), ("uncertain", MAX_UNCERTAIN), ("roots", MAX_ROOTS)
+    gains, constants, uncertain, roots = (read_names(document[key], key, 0, most) for key, most in parts)
     need(len(gains) + len(constants) <= MAX_NUMBERS, "gains and constants", "at most 64", "more")
     weights = read_names(document["states"], "states", 1, MAX_STATES)
-    names = [*gains, *constants, *uncertain, *weights]
+    lifts = read_names(document["lifts"], "lifts", 0, MAX_LIFTS if domain == "cells" else 0)
+    inputs = read_names(document.get("inputs", {}), "inputs", int("inputs" in document), MAX_INPUTS)
+    names = [*gains, *constants, *uncertain, *roots, *lifts, *weights, *inputs]
     need(len(set(names)) == len(names), "names", "different from each other", names)
     most = MAX_WEIGHT if domain == "cells" else 1
     for name, weight in weights.items():
         valid = type(weight) is int and 1 <= weight <= most
         need(valid, f"weight of {name}", f"1 to {most} on {domain}", weight)
     numbers = {name: read_rational(value, name) for name, value in (gains | constants).items()}
+    squares = {name: read_root(value, f"root {name}", numbers) for name, value in roots.items()}
     ranges = {name: read_range(ends, f"range of {name}") for name, ends in uncertain.items()}
+    ranges |= {name: ends for name, (_, ends) in squares.items()}
     terms = read_object(document["field"], "field", weights)
-    loop = Loop(law, numbers, weights, domain, ranges, {})
-    return replace(loop, field={state: read_terms(terms[state], f"d{state}/dt", loop) for state in weights})
+    loop = Loop(law, numbers, weights, domain, ranges, {name: square for name, (square, _) in squares.items()}, {}, {})
+    loop = replace(loop, lifts=read_lifts(lifts, loop))
+    known = replace(loop, uncertain=ranges | dict.fromkeys(inputs, (Fraction(0), Fraction(0))))
+    return replace(loop, field={state: read_terms(terms[state], f"d{state}/dt", known) for state in weights})
 
 
-def read_factor(value: Any, where: str, loop: Loop) -> tuple[str, tuple[int, bool]]:
-    """Read a power of a state: its name, the exponent of u_i and whether it is odd."""
+def read_factor(value: Any, where: str, loop: Loop) -> tuple[str, tuple[Number, bool]]:
+    """Read a power of a state or lift: its name, the exponent of u_i or of the lift and whether it is odd."""
     state, text, kind = read_list(value, where, 3, 3)
-    need(type(state) is str and state in loop.weights, where, "a power of a state", state)
+    known = type(state) is str and (state in loop.weights or state in loop.lifts)
+    need(known, where, "a power of a state or of an earlier lift", state)
     need(type(kind) is str and kind in ("s", "a"), where, "of kind s or a", kind)
     exponent = read_rational(text, where, positive=kind == "a")
     need(0 <= exponent <= MAX_EXPONENT, where, f"a power 0 to {MAX_EXPONENT}", text)
+    if state in loop.lifts:
+        return state, (exponent, kind == "s")
     scaled = exponent * loop.weights[state]
     need(scaled.denominator == 1, where, "a power whose exponent times the weight is an integer", text)
     parity = loop.domain == "cells" or scaled % 2 == (kind == "s")
@@ -390,15 +442,15 @@ def read_term(value: Any, where: str, loop: Loop) -> Term:
     need(number != 0, where, "a term with a nonzero number", first)
     for name in read_list(parameters, f"parameters in {where}", 0, MAX_PARAMETERS):
         known = type(name) is str and (name in loop.numbers or name in loop.uncertain)
-        need(known, where, "a product of gains, constants and uncertain parameters", name)
+        need(known, where, "a product of gains, constants, roots and uncertain parameters", name)
         number *= loop.numbers.get(name, 1)
         uncertain += [name] if name in loop.uncertain else []
     need(length(number) <= MAX_BITS, where, "a number with gains of at most 599 digits", length(number))
-    entries = read_list(powers, f"factors in {where}", 0, MAX_STATES)
+    entries = read_list(powers, f"factors in {where}", 0, MAX_STATES + MAX_LIFTS)
     factors = dict(read_factor(factor, where, loop) for factor in entries)
-    need(len(factors) == len(entries), where, "a term with each state at most once", powers)
-    exponents, odd = zip(*(factors.get(state, (0, False)) for state in loop.weights), strict=True)
-    return Term(number, tuple(sorted(uncertain)), exponents, odd)
+    need(len(factors) == len(entries), where, "a term with each state and lift at most once", powers)
+    exponents, odd = zip(*(factors.get(name, (0, False)) for name in (*loop.weights, *loop.lifts)), strict=True)
+    return Term(number, tuple(sorted(uncertain)), exponents, odd, "" if number else json.dumps(value))
 
 
 def read_terms(value: Any, where: str, loop: Loop) -> list[Term]:
@@ -409,8 +461,10 @@ def read_terms(value: Any, where: str, loop: Loop) -> list[Term]:
 
 def term_text(term: Term, loop: Loop) -> str:
     """Write one term, e.g. ``-7*beta*sign(e1)*|e1|^(1/3)``."""
-    parts = [str(term.number), *term.uncertain]
-    for (state, weight), exponent, odd in zip(loop.weights.items(), term.exponents, term.odd, strict=True):
+    if term.written:
+        return f"0 for {term.written}"
+    parts, weights = [str(term.number), *term.uncertain], loop.weights | dict.fromkeys(loop.lifts, 1)
+    for (state, weight), exponent, odd in zip(weights.items(), term.exponents, term.odd, strict=True):
         signed = odd and exponent != weight
         power = state if exponent == weight and odd else f"|{state}|^({Fraction(exponent, weight)})"
         parts += [f"sign({state})"] * signed + [power] * (exponent > 0)
@@ -429,29 +483,37 @@ def named(numbers: dict[str, Any]) -> str:
 
 def describe(loop: Loop) -> list[str]:
     """Describe the loop, which is what the verdict is about."""
-    ranges = [f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()]
+    ranges = {name: f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()}
+    roots = {name: f"root: {ranges.pop(name)} is the positive square root of {of}" for name, of in loop.roots.items()}
     return [
         f"law {loop.law}: the name is not verified, the verdict is about the field below",
         f"gains and constants: {named(loop.numbers)}",
         f"domain: {loop.domain}; states with weights: {named(loop.weights)}",
-        f"uncertain, measurable in time: {', '.join(ranges) or 'none'}",
+        f"uncertain, measurable in time: {', '.join(ranges.values()) or 'none'}",
+        *roots.values(),
+        *(f"argument of a nested power: {lift} = {sum_text(terms, loop)}" for lift, terms in loop.lifts.items()),
         *(f"d{state}/dt = {sum_text(terms, loop)}" for state, terms in loop.field.items()),
     ]
 
 
 def describe_claims(loop: Loop, claims: dict[str, Fraction], m: int, n: int) -> list[str]:
     """Describe what a proof proves; V <= C sum u^m makes dV/dt <= -c V^(n/m)."""
-    positive, *bounds, decay = claims.values()
+    positive, decrease, kappa = (claims.get(key) for key in ("positive", "decrease", "decay"))
     if loop.domain == "reals":
-        text = f"V >= {positive} * sum x_i^{m}; dV/dt <= -2*a*V with a = {decay}"
+        text = f"V >= {positive} * sum x_i^{m}; dV/dt <= -2*a*V with a = {claims['rate']}"
         degrees, ending = f"V {m}", "exponentially with rate a" if m == 2 else "with V(t) <= exp(-2*a*t)*V(0)"
     else:
-        text = f"V >= {positive} * sum u_i^{m}; dV/dt <= -{decay} * sum u_i^{n}; u_i = |x_i|^(1/weight)"
+        text = f"V >= {positive} * sum u_i^{m}; dV/dt <= -{decrease} * sum u_i^{n}; u_i = |x_i|^(1/weight)"
         degrees, ending = f"V {m}, dV/dt {n}", "in finite time" if n < m else "finite time is not claimed"
-    bounded = [(state, weight) for state, weight in loop.weights.items() if f"bound_{state}" in claims]
+    bounds = [(claims.get(f"bound_{x}"), x, Fraction(m, r)) for x, r in loop.weights.items()]
+    fall = [f"dV/dt <= -{kappa} * V^({Fraction(n, m)})"] if kappa else []
+    if kappa and n < m:
+        time, power = Fraction(m, m - n) / kappa, Fraction(m - n, m)
+        fall.append(f"settling time: the origin is reached within {time} * V(0)^({power})")
     return [
         f"claims: {text}",
-        *(f"V >= {gamma} * |{x}|^({Fraction(m, r)})" for gamma, (x, r) in zip(bounds, bounded, strict=True)),
+        *(f"V >= {gamma} * |{x}|^({power})" for gamma, x, power in bounds if gamma),
+        *fall,
         f"homogeneous degrees: {degrees}",
         f"conclusion: the origin is globally asymptotically stable, {ending}",
     ]
@@ -482,10 +544,10 @@ def describe_equilibrium(
 
 def read_function(value: Any, loop: Loop) -> list[Term]:
     """Read V; the closed-cell argument and the affine ends need it C1 and without uncertain parameters."""
-    function = read_terms(value, "V", loop)
+    function = pad_terms(read_terms(value, "V", replace(loop, lifts={})), len(loop.weights) + len(loop.lifts))
     for index, term in enumerate(function, 1):
         need(not term.uncertain, f"V term {index}", "without uncertain parameters", term.uncertain)
-        for weight, exponent, odd in zip(loop.weights.values(), term.exponents, term.odd, strict=True):
+        for weight, exponent, odd in zip(loop.weights.values(), term.exponents, term.odd, strict=False):
             smooth = exponent >= weight if odd else exponent == 0 or exponent > weight
             need(smooth, f"V term {index}", "C1: exponents s >= 1, a > 1", str(Fraction(exponent, weight)))
     return function
@@ -507,12 +569,22 @@ def time_derivative(function: list[Term], loop: Loop, budget: Budget) -> SignedS
     return total
 
 
-def restrict(function: SignedSum, signs: Exponents, values: dict[str, Fraction], budget: Budget) -> Polynomial:
+def collect(terms: Iterable[Term], budget: Budget) -> SignedSum:
+    """Add up terms."""
+    total: SignedSum = {}
+    for term in terms:
+        add(total, (term.uncertain, term.exponents, term.odd), term.number, budget)
+    return total
+
+
+def restrict(function: SignedSum, cell: "Cell", values: dict[str, Fraction], budget: Budget) -> Polynomial:
     """Write a function as a polynomial in u on one cell at one vertex (in x on reals, with all signs +)."""
     total: Polynomial = {}
     for (uncertain, exponents, odd), number in function.items():
-        sign = prod(sign for sign, flag in zip(signs, odd, strict=True) if flag)
-        add(total, exponents, sign * number * prod(values[name] for name in uncertain), budget)
+        sign = prod(sign for sign, flag in zip(cell.signs, odd, strict=False) if flag)
+        powers = [Fraction(exponents[i]) * n for i, n in cell.degrees.items()]
+        need(all(power.denominator == 1 for power in powers), "powers of lifts", "integers on cells", "a fraction")
+        add(total, tuple(map(int, powers)), sign * number * prod(values[name] for name in uncertain), budget)
     return total
 
 
@@ -528,10 +600,99 @@ def cells_of(choices: Iterable[Sequence[int]]) -> dict[str, Exponents]:
     return {"".join("+" if sign > 0 else "-" for sign in signs): signs for signs in product(*choices)}
 
 
+@dataclass
+class Cell:
+    """Points where states and lifts have given signs, after what holds there; it grows with every lift.
+
+    `degrees` has an entry for every variable: its index among states and lifts, and the degree of that.
+    """
+
+    label: str
+    states: int
+    signs: Exponents
+    degrees: dict[int, int]
+    equalities: list[Polynomial]
+    inequalities: list[Polynomial]
+
+    def has_interior(self) -> bool:
+        """Tell whether signs alone leave points where all variables are positive."""
+        one_sign = (len({number > 0 for number in h.values()}) == 1 for h in self.equalities)
+        return not any(one_sign) and all(max(g.values()) > 0 for g in self.inequalities)
+
+
+def whole_space(size: int) -> Cell:
+    """Return what takes the place of the cells on reals."""
+    return Cell("", size, (1,) * size, dict.fromkeys(range(size), 1), [], [])
+
+
+def widen(polynomials: Iterable[Polynomial], size: int) -> list[Polynomial]:
+    """Write polynomials in more variables."""
+    return [{(*e, *[0] * (size - len(e))): number for e, number in entry.items()} for entry in polynomials]
+
+
+def reach_of(form: Polynomial, reaches: dict[int, set[int]], count: int, budget: Budget) -> set[int]:
+    """Return the states that a lift's argument depends on, after checking that it is zero on a null set only.
+
+    As a polynomial in those states on which no lift in it depends, it has a coefficient without lifts. This is a
+    nonzero polynomial in the other states, hence zero on a null set.
+    """
+    budget.spend(len(form) * MAX_STATES, 0)
+    inner = set[int]().union(*(reaches[i] for e in form for i in range(count, len(e)) if e[i]))
+    parts = defaultdict[Exponents, set[bool]](set)
+    for e in form:
+        parts[tuple(0 if i in inner else e[i] for i in range(count))].add(any(e[count:]))
+    need({False} in parts.values(), "an argument", "zero on a null set only, by a part without lifts", "another")
+    return inner | {i for e in form for i in range(count) if e[i]}
+
+
+def cells_with_lifts(loop: Loop, budget: Budget) -> list[Cell]:
+    """Return the cells with an interior; a lift P gives t*w^n = P or, where only its sign occurs, t*P >= 0."""
+    count, degrees, cells = len(loop.weights), dict[str, int](), []
+    fixed = {name: low for name, (low, high) in loop.uncertain.items() if low == high}
+    terms = [*chain(*loop.field.values()), *(term for term in chain(*loop.lifts.values()) if term.number)]
+    for i, lift in enumerate(loop.lifts, count):
+        need(any(term.odd[i] or term.exponents[i] for term in terms), f"lift {lift}", "used", "one that is not")
+    raised = {i for term in terms for i, exponent in enumerate(term.exponents) if exponent}
+    arguments = [collect(terms, budget) for terms in loop.lifts.values()]
+    for label, signs in cells_of([(1, -1)] * (count + len(arguments))).items():
+        cell, reaches = Cell(f" {label}", count, signs, dict.fromkeys(range(count), 1), [], []), dict[int, set[int]]()
+        for i, (lift, argument) in enumerate(zip(loop.lifts, arguments, strict=True), count):
+            form, size = restrict(argument, cell, fixed, budget), len(cell.degrees)
+            degree = degree_of(form, f"lift {lift}")
+            need(degrees.setdefault(lift, degree) == degree, f"lift {lift}", "of one degree on all cells", degree)
+            reach = reach_of(form, reaches, count, budget)
+            if i in raised:
+                reaches[size], cell.degrees[i] = reach, degree
+                power: Polynomial = {(*[0] * size, degree): signs[i]}
+                cell.equalities.append(add_scaled(power, Fraction(-1), widen([form], size + 1)[0], budget))
+            else:
+                cell.inequalities.append(add_scaled({}, Fraction(signs[i]), form, budget))
+        if cell.has_interior():
+            cells.append(cell)
+    return cells
+
+
+@dataclass(frozen=True)
+class Obligation:
+    """P >= 0 where all variables are non-negative and the limits hold; `size` is the number of variables."""
+
+    name: str
+    polynomial: Polynomial
+    size: int
+    equalities: Sequence[Polynomial] = ()
+    inequalities: Sequence[Polynomial] = ()
+
+    def key(self) -> Any:
+        """Identify obligations that share a witness."""
+        parts = (self.polynomial,), self.equalities, self.inequalities
+        return tuple(tuple(frozenset(entry.items()) for entry in part) for part in parts)
+
+
 def read_claims(value: Any, loop: Loop) -> dict[str, Fraction]:
-    """Read the claims in the order of their obligations: positive, bounds, then decrease or rate."""
+    """Read the claims in the order of their obligations: positive, bounds, decrease or rate, then decay."""
     bounds = [f"bound_{state}" for state in loop.weights if f"bound_{state}" in read_object(value, "claims")]
-    keys = "positive", *bounds, "decrease" if loop.domain == "cells" else "rate"
+    keys = "positive", *bounds, *(("decrease",) if loop.domain == "cells" else ("rate",))
+    keys += ("decay",) if loop.domain == "cells" and "decay" in value else ()
     given = read_object(value, "claims", keys)
     return {key: read_rational(given[key], f"claims {key}", positive=True) for key in keys}
 
@@ -541,72 +702,133 @@ def power_sum(indices: Iterable[int], size: int, degree: int) -> Polynomial:
     return {tuple(degree * (i == j) for j in range(size)): Fraction(1) for i in indices}
 
 
+def vertices_of(loop: Loop) -> list[dict[str, Fraction]]:
+    """Return the vertices of the box of uncertain parameters; a range of one point has one."""
+    return [
+        dict(zip(loop.uncertain, vertex, strict=True))
+        for vertex in product(*(dict.fromkeys(ends) for ends in loop.uncertain.values()))
+    ]
+
+
+def named_vertex(name: str, vertex: dict[str, Fraction]) -> str:
+    """Return the name of an obligation at a vertex."""
+    return name + "".join(f" {key}={value}" for key, value in vertex.items())
+
+
 def obligations(
     function: SignedSum, rate: SignedSum, claims: dict[str, Fraction], loop: Loop, budget: Budget
-) -> Iterator[tuple[str, int, Polynomial]]:
-    """Yield the name, the degree of V or dV/dt, and the polynomial P >= 0, in the order of the format."""
-    size, on_cells, (*lower, last) = len(loop.weights), loop.domain == "cells", claims
-    cells = {f" {k}": v for k, v in cells_of([(1, -1)] * size).items()} if on_cells else {"": (1,) * size}
-    vertices = list(product(*(dict.fromkeys(ends) for ends in loop.uncertain.values())))
-    count = len(cells) * (len(lower) + len(vertices))
+) -> Iterator[tuple[int, Obligation]]:
+    """Yield the degree of V or dV/dt and the obligation, in the order of the format."""
+    size, on_cells, vertices = len(loop.weights), loop.domain == "cells", vertices_of(loop)
+    lower = [claim for claim in claims if claim not in ("decrease", "rate", "decay")]
+    if on_cells:
+        cells = cells_with_lifts(loop, budget)
+        plain = cells_with_lifts(replace(loop, field={}, lifts={}), budget)
+    else:
+        plain = cells = [whole_space(size)]
+    count = len(plain) * len(lower) + len(cells) * (len(claims) - len(lower)) * len(vertices)
     need(count <= MAX_OBLIGATIONS, "obligations", f"at most {MAX_OBLIGATIONS}", count)
-    for claim, (cell, signs) in product(lower, cells.items()):
-        value = restrict(function, signs, {}, budget)
+    for claim, cell in product(lower, plain):
+        value = restrict(function, cell, {}, budget)
         degree = degree_of(value, "V")
         need(on_cells or degree % 2 == 0, "V", "of even degree on reals", degree)
         chosen = [i for i, state in enumerate(loop.weights) if claim in ("positive", f"bound_{state}")]
-        yield claim + cell, degree, add_scaled(value, -claims[claim], power_sum(chosen, size, degree), budget)
-    for (cell, signs), vertex in product(cells.items(), vertices):
-        values = dict(zip(loop.uncertain, vertex, strict=True))
-        name = last + cell + "".join(f" {key}={value}" for key, value in values.items())
-        fall = add_scaled({}, Fraction(-1), restrict(rate, signs, values, budget), budget)
-        if on_cells:
-            degree = degree_of(fall, f"dV/dt at {name}")
-            powers = power_sum(range(size), size, degree)
-            yield name, degree, add_scaled(fall, -claims[last], powers, budget)
-        else:
-            value = restrict(function, signs, {}, budget)
-            yield name, 0, add_scaled(fall, -2 * claims[last], value, budget)
+        difference = add_scaled(value, -claims[claim], power_sum(chosen, size, degree), budget)
+        yield degree, Obligation(claim + cell.label, difference, size)
+    for claim, cell, vertex in product(claims, cells, vertices):
+        if claim not in lower:
+            name = named_vertex(claim + cell.label, vertex)
+            fall = add_scaled({}, Fraction(-1), restrict(rate, cell, vertex, budget), budget)
+            value = restrict(function, cell, {}, budget) if claim != "decrease" else {}
+            yield falling(name, fall, value, claim, claims[claim], cell, budget)
 
 
-def check_witness(name: str, polynomial: Polynomial, value: Any, loop: Loop, budget: Budget) -> None:
-    """Check multiplier * P = sum of u^times b'Qb."""
-    where, size, on_cells = f"witness of {name}:", len(loop.weights), loop.domain == "cells"
-    witness = read_object(value, where, ("obligation", "multiplier", "squares"))
-    need(witness["obligation"] == name, where, "the next witness", witness["obligation"])
+def falling(
+    name: str, fall: Polynomial, value: Polynomial, claim: str, number: Fraction, cell: Cell, budget: Budget
+) -> tuple[int, Obligation]:
+    """Return the degree of -dV/dt and the obligation that it is large enough."""
+    size, equalities = len(cell.degrees), cell.equalities
+    if claim == "rate":
+        return 0, Obligation(name, add_scaled(fall, -2 * number, value, budget), size)
+    degree = degree_of(fall, f"dV/dt at {name}")
+    powers = power_sum(range(cell.states), size, degree)
+    if claim == "decay":
+        size += 1
+        [fall], [value], powers = widen([fall], size), widen([value], size), power_sum([size - 1], size, degree)
+        root = power_sum([size - 1], size, degree_of(value, "V"))
+        equalities = [*equalities, add_scaled(root, Fraction(-1), value, budget)]
+    limits = widen(equalities, size), widen(cell.inequalities, size)
+    return degree, Obligation(name, add_scaled(fall, -number, powers, budget), size, *limits)
+
+
+def read_squares(value: Any, where: str, size: int, most: int, budget: Budget) -> Polynomial:
+    """Read and expand the sum of u^times b'Qb, with times up to 1 or 0."""
+    total: Polynomial = {}
+    for index, entry in enumerate(read_list(value, f"{where} squares", 0, 2**size), 1):
+        label, _, expanded = read_square(entry, f"{where} square {index}", "times", size, budget)
+        factor = read_exponents(label, f"{where} square {index} times", size, most)
+        add_product(total, {factor: 1}, expanded, budget)
+    return total
+
+
+def check_witness(obligation: Obligation, value: Any, on_cells: bool, budget: Budget) -> None:
+    """Check multiplier * P = squares + sum of g_l * squares_l + sum of q_k * h_k."""
+    where, size, most = f"witness of {obligation.name}:", obligation.size, int(on_cells)
+    witness = read_object(value, where, ("obligation", "multiplier", "squares", "equalities", "inequalities"))
+    need(witness["obligation"] == obligation.name, where, "the next witness", witness["obligation"])
     multiplier = read_polynomial(witness["multiplier"], f"{where} multiplier", size, positive=True)
     need(bool(multiplier), f"{where} multiplier", "nonempty", multiplier)
     one = multiplier == {(0,) * size: 1}  # so that no number of the file is without effect
-    need(one or (on_cells and bool(polynomial)), f"{where} multiplier", "1 on reals or for P = 0", multiplier)
-    squares = read_list(witness["squares"], f"{where} squares", 0, 0 if not polynomial else MAX_BYTES)
+    need(
+        one or (on_cells and bool(obligation.polynomial)), f"{where} multiplier", "1 on reals or for P = 0", multiplier
+    )
+    count = len(obligation.inequalities)
+    lists = [witness["squares"], *read_list(witness["inequalities"], f"{where} inequalities", count, count)]
+    count = len(obligation.equalities)
+    cofactors = read_polynomials(witness["equalities"], f"{where} equalities", size, count, count)
+    empty = not any(lists) and not any(cofactors)
+    need(bool(obligation.polynomial) or empty, f"{where} squares and equalities", "empty for P = 0", "others")
     right: Polynomial = {}
-    for index, square in enumerate(squares, 1):
-        label, _, expanded = read_square(square, f"{where} square {index}", "times", size, budget)
-        factor = read_exponents(label, f"{where} square {index} times", size, 1 if on_cells else 0)
-        add_product(right, {factor: 1}, expanded, budget)
-    check_identity(multiplier, polynomial, right, f"{where} identity", budget)
+    factors: list[Polynomial] = [{(0,) * size: 1}, *obligation.inequalities]
+    for factor, squares in zip(factors, lists, strict=True):
+        add_product(right, factor, read_squares(squares, where, size, most, budget), budget)
+    for cofactor, equality in zip(cofactors, obligation.equalities, strict=True):
+        add_product(right, cofactor, equality, budget)
+    check_identity(multiplier, obligation.polynomial, right, f"{where} identity", budget)
+
+
+def check_witnesses(value: Any, pairs: Iterable[Obligation], on_cells: bool, budget: Budget) -> None:
+    """Check a witness for each different obligation, in their order."""
+    witnesses, seen = iter(read_list(value, "witnesses", 0, MAX_OBLIGATIONS)), set()
+    for obligation in pairs:
+        if obligation.key() not in seen:
+            seen.add(obligation.key())
+            check_witness(obligation, next(witnesses, "none"), on_cells, budget)
+    need(next(witnesses, None) is None, "witnesses", f"{len(seen)} in number", len(value))
+
+
+def check_affine(loop: Loop) -> None:
+    """Check that no uncertain parameter occurs twice in a term, else the ends would not decide."""
+    for term in chain(*loop.field.values()):
+        unique = len(set(term.uncertain)) == len(term.uncertain)
+        need(unique, "field", "affine in every uncertain parameter", term.uncertain)
 
 
 def prove(document: dict[str, Any], loop: Loop, budget: Budget) -> Result:
     """Verify a proof."""
-    for term in (term for terms in loop.field.values() for term in terms):  # else the ends would not decide
-        unique = len(set(term.uncertain)) == len(term.uncertain)
-        need(unique, "field", "affine in every uncertain parameter", term.uncertain)
-    function, potential = read_function(document["V"], loop), SignedSum()
-    for term in function:
-        add(potential, ((), term.exponents, term.odd), term.number, budget)
-    claims, rate = read_claims(document["claims"], loop), time_derivative(function, loop, budget)
-    witnesses = iter(read_list(document["witnesses"], "witnesses", 0, MAX_OBLIGATIONS))
-    seen, degrees = set(), dict[str, int]()
-    for name, degree, polynomial in obligations(potential, rate, claims, loop, budget):
-        first = degrees.setdefault("dV/dt" if name.split()[0] in ("decrease", "rate") else "V", degree)
-        need(degree == first, f"degree at {name}", f"{first} as before", degree)
-        key = frozenset(polynomial.items())
-        if key not in seen:
-            seen.add(key)
-            check_witness(name, polynomial, next(witnesses, "none"), loop, budget)
-    need(next(witnesses, None) is None, "witnesses", f"{len(seen)} in number", len(document["witnesses"]))
-    lines = describe_claims(loop, claims, degrees["V"], degrees["dV/dt"])
+    check_affine(loop)
+    function, claims, degrees = read_function(document["V"], loop), read_claims(document["claims"], loop), [0, 0]
+    rate = time_derivative(function, loop, budget)
+
+    def consistent() -> Iterator[Obligation]:
+        for degree, obligation in obligations(collect(function, budget), rate, claims, loop, budget):
+            kind = obligation.name.split()[0] in ("decrease", "rate", "decay")
+            degrees[kind] = degrees[kind] or degree
+            need(degree == degrees[kind], f"degree at {obligation.name}", f"{degrees[kind]} as before", degree)
+            yield obligation
+
+    check_witnesses(document["witnesses"], consistent(), loop.domain == "cells", budget)
+    lines = describe_claims(loop, claims, *degrees)
     return Result("proved", (*describe(loop), f"V = {sum_text(function, loop)}", *lines))
 
 
@@ -622,6 +844,7 @@ def read_values(value: Any, where: str, names: Iterable[str]) -> dict[str, Fract
 def refute(document: dict[str, Any], loop: Loop, budget: Budget) -> Result:
     """Verify that a point is an equilibrium of Filippov's inclusion."""
     need(loop.domain == "cells", "the domain of a refutation", "cells", loop.domain)
+    need(not loop.roots and not loop.lifts, "roots and lifts of a refutation", "empty", [*loop.roots, *loop.lifts])
     refutation = read_object(document["refutation"], "refutation", ("parameters", "point", "weights"))
     values = read_values(refutation["parameters"], "parameters", loop.uncertain)
     for name, (low, high) in loop.uncertain.items():
@@ -649,7 +872,166 @@ def limit_of(
     flags = [index for index, odd in enumerate(term.odd) if odd]
     share = sum(share * prod(cell[index] for index in flags) for share, cell in mixture)
     factors: list[Number] = [term.number, share, *(values[name] for name in term.uncertain)]
-    return multiply(factors, map(abs, point), term.exponents, budget)
+    return multiply(factors, map(abs, point), tuple(map(int, term.exponents)), budget)
+
+
+# ---------------------------------------------------------------- closed loops: bounds
+
+
+@dataclass(frozen=True)
+class InvariantSet:
+    """V <= 1, with what its decay is spent on: the input, its rate of change and the other sets."""
+
+    function: list[Term]
+    decay: Fraction
+    shares: list[Fraction]
+    borrowed: list[Fraction]
+
+
+@dataclass(frozen=True)
+class Input:
+    """A function of time within limits, and what it can do to the outputs: a bound and weights of sets for each."""
+
+    name: str
+    limits: list[Fraction]
+    sets: list[InvariantSet]
+    bounds: dict[str, tuple[Fraction, list[Fraction]]]
+
+
+def read_parts(value: Any, where: str, count: int, whole: Fraction) -> list[Fraction]:
+    """Read non-negative numbers of limited sum."""
+    parts = [read_rational(entry, where) for entry in read_list(value, where, count, count)]
+    need(all(part >= 0 for part in parts) and sum(parts) <= whole, where, f"non-negative, sum <= {whole}", value)
+    return parts
+
+
+def read_set(value: Any, where: str, index: int, count: int, limits: list[Fraction], loop: Loop) -> InvariantSet:
+    """Read a set; the loop's states include the input if this has a limited rate of change."""
+    entry = read_object(value, where, ("V", "decay", "shares", "borrowed"))
+    decay = read_rational(entry["decay"], f"{where} decay", positive=True)
+    shares = read_parts(entry["shares"], f"{where} shares", len(limits), decay)
+    borrowed = read_parts(entry["borrowed"], f"{where} borrowed", count, decay - sum(shares))
+    need(borrowed[index] == 0, f"{where} borrowed", "zero for the set itself", entry["borrowed"])
+    return InvariantSet(read_terms(entry["V"], f"{where} V", loop), decay, shares, borrowed)
+
+
+def read_input(name: str, value: Any, outputs: Iterable[str], loop: Loop) -> Input:
+    """Read an input."""
+    entry = read_object(value, f"input {name}", ("limits", "sets", "bounds"))
+    where, bounds = f"limits of {name}", read_object(entry["bounds"], f"bounds of {name}", outputs)
+    need(list(bounds) == list(outputs), f"bounds of {name}", "in the order of the outputs", list(bounds))
+    limits = [read_rational(limit, where, positive=True) for limit in read_list(entry["limits"], where, 1, 2)]
+    entries = read_list(entry["sets"], f"sets of {name}", 1, MAX_SETS)
+    own = replace(loop, weights=loop.weights | ({name: 1} if len(limits) == 2 else {}), uncertain={})
+    sets = [read_set(e, f"set {i} of {name}", i, len(entries), limits, own) for i, e in enumerate(entries)]
+    pairs = dict[str, tuple[Fraction, list[Fraction]]]()
+    for output, pair in bounds.items():
+        where = f"bound of {output} for {name}"
+        number = read_rational(read_object(pair, where, ("bound", "weights"))["bound"], where, positive=True)
+        pairs[output] = number, read_parts(pair["weights"], f"{where} weights", len(sets), Fraction(1))
+    return Input(name, limits, sets, pairs)
+
+
+def check_linear(loop: Loop, inputs: Collection[str]) -> None:
+    """Check that every term of the field is linear, in a state or in an input, and that every input occurs."""
+    for term in chain(*loop.field.values()):
+        count = sum(name in inputs for name in term.uncertain)
+        need(sum(term.exponents) + count == 1, "field", "linear in states and inputs", term.uncertain)
+    for name in inputs:
+        need(any(name in term.uncertain for term in chain(*loop.field.values())), f"input {name}", "used", "none")
+
+
+def read_form(terms: list[Term], size: int, degree: int, where: str, budget: Budget) -> Polynomial:
+    """Write terms as a form of given degree in as many variables."""
+    form = restrict(collect(pad_terms(terms, size), budget), whole_space(size), {}, budget)
+    need(degree_of(form, where) == degree, where, f"of degree {degree}", degree_of(form, where))
+    return form
+
+
+def alone(loop: Loop, one: Input, inputs: Collection[str]) -> Loop:
+    """Return the loop with one input alone, this and, where it is limited, its rate of change being states."""
+    extra = [one.name, f"d{one.name}/dt"][: len(one.limits)]
+    states, size = len(loop.weights), len(loop.weights) + len(extra)
+    field = dict[str, list[Term]]()
+    for state, terms in loop.field.items():
+        field[state] = pad_terms([term for term in terms if not set(term.uncertain) & set(inputs)], size)
+        for term in terms:
+            if one.name in term.uncertain:
+                others = tuple(name for name in term.uncertain if name != one.name)
+                field[state].append(linear_term(term.number, others, states, size))
+    field |= {name: [] for name in extra}
+    if len(extra) == 2:
+        field[one.name] = [linear_term(Fraction(1), (), states + 1, size)]
+    return replace(loop, weights=loop.weights | dict.fromkeys(extra, 1), field=field)
+
+
+def linear_term(number: Fraction, uncertain: tuple[str, ...], index: int, size: int) -> Term:
+    """Return a number times parameters times one variable."""
+    return Term(number, uncertain, tuple(int(i == index) for i in range(size)), tuple(i == index for i in range(size)))
+
+
+def bound_obligations(
+    loop: Loop, one: Input, inputs: Collection[str], outputs: dict[str, list[Term]], budget: Budget
+) -> Iterator[Obligation]:
+    """Yield that the sets are invariant together and that the outputs are bounded on them."""
+    driven, states = alone(loop, one, inputs), len(loop.weights)
+    size = len(driven.weights)
+    cell, squares = whole_space(size), [power_sum([i], size, 2) for i in range(states, size)]
+    forms = [read_form(entry.function, size, 2, f"V {i} of {one.name}", budget) for i, entry in enumerate(one.sets)]
+    for (i, entry), form in zip(enumerate(one.sets), forms, strict=True):
+        own = form.get(tuple(2 * (j == states) for j in range(size)), 0)
+        need(own * one.limits[0] ** 2 <= 1, f"V {i} of {one.name}", "at most 1 for the input alone", "more")
+        rate = time_derivative(pad_terms(entry.function, size), driven, budget)
+        supply = add_scaled({}, -entry.decay, form, budget)
+        for share, limit, square in zip(entry.shares, one.limits, squares, strict=True):
+            supply = add_scaled(supply, share / limit**2, square, budget)
+        for share, other in zip(entry.borrowed, forms, strict=True):
+            supply = add_scaled(supply, share, other, budget)
+        for vertex in vertices_of(loop):
+            left = add_scaled(supply, Fraction(-1), restrict(rate, cell, vertex, budget), budget)
+            yield Obligation(named_vertex(f"invariant {one.name} {i}", vertex), left, size)
+    size = states + len(one.limits) - 1
+    for output, (bound, weights) in one.bounds.items():
+        form = read_form(outputs[output], size, 1, f"output {output}", budget)
+        left = add_scaled({}, Fraction(-1), add_product({}, form, form, budget), budget)
+        for weight, entry in zip(weights, one.sets, strict=True):
+            left = add_scaled(left, weight * bound**2, read_form(entry.function, size, 2, "V", budget), budget)
+        yield Obligation(f"output {one.name} {output}", left, size)
+
+
+def describe_bounds(loop: Loop, inputs: list[Input], outputs: dict[str, list[Term]]) -> list[str]:
+    """Describe what is bounded, and why."""
+    lines = [f"output {output} = {sum_text(terms, loop)}" for output, terms in outputs.items()]
+    for one in inputs:
+        limits = zip((one.name, f"d{one.name}/dt"), one.limits, strict=False)
+        lines.append(f"input, measurable in time: {', '.join(f'|{name}| <= {limit}' for name, limit in limits)}")
+        own = replace(loop, weights=loop.weights | ({one.name: 1} if len(one.limits) == 2 else {}))
+        for i, entry in enumerate(one.sets):
+            text = f"V{i} = {sum_text(entry.function, own)}, decay {entry.decay}"
+            lines.append(f"invariant under {one.name} alone: {text}")
+        lines += [f"under {one.name} alone: |{output}| <= {bound}" for output, (bound, _) in one.bounds.items()]
+    totals = {output: sum(one.bounds[output][0] for one in inputs) for output in outputs}
+    need(max(map(length, totals.values())) <= MAX_BITS, "a sum of bounds", "of at most 599 digits", "a longer one")
+    bounds = ", ".join(f"|{output}| <= {total}" for output, total in totals.items())
+    return [*lines, f"conclusion: from rest, under all inputs within their limits, {bounds} at all times"]
+
+
+def bound(document: dict[str, Any], loop: Loop, budget: Budget) -> Result:
+    """Verify bounds of linear outputs of a linear loop under inputs within limits."""
+    names = document["inputs"]
+    plain = loop.domain == "reals" and not loop.roots
+    need(plain, "the domain of a bound", "reals, without roots", loop.domain)
+    check_affine(loop)
+    check_linear(loop, names)
+    texts = read_names(document["outputs"], "outputs", 1, MAX_OUTPUTS)
+    own = replace(loop, uncertain={})
+    outputs = {output: read_terms(terms, f"output {output}", own) for output, terms in texts.items()}
+    inputs = [read_input(name, value, outputs, loop) for name, value in names.items()]
+    count = sum(len(one.sets) * len(vertices_of(loop)) + len(outputs) for one in inputs)
+    need(count <= MAX_OBLIGATIONS, "obligations", f"at most {MAX_OBLIGATIONS}", count)
+    pairs = chain.from_iterable(bound_obligations(loop, one, names, outputs, budget) for one in inputs)
+    check_witnesses(document["witnesses"], pairs, False, budget)
+    return Result("proved", (*describe(loop), *describe_bounds(loop, inputs, outputs)))
 
 
 # ---------------------------------------------------------------- polynomials: reading and writing
@@ -955,9 +1337,14 @@ def check(text: str) -> Result:
     need(type(version) is int and version == 1, "format", "the integer 1", version)
     if "polynomial" in document:
         return check_polynomial(document, budget)
-    is_refutation = "refutation" in document
-    read_object(document, "the file", (*LOOP_KEYS, "refutation") if is_refutation else PROOF_KEYS)
-    return (refute if is_refutation else prove)(document, read_loop(document), budget)
+    kinds = {
+        "refutation": ((*LOOP_KEYS, "refutation"), refute),
+        "inputs": (BOUND_KEYS, bound),
+        "V": (PROOF_KEYS, prove),
+    }
+    keys, verify = kinds[next((key for key in kinds if key in document), "V")]
+    read_object(document, "the file", keys)
+    return verify(document, read_loop(document), budget)
 
 
 def read_file(name: str) -> str:

@@ -1,7 +1,10 @@
-"""Files are written whole or not at all."""
+"""Files and folders are written whole or not at all."""
 
 import os
+import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from quakedesign.errors import OutputError
@@ -28,3 +31,34 @@ def write_whole(path: Path, content: str | bytes) -> None:
                 raise
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror}. Choose a folder that you may write.") from None
+
+
+@contextmanager
+def whole_folder(target: Path) -> Iterator[Path]:
+    """Folder to fill that takes its place, and that of an earlier one, when the block ends without an error.
+
+    Raises
+    ------
+    OutputError
+        When it cannot be written; nothing is left behind then, and an earlier folder stays.
+    """
+    try:
+        partial = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.absolute().parent))
+        try:
+            yield partial
+            partial.chmod(0o755)
+            _swap(partial, target)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+    except OSError as error:
+        raise OutputError(f"{target} cannot be written: {error.strerror}. Choose another folder.") from None
+
+
+def _swap(partial: Path, target: Path) -> None:
+    if not target.exists():
+        partial.rename(target)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{target.name}-old-", dir=target.absolute().parent))
+    os.replace(target, old / target.name)
+    os.replace(partial, target)
+    shutil.rmtree(old, ignore_errors=True)

@@ -1,11 +1,11 @@
-"""Files are written whole or not at all."""
+"""Files and folders are written whole or not at all."""
 
 import os
 
 import pytest
 
 from quakedesign.errors import OutputError
-from quakedesign.output import write_whole
+from quakedesign.output import whole_folder, write_whole
 
 
 @pytest.mark.parametrize(("content", "held"), [("μ = ½\n", "μ = ½\n".encode()), (b"\x00\xff", b"\x00\xff")])
@@ -42,3 +42,38 @@ def test_the_old_file_survives_a_crash_while_writing(tmp_path, monkeypatch):
         write_whole(path, "new")
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["result"]
+
+
+def test_a_folder_appears_whole_and_replaces_an_earlier_one(tmp_path):
+    target = tmp_path / "results"
+    for text in ("first", "second"):
+        with whole_folder(target) as partial:
+            assert not (target / text).exists()
+            write_whole(partial / text, text)
+        assert os.listdir(target) == [text]
+    assert target.stat().st_mode & 0o777 == 0o755
+    assert os.listdir(tmp_path) == ["results"]
+
+
+def test_an_earlier_folder_survives_a_failure(tmp_path):
+    target = tmp_path / "results"
+    with whole_folder(target) as partial:
+        write_whole(partial / "old", "old")
+
+    def fill():
+        with whole_folder(target) as partial:
+            write_whole(partial / "new", "new")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fill()
+    assert os.listdir(target) == ["old"]
+    assert os.listdir(tmp_path) == ["results"]
+
+
+def test_a_folder_in_no_folder_is_one_clear_message(tmp_path):
+    with (
+        pytest.raises(OutputError, match=r"nowhere/results cannot be written"),
+        whole_folder(tmp_path / "nowhere" / "results"),
+    ):
+        pass

@@ -1,11 +1,14 @@
 """The exact decision: whether a certificate proves, or refutes, what it claims."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from itertools import product
 
 from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, loop_of, require
-from quakedesign.certificates.obligations import claimed
+from quakedesign.certificates.error_coordinates import in_error_coordinates, without_inputs
+from quakedesign.certificates.obligations import Obligation, claimed
+from quakedesign.certificates.response import Response
+from quakedesign.certificates.response_obligations import demanded, require_sound
 from quakedesign.certificates.witnesses import proves
 from quakedesign.controllers import LoopField, Subject, laws, model_of
 from quakedesign.symbolic.terms import Term, value
@@ -17,7 +20,10 @@ def check(certificate: Certificate, law: Subject | None = None) -> Verdict:
     if certificate.refutation is not None:
         _check_equilibrium(certificate.loop, certificate.refutation)
         return Verdict.REFUTED
-    _check_proof(certificate)
+    if certificate.response is not None:
+        _check_response(certificate, certificate.response)
+    else:
+        _check_proof(certificate)
     return Verdict.PROVED
 
 
@@ -30,6 +36,9 @@ def _same_field(loop: Loop, law: Subject | None) -> None:
     )
     name, model = model_of(loop.law if law is None else law)
     require(isinstance(law, LoopField) or name == loop.law, f"the certificate is about {loop.law!r}, not {name!r}.")
+    if loop.inputs:
+        loop = without_inputs(loop)
+        model = model if {s.name for s in model.states} == set(loop.states) else in_error_coordinates(model)
     names = (model.gains, model.constants, model.uncertain)
     given = (loop.gains, loop.constants, loop.uncertain)
     require(
@@ -60,6 +69,7 @@ def _sorted(loop: Loop, sums: Mapping[str, tuple[Term, ...]]) -> dict[str, list[
 
 def _check_proof(certificate: Certificate) -> None:
     loop, claims = certificate.loop, certificate.claims
+    require(not loop.inputs, "a proof of stability is about a loop without inputs.")
     second = "decrease" if loop.domain == "cells" else "rate"
     required, allowed = {"positive", second}, {f"bound_{state}" for state in loop.states}
     allowed |= {"decay"} if second == "decrease" else set()
@@ -71,15 +81,25 @@ def _check_proof(certificate: Certificate) -> None:
     uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.ranges)
     require(not uncertain, "V must not depend on an uncertain parameter.")
     _check_roots(loop)
+    _check_witnesses(certificate, claimed(loop, certificate.lyapunov, claims))
+
+
+def _check_response(certificate: Certificate, response: Response) -> None:
+    require_sound(certificate.loop, response)
+    _check_witnesses(certificate, demanded(certificate.loop, response))
+
+
+def _check_witnesses(certificate: Certificate, obligations: Iterable[Obligation]) -> None:
+    """Refuse unless every different obligation has its witness, in order, and it is exact."""
     known = set[tuple]()
     expected = list[str]()
-    for one in claimed(loop, certificate.lyapunov, claims):
+    for one in obligations:
         if one.key in known:
             continue
         known.add(one.key)
         expected.append(one.name)
         require(one.name in certificate.witnesses, f"the witness of {one.name!r} is missing.")
-        holds = proves(one, certificate.witnesses[one.name], loop.domain)
+        holds = proves(one, certificate.witnesses[one.name], certificate.loop.domain)
         require(holds, f"the witness of {one.name!r} does not prove its polynomial.")
     extra = "there are witnesses that no obligation needs, or in another order."
     require(expected == list(certificate.witnesses), extra)
@@ -95,7 +115,8 @@ def _check_roots(loop: Loop) -> None:
 
 
 def _check_equilibrium(loop: Loop, equilibrium: Equilibrium) -> None:
-    require(loop.domain == "cells" and not loop.lifts and not loop.roots, "an equilibrium needs cells without lifts.")
+    plain = loop.domain == "cells" and not (loop.lifts or loop.roots or loop.inputs)
+    require(plain, "an equilibrium needs cells without lifts.")
     point, parameters = equilibrium.point, equilibrium.parameters
     require(set(point) == set(loop.states) and any(point.values()), "the point must be away from the origin.")
     require(

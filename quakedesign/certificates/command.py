@@ -15,6 +15,8 @@ from quakedesign.certificates.premises import (
     largest_matched_rate,
     least_authority,
 )
+from quakedesign.certificates.response import Response
+from quakedesign.certificates.tracking import peaks_covered
 from quakedesign.errors import CertificateError
 from quakedesign.fault import Fault, load_fault
 from quakedesign.sos import Answer, Positivity
@@ -90,19 +92,35 @@ def _covers(certificate: Certificate, fault: Fault) -> list[str]:
     for name, (low, high) in ranges.items():
         if not loop.uncertain[name][0] <= low <= high <= loop.uncertain[name][1]:
             raise CertificateError(f"the certified range of {name} does not cover {fault.name}")
-    return said
+    return [*said, *(peaks_covered(certificate, fault) if certificate.response is not None else [])]
 
 
 def statement(certificate: Certificate) -> list[str]:
     """What a certificate says, in lines."""
     loop, symbols = certificate.loop, certificate.loop.symbols
-    lines = [f"law {loop.law}, field re-derived from the law and equal to the file's"]
+    which = "field but for its inputs" if loop.inputs else "field"
+    lines = [f"law {loop.law}, {which} re-derived from the law and equal to the file's"]
     lines.append(", ".join(f"{name} = {v}" for name, v in loop.parameters.items()))
     lines.append(", ".join(f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()))
     lines += [f"{state}' = {from_terms(terms, symbols)}" for state, terms in loop.field.items()]
     if certificate.refutation is not None:
         point = ", ".join(f"{name}: {v}" for name, v in certificate.refutation.point.items())
         return [*lines, f"Filippov equilibrium away from the origin, in cell coordinates {point}"]
+    if certificate.response is not None:
+        return [*lines, *_response(certificate, certificate.response)]
     lines.append("V = " + " + ".join(f"({from_terms([term], symbols)})" for term in certificate.lyapunov))
     lines.append(", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
+    return lines
+
+
+def _response(certificate: Certificate, response: Response) -> list[str]:
+    """Limits of the inputs and the bounds of the outputs."""
+    loop, lines = certificate.loop, ["start: all states zero"]
+    for name, limits in loop.inputs.items():
+        words = (f"|{name}| <= {limits[0]}", *(f"|{name}'| <= {rate}" for rate in limits[1:]))
+        lines.append(f"measurable {' and '.join(words)}")
+    for output, row in response.outputs.items():
+        parts = ", ".join(f"{name} {part.bounds[output].bound}" for name, part in response.parts.items())
+        line = f"{output} = {from_terms(row, loop.symbols)}"
+        lines.append(f"|{output}| <= {response.total(output)} for ever, {line} (of this: {parts})")
     return lines

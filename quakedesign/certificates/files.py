@@ -2,13 +2,14 @@
 
 import json
 import re
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Witness
+from quakedesign.certificates.response_files import limits_of, plain_response, read_response
+from quakedesign.certificates.term_files import LIMITS, plain_terms, read_terms, texts
 from quakedesign.errors import CertificateError
 from quakedesign.output import write_whole
 from quakedesign.sos.exact.proofs import Square
@@ -27,19 +28,8 @@ from quakedesign.sos.exact.strict import (
     read_rationals,
     with_keys,
 )
-from quakedesign.symbolic.terms import Term
 
 _LAW = re.compile(r"[A-Za-z0-9_-]{1,40}")
-_LIMITS = {
-    "roots": 4,
-    "lifts": 4,
-    "states": 6,
-    "uncertain": 8,
-    "parameters": 64,
-    "terms": 200,
-    "basis": 200,
-    "witnesses": 4096,
-}
 
 
 def load_certificate(path: str | Path) -> Certificate:
@@ -86,13 +76,16 @@ def parse_certificate(text: str) -> Certificate:
 
 def certificate_of(raw: Any) -> Certificate:
     """Certificate from a parsed file. Raises CertificateError as `load_certificate`."""
-    return _certificate(with_keys(raw, _PROOF if isinstance(raw, dict) and "refutation" not in raw else _REFUTATION))
+    kinds = {"refutation": _REFUTATION, "inputs": _BOUND}
+    keys = next((keys for word, keys in kinds.items() if isinstance(raw, dict) and word in raw), _PROOF)
+    return _certificate(with_keys(raw, keys))
 
 
 _COMMON = {"format", "law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field"}
 _WITNESS = {"obligation", "multiplier", "squares", "equalities", "inequalities"}
 _PROOF = _COMMON | {"V", "claims", "witnesses"}
 _REFUTATION = _COMMON | {"refutation"}
+_BOUND = _COMMON | {"inputs", "outputs", "witnesses"}
 
 
 def _certificate(raw: dict[str, Any]) -> Certificate:
@@ -101,14 +94,16 @@ def _certificate(raw: dict[str, Any]) -> Certificate:
     if "refutation" in raw:
         return Certificate(loop=loop, refutation=_equilibrium(raw["refutation"]))
     witnesses: dict[str, Witness] = {}
-    for entry in listed(raw["witnesses"], "witnesses", _LIMITS["witnesses"]):
+    for entry in listed(raw["witnesses"], "witnesses", LIMITS["witnesses"]):
         name = with_keys(entry, _WITNESS)["obligation"]
         need(isinstance(name, str) and name not in witnesses, "an obligation must be named once, by a text")
         witnesses[name] = _witness(entry, loop)
+    if "inputs" in raw:
+        return Certificate(loop=loop, response=read_response(raw, loop), witnesses=witnesses)
     return Certificate(
         loop=loop,
-        lyapunov=_terms(raw["V"], loop, tuple(loop.states)),
-        claims=read_rationals(raw["claims"], "claims", 3 + _LIMITS["states"]),
+        lyapunov=read_terms(raw["V"], loop, tuple(loop.states)),
+        claims=read_rationals(raw["claims"], "claims", 3 + LIMITS["states"]),
         witnesses=witnesses,
     )
 
@@ -116,14 +111,15 @@ def _certificate(raw: dict[str, Any]) -> Certificate:
 def _loop(raw: dict[str, Any]) -> Loop:
     need(isinstance(raw["law"], str) and _LAW.fullmatch(raw["law"]) is not None, "law must be a short name")
     need(raw["domain"] in ("cells", "reals"), "domain must be cells or reals")
-    gains = read_rationals(raw["gains"], "gains", _LIMITS["parameters"])
-    constants = read_rationals(raw["constants"], "constants", _LIMITS["parameters"])
-    states = objected(raw["states"], "states", _LIMITS["states"])
-    uncertain = objected(raw["uncertain"], "uncertain", _LIMITS["uncertain"])
-    lifts = objected(raw["lifts"], "lifts", _LIMITS["lifts"])
-    roots = objected(raw["roots"], "roots", _LIMITS["roots"])
-    names = [*gains, *constants, *states, *uncertain, *roots, *lifts]
-    need(len(set(names)) == len(names) and len(gains) + len(constants) <= _LIMITS["parameters"], "names must differ")
+    gains = read_rationals(raw["gains"], "gains", LIMITS["parameters"])
+    constants = read_rationals(raw["constants"], "constants", LIMITS["parameters"])
+    states = objected(raw["states"], "states", LIMITS["states"])
+    uncertain = objected(raw["uncertain"], "uncertain", LIMITS["uncertain"])
+    lifts = objected(raw["lifts"], "lifts", LIMITS["lifts"])
+    roots = objected(raw["roots"], "roots", LIMITS["roots"])
+    inputs = objected(raw.get("inputs", {}), "inputs", LIMITS["inputs"])
+    names = [*gains, *constants, *states, *uncertain, *roots, *lifts, *inputs]
+    need(len(set(names)) == len(names) and len(gains) + len(constants) <= LIMITS["parameters"], "names must differ")
     need(all(NAME.fullmatch(n) for n in names) and states != {}, "states and uncertain need names")
     top = 12 if raw["domain"] == "cells" else 1
     need(all(type(w) is int and 1 <= w <= top for w in states.values()), f"weights must be integers from 1 to {top}")
@@ -144,10 +140,11 @@ def _loop(raw: dict[str, Any]) -> Loop:
         roots={name: _root(entry, known) for name, entry in roots.items()},
     )
     powers = (*states, *lifts)
-    arguments = {lift: _terms(lifts[lift], bare, powers[: len(states) + i]) for i, lift in enumerate(lifts)}
+    arguments = {lift: read_terms(lifts[lift], bare, powers[: len(states) + i]) for i, lift in enumerate(lifts)}
     need(bare.domain == "cells" or not lifts, "lifts belong on cells")
     rates = with_keys(raw["field"], set(states))
-    return replace(bare, lifts=arguments, field={state: _terms(rates[state], bare, powers) for state in states})
+    moved = replace(bare, inputs={name: limits_of(entry) for name, entry in inputs.items()})
+    return replace(moved, lifts=arguments, field={state: read_terms(rates[state], moved, powers) for state in states})
 
 
 def _root(raw: Any, known: dict[str, Fraction]) -> tuple[str, tuple[Fraction, Fraction]]:
@@ -156,42 +153,17 @@ def _root(raw: Any, known: dict[str, Fraction]) -> tuple[str, tuple[Fraction, Fr
     return of, (read_rational(low), read_rational(high))
 
 
-def _terms(raw: Any, loop: Loop, powers: Sequence[str]) -> tuple[Term, ...]:
-    return tuple(_term(entry, loop, powers) for entry in listed(raw, "terms", _LIMITS["terms"]))
-
-
-def _term(raw: Any, loop: Loop, powers: Sequence[str]) -> Term:
-    number, names, entries = listed(raw, "a term", length=3)
-    coefficient = read_rational(number)
-    need(coefficient != 0, "a term must not be zero")
-    known = {*loop.gains, *loop.constants, *loop.ranges}
-    parameters = tuple(listed(names, "parameters", 32))
-    need(all(isinstance(n, str) and n in known for n in parameters), "a term has an unknown parameter")
-    factors = tuple(_factor(entry, powers) for entry in listed(entries, "factors", len(powers)))
-    need(len({f[0] for f in factors}) == len(factors), "a state occurs twice in a term")
-    return Term(coefficient, parameters, factors)
-
-
-def _factor(raw: Any, powers: Sequence[str]) -> tuple[str, Fraction, str]:
-    state, exponent, kind = listed(raw, "a factor", length=3)
-    power = read_rational(exponent)
-    need(isinstance(state, str) and state in powers, "a factor has an unknown state")
-    need(
-        kind in ("s", "a") and 0 <= power <= 24 and (kind == "s" or power > 0), "a factor has a wrong kind or exponent"
-    )
-    return state, power, kind
-
-
 def _witness(raw: dict[str, Any], loop: Loop) -> Witness:
-    multiplier = read_polynomial(raw["multiplier"], "multiplier", None, _LIMITS["basis"])
+    multiplier = read_polynomial(raw["multiplier"], "multiplier", None, LIMITS["basis"])
     need(multiplier != {}, "a multiplier must not be empty")
     variables = len(next(iter(multiplier)))
-    need(len(loop.states) <= variables <= len(loop.states) + len(loop.lifts) + 1, "a multiplier has a wrong key")
+    more = 2 if loop.inputs else len(loop.lifts) + 1
+    need(len(loop.states) <= variables <= len(loop.states) + more, "a multiplier has a wrong key")
     squares = _squares(raw["squares"], variables, loop, ())
-    conditions = listed(raw["inequalities"], "inequalities", _LIMITS["lifts"])
+    conditions = listed(raw["inequalities"], "inequalities", LIMITS["lifts"])
     for k, entries in enumerate(conditions):
         squares += _squares(entries, variables, loop, (variables + k,))
-    cofactors = listed(raw["equalities"], "equalities", _LIMITS["lifts"] + 1)
+    cofactors = listed(raw["equalities"], "equalities", LIMITS["lifts"] + 1)
     return Witness(
         multiplier=multiplier,
         squares=tuple(squares),
@@ -207,7 +179,7 @@ def _squares(raw: Any, variables: int, loop: Loop, condition: tuple[int, ...]) -
         times = read_exponents(square["times"], variables, 1 if loop.domain == "cells" else 0)
         gram = [read_rational(v) for v in listed(square["gram"], "gram")]
         common_grid(gram)
-        basis = tuple(read_exponents(b, variables, 999) for b in listed(square["basis"], "basis", _LIMITS["basis"]))
+        basis = tuple(read_exponents(b, variables, 999) for b in listed(square["basis"], "basis", LIMITS["basis"]))
         size = len(basis)
         need(0 < size == len(set(basis)), "a basis must be a list of different exponents")
         found.append(
@@ -224,8 +196,8 @@ def _equilibrium(raw: Any) -> Equilibrium:
     entries = with_keys(raw, {"parameters", "point", "weights"})
     weights = objected(entries["weights"], "weights", 64)
     return Equilibrium(
-        parameters=read_rationals(entries["parameters"], "parameters", _LIMITS["uncertain"]),
-        point=read_rationals(entries["point"], "point", _LIMITS["states"]),
+        parameters=read_rationals(entries["parameters"], "parameters", LIMITS["uncertain"]),
+        point=read_rationals(entries["point"], "point", LIMITS["states"]),
         weights={cell: read_rational(w) for cell, w in weights.items()},
     )
 
@@ -235,36 +207,31 @@ def certificate_text(certificate: Certificate) -> str:
     return json.dumps(_plain(certificate), ensure_ascii=True, separators=(",", ":"), indent=None) + "\n"
 
 
-def _texts(values: Mapping[str, Fraction]) -> dict[str, str]:
-    return {name: str(v) for name, v in values.items()}
-
-
-def _plain_terms(terms: tuple[Term, ...]) -> list[Any]:
-    return [[str(t.coefficient), list(t.parameters), [[s, str(e), k] for s, e, k in t.factors]] for t in terms]
-
-
 def _plain(certificate: Certificate) -> dict[str, Any]:
     loop = certificate.loop
     plain: dict[str, Any] = {
         "format": 1,
         "law": loop.law,
-        "gains": _texts(loop.gains),
-        "constants": _texts(loop.constants),
+        "gains": texts(loop.gains),
+        "constants": texts(loop.constants),
         "states": dict(loop.states),
         "domain": loop.domain,
         "uncertain": {name: [str(low), str(high)] for name, (low, high) in loop.uncertain.items()},
         "roots": {name: [of, str(low), str(high)] for name, (of, (low, high)) in loop.roots.items()},
-        "lifts": {lift: _plain_terms(terms) for lift, terms in loop.lifts.items()},
-        "field": {state: _plain_terms(terms) for state, terms in loop.field.items()},
+        "lifts": {lift: plain_terms(terms) for lift, terms in loop.lifts.items()},
+        "field": {state: plain_terms(terms) for state, terms in loop.field.items()},
     }
     if certificate.refutation is not None:
         found = certificate.refutation
         parts = {"parameters": found.parameters, "point": found.point, "weights": found.weights}
-        return plain | {"refutation": {key: _texts(values) for key, values in parts.items()}}
+        return plain | {"refutation": {key: texts(values) for key, values in parts.items()}}
+    witnesses = [_plain_witness(name, witness) for name, witness in certificate.witnesses.items()]
+    if certificate.response is not None:
+        return plain | plain_response(certificate.response, loop) | {"witnesses": witnesses}
     return plain | {
-        "V": _plain_terms(certificate.lyapunov),
-        "claims": _texts(certificate.claims),
-        "witnesses": [_plain_witness(name, witness) for name, witness in certificate.witnesses.items()],
+        "V": plain_terms(certificate.lyapunov),
+        "claims": texts(certificate.claims),
+        "witnesses": witnesses,
     }
 
 

@@ -183,7 +183,7 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
     """Premises of the linear feedback: sectors inside the certified ones; constant reference; vanishing disturbance.
 
     The certificate speaks about constant references and disturbances that vanish at the equilibrium. The last two
-    premises say by how much a task leaves that (ERRATA 8, 11): errors then stay bounded, but no bound is certified.
+    premises say by how much a task leaves that (ERRATA 8, 11): errors then stay bounded, as certified peaks say.
 
     Raises
     ------
@@ -223,14 +223,14 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
             required=float(peak_rate),
             certified=0.0,
             unit="m/s",
-            note="certified about constant references; a moving one leaves a bounded error",
+            note="certified about constant references; for a moving one see the certified peaks",
         ),
         Premise(
             name="vanishing_disturbance",
             required=fault.disturbance.largest_explicit,
             certified=0.0,
             unit="m/s^2",
-            note="a disturbance that does not vanish leaves a bounded error, not certified",
+            note="for one that does not vanish see the certified peaks",
         ),
         *_limits_premise(fault, controller),
     ]

@@ -6,11 +6,11 @@ import sys
 
 from cyclopts import CycloptsError
 
-from quakedesign.cli import design, loop, plant, polynomial, proof
+from quakedesign.cli import campaign, design, figures, loop, plant, polynomial, proof
 from quakedesign.cli.shared import app
 from quakedesign.errors import QuakedesignError
 
-__all__ = ["app", "design", "loop", "main", "plant", "polynomial", "proof"]
+__all__ = ["app", "campaign", "design", "figures", "loop", "main", "plant", "polynomial", "proof"]
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -1,6 +1,7 @@
-"""Commands that simulate closed loops."""
+"""Commands about one closed loop: simulate it, see what sampling does to it, export its controller."""
 
 from pathlib import Path
+from typing import Any
 
 from quakedesign.cli.shared import Force, Gains, Json, app, console, new_file, print_json, progress
 
@@ -12,10 +13,20 @@ def simulate(
     *,
     controller: str = "none",
     gains: Gains = ("published",),
+    scale: str | None = None,
+    feedforward: str = "none",
     step: float | None = None,
+    duration: float | None = None,
     scheme: str = "continuous",
+    substeps: int = 1,
     method: str = "dormand-prince",
     plant: str = "smooth",
+    drift: float = 0.0,
+    perturbation: str | None = None,
+    slip_noise: float = 0.0,
+    rate_noise: float = 0.0,
+    differentiator_bound: float | None = None,
+    filter_order: int = 0,
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
@@ -29,15 +40,36 @@ def simulate(
     controller
         none, cta, dia or elqr.
     gains
-        published, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+        published, designed, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+    scale
+        λ of a sliding mode in place of that of the gains, decimal or p/q.
+    feedforward
+        none, nominal or centred: what a sliding mode adds to ν from what is known of the fault.
     step
         Length of one step in s; the fault's sampling time unless given.
+    duration
+        In s; the operation time unless given. Without a controller: the fault under its own disturbance.
     scheme
-        continuous.
+        continuous (the law in every stage of the integrator), or sampled and held: explicit, implicit, semi-implicit,
+        compensated.
+    substeps
+        Steps of the integrator per sample.
     method
-        dormand-prince or rk4.
+        dormand-prince or rk4; cvodes or idas for smooth loops.
     plant
         smooth (the paper's, for forward slip) or coulomb (set-valued friction: stick, slip, reversal).
+    drift
+        Velocity of the far end in m/s.
+    perturbation
+        Of the user's in m/s^2, added to the fault's own: an expression of slip, slip_rate and time.
+    slip_noise
+        Standard deviation of the measured slip in m.
+    rate_noise
+        Standard deviation of the measured slip rate in m/s.
+    differentiator_bound
+        λ_d in m/s^2: tell the law what a differentiator estimates from the slip.
+    filter_order
+        Of the differentiator.
     out
         NetCDF file to write.
     force
@@ -46,36 +78,192 @@ def simulate(
         Print JSON.
     """
     from quakedesign.fault import load_fault
-    from quakedesign.report.single import run_single
+    from quakedesign.report.single import chosen_controller, run_single
+    from quakedesign.simulation import Load, Measurement
+    from quakedesign.simulation import perturbation as read_perturbation
 
     new_file(out, "output file", force=force)
     found = load_fault(fault)
+    law = (
+        None
+        if controller == "none"
+        else chosen_controller(found, controller, gains, scale=scale, feedforward=feedforward)
+    )
+    pushed = None if perturbation is None else read_perturbation(perturbation)
     with progress() as tell:
         trajectory, premises = run_single(
             found,
-            controller,
-            gains,
+            law,
+            tell=lambda done: tell("simulation", done),
+            duration=duration,
+            load=Load(drift=drift, perturbation=pushed) if drift or pushed is not None else None,
+            noise=Measurement(slip_noise=slip_noise, rate_noise=rate_noise),
+            differentiator_bound=differentiator_bound,
+            filter_order=filter_order,
             step=step,
             scheme=scheme,
             method=method,
             plant=plant,
-            tell=lambda done: tell("simulation", done),
+            substeps=substeps,
         )
     if out is not None:
         trajectory.save(out)
-    metrics = trajectory.metrics.to_dict()
-    answer = {
+    if json:
+        print_json(_answer(trajectory, premises))
+    else:
+        _print_run(trajectory, premises)
+    return 0
+
+
+def _answer(trajectory: Any, premises: Any) -> dict[str, Any]:
+    metrics, energy = trajectory.metrics.to_dict(), trajectory.energy
+    return {
         "metrics": metrics,
         "premises": [p.to_dict() for p in premises],
         "events": dict(trajectory.events),
+        "energy": energy.to_dict() | {"relative_residual": energy.relative_residual} if energy else None,
         "steps": metrics["steps"],
         "seconds": metrics["seconds"],
         "run": dict(trajectory.provenance),
     }
+
+
+def _print_run(trajectory: Any, premises: Any) -> None:
+    from quakedesign.report.terminal import print_run
+
+    print_run(trajectory, premises, console())
+    if trajectory.energy:
+        print(f"  energy that the integration loses: {trajectory.energy.relative_residual:.2g} of the largest share")
+
+
+@app.command
+def sampling(
+    fault: str,
+    /,
+    *,
+    controller: str = "cta",
+    gains: Gains = ("designed",),
+    scale: Gains = (),
+    schemes: Gains = ("explicit", "implicit", "semi-implicit", "compensated"),
+    duration: float | None = None,
+    out: Path | None = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Show what sampling does: every scheme beside the published controllers, orders of accuracy, sensitivities.
+
+    Writes results.json and figures. Errors count after a quarter of each run; those with noise last a sixteenth of
+    the task.
+
+    Parameters
+    ----------
+    fault
+        Preset or path of a .toml file.
+    controller
+        cta, dia or elqr.
+    gains
+        designed, published, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+    scale
+        Further values of λ for a sliding mode, decimal or p/q.
+    schemes
+        To run the law with.
+    duration
+        Of the runs in s; the operation time unless given.
+    out
+        Folder to write; ./quakedesign-FAULT-sampling unless given.
+    force
+        Replace a folder of earlier results.
+    json
+        Print results.json on stdout.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.report.folder import prepare
+    from quakedesign.report.sampling import sampling_report
+    from quakedesign.report.sampling_output import print_sampling, write_sampling
+    from quakedesign.report.single import DESIGNED, chosen_controller
+    from quakedesign.synthesis import design
+
+    found = load_fault(fault)
+    folder = out or Path(f"quakedesign-{found.name}-sampling")
+    prepare(folder, force=force)
+    with progress() as tell:
+        tell("gains", 0.0)
+        law = design(found, controller) if gains == DESIGNED else chosen_controller(found, controller, gains)
+        report = sampling_report(found, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
+        results = write_sampling(report, folder)
+    if json:
+        print_json(results)
+    else:
+        print_sampling(report, console())
+        console().print(f"\nwritten: {folder}/ (results.json, figures)")
+    return 0
+
+
+@app.command
+def export(
+    fault: str,
+    /,
+    *,
+    controller: str = "cta",
+    gains: Gains = ("published",),
+    scale: str | None = None,
+    feedforward: str = "none",
+    step: float | None = None,
+    scheme: str = "explicit",
+    differentiator_bound: float | None = None,
+    filter_order: int = 0,
+    out: Path | None = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Write a controller as C for the computer of a laboratory: one function, called once per sample.
+
+    Parameters
+    ----------
+    fault
+        Preset or path of a .toml file.
+    controller
+        cta, dia or elqr.
+    gains
+        published, designed, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+    scale
+        λ of a sliding mode in place of that of the gains, decimal or p/q.
+    feedforward
+        none, nominal or centred.
+    step
+        Sampling period in s; the fault's unless given.
+    scheme
+        explicit, implicit, semi-implicit or compensated.
+    differentiator_bound
+        λ_d in m/s^2: measure the slip alone, and estimate the rest with a differentiator.
+    filter_order
+        Of the differentiator.
+    out
+        Folder to write; ./quakedesign-FAULT-CONTROLLER unless given.
+    force
+        Replace a folder that holds an earlier export.
+    json
+        Print JSON.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.report.exporting import export_answer, export_lines
+    from quakedesign.report.single import chosen_controller
+
+    found = load_fault(fault)
+    law = chosen_controller(found, controller, gains, scale=scale, feedforward=feedforward)
+    folder = out or Path(f"quakedesign-{found.name}-{controller}")
+    answer = export_answer(
+        found,
+        law,
+        folder,
+        step=step,
+        scheme=scheme,
+        differentiator_bound=differentiator_bound,
+        filter_order=filter_order,
+        force=force,
+    )
     if json:
         print_json(answer)
     else:
-        from quakedesign.report.terminal import print_run
-
-        print_run(trajectory, premises, console())
+        print("\n".join(export_lines(answer)))
     return 0

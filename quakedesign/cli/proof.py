@@ -1,50 +1,100 @@
 """Commands that prove, refute and re-check."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Json, app, console, new_file, print_json
+from quakedesign.cli.shared import Force, Gains, Json, app, console, new_file, print_json
+from quakedesign.errors import ParameterError
 
 
 @app.command
 def certify(
     law: str,
+    fault: str | None = None,
     /,
     *,
-    gains: Annotated[tuple[str, str, str, str], Parameter(allow_leading_hyphen=True)],
-    lipschitz: Annotated[str, Parameter(allow_leading_hyphen=True)],
-    gain_range: tuple[str, str] = ("1", "1"),
+    gains: Gains,
+    lipschitz: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    gain_range: tuple[str, str] | None = None,
+    box: str | None = None,
+    feedback: str | None = None,
+    step: str | None = None,
+    peaks: str | None = None,
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
-    """Prove or refute given gains of a sliding-mode law. Exit code 0 only if proved.
+    """Prove or refute given gains: of a sliding mode for a bound on |h'|, of the e-LQR on a fault.
+
+    Exit code 0 only if proved, and if the peaks that were asked for are certified.
 
     Parameters
     ----------
     law
-        cta or dia.
+        cta or another sliding mode; or elqr.
+    fault
+        For the e-LQR: preset or path of a .toml file.
     gains
-        Four exact numbers: decimals, exponents or p/q.
+        Exact numbers: decimals, exponents or p/q; four for cta and elqr (SI).
     lipschitz
-        Bound on |h'|, in the unit of ν per second.
+        For a sliding mode: bound on |h'|, in the unit of ν per second.
     gain_range
-        b_m and b_M, the range of the control coefficient β.
+        For a sliding mode: b_m and b_M, the range of the control coefficient β; 1 1 unless given.
+    box
+        For the e-LQR: uncertainty box, paper or ten-percent.
+    feedback
+        For the e-LQR: error (k1 and k2 act on x1 - r and x2 - r', the default) or state (on x1 and x2, as printed).
+    step
+        For the e-LQR: sampling period in s for which p is held; the fault's unless given.
+    peaks
+        For the e-LQR: certify how fast the fault can slip at most, for every disturbance of a class: amplitude or rate.
     out
-        File for the certificate.
+        File for the certificate. Other proofs of an e-LQR go beside it, with their names added.
     force
-        Replace an existing file.
+        Replace existing files.
     json
         Print JSON.
     """
+    from quakedesign.controllers import law as law_of
+
+    new_file(out, "certificate file", force=force)
+    about_fault = {"FAULT": fault, "--box": box, "--feedback": feedback, "--step": step, "--peaks": peaks}
+    about_rate = {"--lipschitz": lipschitz, "--gain-range": gain_range}
+    if law_of(law).loop_field().domain == "reals":
+        _refuse_options(law, about_rate, "needs a FAULT instead")
+        if fault is None:
+            raise ParameterError(f"certify {law} needs a fault. Received none. Give a preset or a file after {law}.")
+        return _certify_on_fault(fault, gains, box, feedback or "error", step, peaks, out, force, json)
+    _refuse_options(law, about_fault, "needs --lipschitz instead")
+    if lipschitz is None:
+        raise ParameterError(f"certify {law} needs a bound on |h'|. Received none. Give --lipschitz.")
+    return _certify_for_rate(law, gains, lipschitz, gain_range or ("1", "1"), out, json)
+
+
+def _refuse_options(law: str, options: Mapping[str, Any], remedy: str) -> None:
+    """Refuse options that belong to another kind of law.
+
+    Raises
+    ------
+    ParameterError
+    """
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise ParameterError(f"{', '.join(given)} cannot be used with {law}, which {remedy}. Leave it out.")
+
+
+def _certify_for_rate(
+    law: str, gains: tuple[str, ...], lipschitz: str, gain_range: tuple[str, str], out: Path | None, json: bool
+) -> int:
+    """Verdict on a sliding mode."""
     from time import perf_counter
 
     from quakedesign.rationals import rational
     from quakedesign.synthesis import certify as decide
 
-    new_file(out, "certificate file", force=force)
     began = perf_counter()
     verdict, certificate = decide(law, gains, lipschitz=lipschitz, gain_range=gain_range)
     if certificate is not None and out is not None:
@@ -66,6 +116,36 @@ def certify(
     return 0 if found["verdict"] == "proved" else 1
 
 
+def _certify_on_fault(
+    fault: str, gains: tuple[str, ...], box: str | None, feedback: str, step: str | None, peaks: str | None,
+    out: Path | None, force: bool, json: bool,
+) -> int:  # fmt: skip
+    """Verdict on an e-LQR."""
+    from time import perf_counter
+
+    from quakedesign.controllers.elqr import ExtendedLQR
+    from quakedesign.fault import load_fault
+    from quakedesign.report.linear import verdict_lines
+    from quakedesign.synthesis.linear.verdict import judge
+
+    began = perf_counter()
+    controller = ExtendedLQR.from_values(gains, feedback=feedback)
+    judged = judge(load_fault(fault, box=box), controller, step=step, peaks=peaks)
+    files = judged.save(out, force=force) if out is not None else {}
+    found = {
+        **judged.to_dict(),
+        "certificate": files.get("stability"),
+        "certificates": files,
+        "seconds": perf_counter() - began,
+    }
+    if json:
+        print_json(found)
+    else:
+        for line in verdict_lines(judged):
+            console().print(line, markup=False)
+    return 0 if found["verdict"] == "proved" and (peaks is None or judged.peaks is not None) else 1
+
+
 @app.command
 def check(*files: Path, fault: str | None = None, json: Json = False) -> int:
     """Re-check certificate files in exact arithmetic. Exit code 0 only if all are proved.
@@ -80,7 +160,6 @@ def check(*files: Path, fault: str | None = None, json: Json = False) -> int:
         Print JSON.
     """
     from quakedesign.certificates.command import check_files
-    from quakedesign.errors import ParameterError
 
     if not files:
         raise ParameterError("check needs at least one certificate file. Received none. Give a path.")

@@ -13,7 +13,8 @@ from quakedesign.errors import OutputError
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Force = Annotated[bool, Parameter(negative="")]
-Gains = Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, consume_multiple=True)]
+# Negative decimals are values anyhow; with leading hyphens allowed, options after the gains would be gains too.
+Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
 
 app = App(
     name="quakedesign",

@@ -1,7 +1,7 @@
 """All controllers of one fault side by side, in closed loop."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from math import isqrt
 from typing import Any
@@ -11,9 +11,11 @@ from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import Domain, Variant, certified_lipschitz
 from quakedesign.controllers import SlidingMode, published
 from quakedesign.fault import Fault
+from quakedesign.report.linear import held_sentence, peaks_sentence
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis import Design, assess
+from quakedesign.synthesis.linear.certified_peaks import CLASSES, CertifiedPeaks
 from quakedesign.synthesis.linear.scaled_design import vertex_poles
 from quakedesign.synthesis.sampling import largest_sampling_time, on_trajectory
 
@@ -37,6 +39,10 @@ class Entry:
         For a linear law: growth of the fastest mode per step of the run [-]; below 1 is stable.
     variants : tuple of Variant
         For a designed sliding mode: what is certified of the same gains with every named feed-forward.
+    held : mapping or None
+        For a linear law: what is decided when p is held over T_s, see `Design.held_facts`.
+    peaks : mapping of str to CertifiedPeaks
+        For a designed linear law that is proved: certified peaks by class of disturbances; no class without any.
     """
 
     label: str
@@ -46,6 +52,8 @@ class Entry:
     largest_step: float | None = None
     growth_per_step: float | None = None
     variants: tuple[Variant, ...] = ()
+    held: Mapping[str, Any] | None = None
+    peaks: Mapping[str, CertifiedPeaks] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Keys of DESIGN.md; exact quantities as texts, measured ones as numbers, SI."""
@@ -60,6 +68,8 @@ class Entry:
             "headline": headline(self),
             "largest_sampling_time": self.largest_step,
             "growth_per_step": self.growth_per_step,
+            "held": dict(self.held) if self.held else None,
+            "peaks": {name: found.to_dict() for name, found in self.peaks.items()} or None,
             "details": dict(found.details),
             "metrics": self.run.metrics.to_dict() if self.run else None,
             "events": dict(self.run.events) if self.run else None,
@@ -155,7 +165,18 @@ def _entry(origin: str, design: Design, tell: Callable[[str, float], None]) -> E
     if not isinstance(design.controller, SlidingMode):
         poles = vertex_poles(sectors(design.fault), list(design.controller.gains.values()))
         growth = amplification(poles, run.provenance["step"], run.provenance["method"])
-        return Entry(label=label, origin=origin, design=design, run=run, growth_per_step=growth)
+        tell(f"{label}: held pressure and peaks", 0.0)
+        wanted = CLASSES if origin == "designed" and design.verdict is Verdict.PROVED else ()
+        peaks = {kind: design.certified_peaks(kind) for kind in wanted}
+        return Entry(
+            label=label,
+            origin=origin,
+            design=design,
+            run=run,
+            growth_per_step=growth,
+            held=design.held_facts(),
+            peaks={kind: found for kind, found in peaks.items() if found is not None},
+        )
     bound = float(_lipschitz(design))
     premise = on_trajectory(design.controller, bound, run)
     if design.verdict is not Verdict.PROVED or premise is None:
@@ -199,7 +220,7 @@ def headline(entry: Entry) -> str:
     verdict = {
         Verdict.PROVED: "proved in continuous time",
         Verdict.REFUTED: "refuted: a counterexample checks in exact arithmetic",
-        Verdict.UNDECIDED: "undecided: no certificate",
+        Verdict.UNDECIDED: f"undecided: {design.details.get('reason', 'no certificate')}",
     }[design.verdict]
     parts = [verdict, *_broken(design.premises)]
     if design.verdict is Verdict.PROVED and all(p.holds for p in design.premises):
@@ -209,6 +230,10 @@ def headline(entry: Entry) -> str:
     if entry.growth_per_step is not None:
         stable = "stable" if entry.growth_per_step < 1 else "UNSTABLE"
         parts.append(f"{stable} at the step used")
+    if entry.peaks:
+        parts.append(peaks_sentence(entry.peaks))
+    if entry.held is not None:
+        parts.append(held_sentence(entry.held))
     return "; ".join([*parts, *_happened(entry.run)])
 
 

@@ -48,8 +48,9 @@ def export_answer(
     seen = sensor(period, EXACT, differentiator_bound, filter_order)
     chosen = simulation_scheme(scheme, **({"measurement": seen} if seen.noisy else {}))
     found = export_controller(fault, law, folder, step=step, scheme=chosen, force=force)
-    estimating = isinstance(seen, OutputFeedback)
-    premises = [differentiator_premise(fault, law, seen, scheme=scheme)] if estimating else []
+    premises = []
+    if isinstance(seen, OutputFeedback):
+        premises.append(differentiator_premise(fault, law, seen, scheme=scheme))
     files = [str(folder / name) for name in (HEADER, SOURCE)]
     return found.to_dict() | {"files": files, "premises": [p.to_dict() for p in premises]}
 

@@ -9,11 +9,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.certificates import certificate_text
+from quakedesign.certificates import Certificate, certificate_text
 from quakedesign.errors import OutputError
-from quakedesign.report.comparison import Comparison
+from quakedesign.report.comparison import Comparison, Entry
 from quakedesign.report.facts import fault_dict, fault_sentences
 from quakedesign.report.numbers import csv_text, printed, table
+from quakedesign.synthesis.linear.peak_certificate import peak_certificate
 
 if TYPE_CHECKING:
     from quakedesign.report.paper_study import PaperStudy
@@ -51,8 +52,11 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
     found = {"fault": fault_dict(comparison.fault), **comparison.to_dict()}
     for origin, group in (("designed", "controllers"), ("published", "published")) if stored else ():
         for entry in comparison.of(origin):
+            told = found[group][entry.design.name]
             if entry.design.certificate is not None:
-                found[group][entry.design.name]["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
+                told["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
+            for kind in entry.peaks:
+                told["peaks"][kind]["certificate"] = f"certificates/{entry.design.name}-peaks-{kind}.json"
     found["versions"] = {package: version(package) for package in _PACKAGES}
     return found
 
@@ -141,12 +145,29 @@ def _fill(
         if entry.design.certificate is not None:
             path = folder / "certificates" / _file(entry.origin, entry.design.name)
             path.write_text(certificate_text(entry.design.certificate), encoding="utf-8")
+        for kind, certificate in peak_certificates(entry).items():
+            path = folder / "certificates" / f"{entry.design.name}-peaks-{kind}.json"
+            path.write_text(certificate_text(certificate), encoding="utf-8")
     for i, (name, drawing) in enumerate(drawn.items()):
         tell(f"figure {name}", i / len(drawn))
         drawing.savefig(folder / "figures" / f"{name}.png", metadata={"Software": None})
     page = page_html(comparison, fault_sentences(comparison.fault), drawn)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "results.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def peak_certificates(entry: Entry) -> dict[str, Certificate]:
+    """Certificates of an entry's peaks by class of disturbances, checked.
+
+    Raises
+    ------
+    CertificateError
+    """
+    law = entry.design.controller
+    found = {kind: peak_certificate(peaks, law) for kind, peaks in entry.peaks.items() if law is not None}
+    for certificate in found.values():
+        certificate.check()
+    return found
 
 
 def _swap(partial: Path, out: Path) -> None:

@@ -130,6 +130,7 @@ def sampling_report(
     law: Controller | Design,
     *,
     scales: Sequence[str] = (),
+    schemes: Sequence[str] = SCHEMES,
     duration: float | None = None,
     progress: Tell | None = None,
 ) -> SamplingReport:
@@ -142,6 +143,8 @@ def sampling_report(
         Of a design the certified bound on |h'| is known; of other gains the limit that no certificate exceeds.
     scales : sequence of str
         Further λ, exact, with which the base gains of a sliding mode are run; its certificate holds for every λ.
+    schemes : sequence of str
+        Those that sample.
     duration : float, optional
         Of the runs [s]; the operation time unless given. Sensitivities to noise take a sixteenth of it, orders 650 T_s.
     progress : callable, optional
@@ -163,14 +166,16 @@ def sampling_report(
         raise ParameterError(f"a law to sample needs gains. Received a design for {fault.name} without. Give gains.")
     limit = _limit(controller, design)
     entries: list[tuple[str, Controller, tuple[str, ...]]]
-    entries = [("designed" if design else "given", variant, SCHEMES) for variant in _variants(controller, scales)]
+    entries = [
+        ("designed" if design else "given", variant, tuple(schemes)) for variant in _variants(controller, scales)
+    ]
     entries += [("published", known, PUBLISHED_SCHEMES) for known in published(fault.name).values()]
     found = [
         _row(fault, origin, variant, scheme, limit if origin != "published" else None, duration, tell)
-        for origin, variant, schemes in entries
-        for scheme in schemes
+        for origin, variant, chosen in entries
+        for scheme in chosen
     ]
-    return SamplingReport(fault=fault, rows=tuple(found), studies=_studies(fault, controller, duration, tell))
+    return SamplingReport(fault=fault, rows=tuple(found), studies=_studies(fault, controller, schemes, duration, tell))
 
 
 def _variants(controller: Controller, scales: Sequence[str]) -> list[Controller]:
@@ -211,26 +216,32 @@ def _row(
     return Row(label=label, origin=origin, controller=law, scheme=scheme, run=run, premise=premise)
 
 
-def _studies(fault: Fault, law: Controller, duration: float | None, tell: Tell) -> dict[str, Study]:
+def _studies(
+    fault: Fault, law: Controller, schemes: Sequence[str], duration: float | None, tell: Tell
+) -> dict[str, Study]:
     task = fault.reference.operation_time
     window = (task if duration is None else duration) * SHARE
     found = {}
     if isinstance(law, SlidingMode) and not any(law.feedforward.coefficients.values()):
         tell("orders of accuracy", 0.0)
-        found["orders"] = orders(fault, law)
+        found["orders"] = orders(fault, law, schemes)
     for i, of in enumerate(("slip_noise", "rate_noise")):
         tell(f"sensitivity to {of.replace('_', ' ')}", i / 3)
-        found[of] = noise_sensitivity(fault, law, levels=noise_levels(fault, of), of=of, duration=window)
+        found[of] = noise_sensitivity(
+            fault, law, levels=noise_levels(fault, of), of=of, schemes=schemes, duration=window
+        )
     tell("sensitivity to the input gain", 2 / 3)
     box = fault if fault.box.authority else fault.with_box(UNCERTAIN)
-    return found | {"input_gain": gain_sensitivity(box, law, points=3, duration=duration)}
+    return found | {"input_gain": gain_sensitivity(box, law, points=3, schemes=schemes, duration=duration)}
 
 
-def orders(fault: Fault, law: SlidingMode) -> Study:
+def orders(fault: Fault, law: SlidingMode, schemes: Sequence[str] = SCHEMES) -> Study:
     """Errors over three decades of T_s below that of the fault, in runs of 650 of its T_s, from half of them on."""
     longest = fault.sampling_time
     steps = [longest * 10 ** (-k / 2) for k in range(2 * DECADES + 1)]
-    return accuracy(fault, law, steps=steps, duration=PERIODS * longest, settled_from=PERIODS * longest / 2)
+    return accuracy(
+        fault, law, steps=steps, schemes=schemes, duration=PERIODS * longest, settled_from=PERIODS * longest / 2
+    )
 
 
 def noise_levels(fault: Fault, of: str) -> tuple[float, ...]:
@@ -255,7 +266,7 @@ def order_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Heading and rows of the orders as texts: one row a scheme, with exponents and the errors at the longest T_s."""
     exponents = study.orders()
     names = list(next(iter(study.errors.values())))
-    head = ("scheme", *(f"order of {QUANTITIES[n][0]}" for n in names), *map(_quantity, names))
+    head = ("scheme", *(f"order of {QUANTITIES[n][0].removeprefix('max ')}" for n in names), *map(_quantity, names))
     rows = []
     for scheme, found in study.errors.items():
         powers = (exponents[scheme][n] for n in names)

@@ -10,6 +10,8 @@ from rich.table import Table
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.sampling import COLUMNS, FOOTNOTE, SamplingReport, order_rows, study_rows
 
+WIDTHS = (16, 13, 8, 8, 6, 6, 5, 8)
+
 
 def write_sampling(report: SamplingReport, folder: Path) -> dict[str, Any]:
     """Write ``results.json`` and ``figures/*.png`` into a folder that appears whole; return what the former holds.
@@ -30,7 +32,7 @@ def write_sampling(report: SamplingReport, folder: Path) -> dict[str, Any]:
 def print_sampling(report: SamplingReport, console: Any) -> None:
     """Table of the schemes, and one of every study."""
     console.print(f"[bold]{report.fault.name}[/bold], T_s = {report.fault.sampling_time:g} s")
-    console.print(_table(COLUMNS, [row.cells() for row in report.rows], texts=2), soft_wrap=False)
+    console.print(_table(COLUMNS, [row.cells() for row in report.rows], WIDTHS), soft_wrap=False)
     for row in report.rows:
         if {"diverged", "opening"} & set(row.run.events):
             console.print(f"{row.label}, {row.scheme}: {dict(row.run.events)}", markup=False)
@@ -44,13 +46,16 @@ def print_sampling(report: SamplingReport, console: Any) -> None:
             )
         console.print(levels, markup=False)
         head, rows = order_rows(study) if name == "orders" else study_rows(study)
-        console.print(_table(head, rows, texts=1 if name == "orders" else 2), soft_wrap=False)
+        console.print(_table(head, rows, (13,) if name == "orders" else (13, 10)), soft_wrap=False)
 
 
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], *, texts: int) -> Table:
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], widths: tuple[int, ...]) -> Table:
+    """Table whose columns of text, the first one or two, have the widths given; so have others as far as given."""
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    texts = min(len(widths), 2)
     for i, column in enumerate(head):
-        table.add_column(escape(column), justify="left" if i < texts else "right")
+        width = widths[i] if i < len(widths) else None
+        table.add_column(escape(column), justify="left" if i < texts else "right", width=width)
     for row in rows:
         table.add_row(*map(escape, row))
     return table

@@ -1,13 +1,41 @@
-"""Closed loops in CasADi: integrators, schemes, compiled stepping, metrics, trajectories."""
+"""Closed loops in CasADi: integrators, schemes, actuators, sensing, compiled stepping, metrics, trajectories, export.
 
+Numerical libraries load inside the functions that need them. Campaigns are in `quakedesign.simulation.campaign`.
+"""
+
+from quakedesign.simulation.actuators import (
+    Actuator,
+    Delay,
+    Diffusion,
+    Lag,
+    Quantisation,
+    RateLimit,
+    Saturation,
+    stages,
+)
 from quakedesign.simulation.earthquake import natural_earthquake
 from quakedesign.simulation.energy import EnergyBudget
+from quakedesign.simulation.export import ControllerStep, controller_step, export_controller
 from quakedesign.simulation.integrators import Integrator, integrator, integrators
 from quakedesign.simulation.interop import to_casadi, to_iosystem
 from quakedesign.simulation.loading import Load
+from quakedesign.simulation.measurement import Measurement
 from quakedesign.simulation.metrics import Metrics, StickMetrics
+from quakedesign.simulation.perturbation import perturbation
 from quakedesign.simulation.run import simulate
-from quakedesign.simulation.schemes import Scheme, schemes
+from quakedesign.simulation.sampled_trajectory import SampledTrajectory
+from quakedesign.simulation.sampling_study import Study, accuracy, gain_sensitivity, noise_sensitivity, weight_study
+from quakedesign.simulation.schemes import Scheme, schemes, simulation_scheme
+from quakedesign.simulation.sensing import (
+    Averaging,
+    Differentiator,
+    JointCondition,
+    OutputFeedback,
+    Sensor,
+    Transducer,
+    joint_condition,
+    smallest_bound,
+)
 from quakedesign.simulation.state_plants import SpringSlider
 from quakedesign.simulation.state_run import simulate_state, velocity_step
 from quakedesign.simulation.state_trajectory import StateTrajectory
@@ -15,23 +43,51 @@ from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.simulation.variation import Variation
 
 __all__ = [
+    "Actuator",
+    "Averaging",
+    "ControllerStep",
+    "Delay",
+    "Differentiator",
+    "Diffusion",
     "EnergyBudget",
     "Integrator",
+    "JointCondition",
+    "Lag",
     "Load",
+    "Measurement",
     "Metrics",
+    "OutputFeedback",
+    "Quantisation",
+    "RateLimit",
+    "SampledTrajectory",
+    "Saturation",
     "Scheme",
+    "Sensor",
     "SpringSlider",
     "StateTrajectory",
     "StickMetrics",
+    "Study",
     "Trajectory",
+    "Transducer",
     "Variation",
+    "accuracy",
+    "controller_step",
+    "export_controller",
+    "gain_sensitivity",
     "integrator",
     "integrators",
+    "joint_condition",
     "natural_earthquake",
+    "noise_sensitivity",
+    "perturbation",
     "schemes",
     "simulate",
     "simulate_state",
+    "simulation_scheme",
+    "smallest_bound",
+    "stages",
     "to_casadi",
     "to_iosystem",
     "velocity_step",
+    "weight_study",
 ]

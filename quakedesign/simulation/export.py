@@ -1,8 +1,5 @@
 """A sampled controller as C, for the computer of a laboratory."""
 
-import os
-import shutil
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
@@ -12,7 +9,7 @@ from quakedesign.controllers import Controller
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_positive
-from quakedesign.output import write_whole
+from quakedesign.output import whole_folder, write_whole
 from quakedesign.simulation.c_source import header_text, source_text
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.integrators import integrator
@@ -89,8 +86,6 @@ def controller_step(
     require_positive(step=period)
     chosen = _software(simulation_scheme(scheme) if isinstance(scheme, str) else scheme)
     sensed = isinstance(chosen.measurement, Sensor)
-    if isinstance(chosen.measurement, Sensor):
-        chosen.measurement.require_step(period)
     measurement = {"slip": "m"} if sensed else {"slip": "m", "slip_rate": "m/s"}
     function, start = _function(ClosedLoop(fault, controller), chosen, float(period), len(measurement))
     facts = _facts(fault, controller, chosen)
@@ -135,19 +130,9 @@ def export_controller(
     _require_free(target, force)
     found = controller_step(fault, controller, step=step, scheme=scheme)
     texts = {HEADER: header_text(found), SOURCE: source_text(found, HEADER)}
-    try:
-        partial = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.absolute().parent))
-        try:
-            for name, text in texts.items():
-                write_whole(partial / name, text)
-            partial.chmod(0o755)
-            _swap(partial, target)
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)
-    except OutputError:
-        raise
-    except OSError as error:
-        raise OutputError(f"{target} cannot be written: {error.strerror}. Choose another folder.") from None
+    with whole_folder(target) as partial:
+        for name, text in texts.items():
+            write_whole(partial / name, text)
     return found
 
 
@@ -161,16 +146,6 @@ def _require_free(folder: Path, force: bool) -> None:
         raise OutputError(f"{parent} is no folder. Create it, or choose another.")
 
 
-def _swap(partial: Path, target: Path) -> None:
-    if not target.exists():
-        partial.rename(target)
-        return
-    old = Path(tempfile.mkdtemp(prefix=f".{target.name}-old-", dir=target.absolute().parent))
-    os.replace(target, old / target.name)
-    os.replace(partial, target)
-    shutil.rmtree(old, ignore_errors=True)
-
-
 def _software(scheme: Scheme) -> Sampled:
     """Scheme without noise, transducer and substeps; refuses what no controller can carry out."""
     if not isinstance(scheme, Sampled):
@@ -178,8 +153,7 @@ def _software(scheme: Scheme) -> Sampled:
     if scheme.actuator.flowing:
         names = ", ".join(stage.name for stage in scheme.actuator.flowing)
         raise ParameterError(f"what moves between samples belongs to the plant. Received {names}. Leave it out.")
-    measurement: Any = scheme.measurement
-    kept: Any = measurement.software if isinstance(measurement, Sensor) else EXACT
+    kept = scheme.measurement.software if isinstance(scheme.measurement, Sensor) else EXACT
     return replace(scheme, measurement=kept, substeps=1)
 
 

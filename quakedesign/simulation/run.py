@@ -1,21 +1,17 @@
 """One closed loop from rest over the whole task."""
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from fractions import Fraction
-from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from quakedesign.controllers import Controller
-from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
 from quakedesign.simulation.actuators import Actuator
 from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
+from quakedesign.simulation.assembly import trajectory
 from quakedesign.simulation.backend import prepare
 from quakedesign.simulation.checkpoint import Checkpoint
 from quakedesign.simulation.closed_loop import ClosedLoop
@@ -24,16 +20,13 @@ from quakedesign.simulation.integrators import AdaptiveIntegrator, Integrator, a
 from quakedesign.simulation.integrators.adaptive import FLOOR
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.metrics import events, metrics
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.sampled_trajectory import SampledTrajectory
 from quakedesign.simulation.schemes import Scheme, simulation_scheme
+from quakedesign.simulation.sensing import Sensor
+from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.stepping import Advancer, instants, march
 from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.simulation.variation import Variation, names
-
-MOST_STEPS = 10**10
-_ALMOST_A_STEP = Fraction(1, 10**6)
 
 
 def simulate(
@@ -55,7 +48,7 @@ def simulate(
     checkpoint: str | Path | None = None,
     substeps: int = 1,
     actuator: Actuator | None = None,
-    measurement: Measurement | None = None,
+    measurement: Measurement | Sensor | None = None,
 ) -> Trajectory:
     """Simulate a fault under a controller, from rest, with the fault's own disturbance and reference.
 
@@ -100,8 +93,9 @@ def simulate(
         Steps of the integrator per `step`, for a named scheme that samples.
     actuator : Actuator, optional
         What lies between the pressure that is asked for and that in the fault, for a named scheme that samples.
-    measurement : Measurement, optional
-        Noise of what the controller sees, for a named scheme that samples.
+    measurement : Measurement or Sensor, optional
+        Noise of what the controller sees, or a sensor that tells it estimates from the slip alone, for a named scheme
+        that samples.
 
     Returns
     -------
@@ -113,7 +107,8 @@ def simulate(
     ------
     ParameterError
         For a step, duration or number of samples that is not positive and finite, an unknown scheme, method or plant,
-        a variation outside the box, or a loop that is not smooth with a method that needs one.
+        a variation outside the box, a sensor made for another step, or a loop that is not smooth with a method that
+        needs one.
     SimulationError
         When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
         cannot go on, or when the checkpoint is that of another run.
@@ -131,7 +126,9 @@ def simulate(
     return run(recorder, setting, chosen, progress=progress, compiled=compiled, checkpoint=checkpoint)
 
 
-def _scheme(scheme: str | Scheme, substeps: int, actuator: Actuator | None, measurement: Measurement | None) -> Scheme:
+def _scheme(
+    scheme: str | Scheme, substeps: int, actuator: Actuator | None, measurement: Measurement | Sensor | None
+) -> Scheme:
     """Scheme from what `simulate` was given."""
     settings: dict[str, Any] = {"substeps": substeps} if substeps != 1 else {}
     settings |= {"actuator": actuator} if actuator is not None else {}
@@ -159,45 +156,6 @@ def loop_class(plant: str) -> type[ClosedLoop]:
     return found[plant]
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """How far and how finely to go: times in s, checked."""
-
-    step: float
-    steps: int
-    samples: int
-    settled_from: float
-
-    @classmethod
-    def of(
-        cls,
-        fault: Fault,
-        step: float | None,
-        duration: float | None,
-        samples: int,
-        settled_from: float | None,
-    ) -> "Setting":
-        """Setting from what `simulate` was given; None stands for its defaults."""
-        task = fault.reference.operation_time
-        length = _positive("duration", task if duration is None else duration)
-        pace = _positive("step", fault.sampling_time if step is None else step)
-        steps = int(rational(length) / rational(pace) + _ALMOST_A_STEP)
-        if not 1 <= steps <= MOST_STEPS:
-            raise ParameterError(f"duration must hold 1 to {MOST_STEPS:.0e} steps. Received {steps}. Change the step.")
-        if isinstance(samples, bool) or not isinstance(samples, int) or samples < 1:
-            raise ParameterError(f"samples must be a whole number of at least 1. Received {samples!r}.")
-        start = min(task, length) / 4 if settled_from is None else settled_from
-        if not (math.isfinite(start) and start >= 0):
-            raise ParameterError(f"settled_from must be a time of at least 0 s. Received {start!r} s.")
-        return cls(pace, steps, samples, float(start))
-
-
-def _positive(name: str, value: float) -> float:
-    if not (math.isfinite(value) and value > 0):
-        raise ParameterError(f"{name} must be positive and finite. Received {value!r} s.")
-    return float(value)
-
-
 def run(
     recorder: Recorder,
     setting: Setting,
@@ -216,7 +174,7 @@ def run(
     file = Checkpoint.of(checkpoint, step, start, wanted) if checkpoint else None
     kept = march(Advancer.of(backend, start), wanted, recorder.index("diverged"), progress, file)
     told = {"backend": backend.name, "backend_reason": backend.reason}
-    return _trajectory(recorder, setting, kept, _provenance(recorder, method) | told, (began, ready))
+    return trajectory(recorder, setting, kept, _provenance(recorder, method) | told, (began, ready))
 
 
 def run_adaptive(
@@ -236,51 +194,7 @@ def run_adaptive(
     smooth = SmoothMarch(recorder, method, rtol)
     kept = smooth.run(recorder.start(setting.settled_from), instants(setting.steps, setting.samples), progress)
     told = {"backend": "sundials", "rtol": rtol, "floor": FLOOR}
-    return _trajectory(recorder, setting, kept, _provenance(recorder, method) | told, (began, began))
-
-
-def _trajectory(
-    recorder: Recorder, setting: Setting, kept: Any, provenance: dict[str, Any], began: tuple[float, float]
-) -> Trajectory:
-    """Trajectory from the kept vectors, of which those before a divergence are shown."""
-    observe, signals = _watchers(recorder)
-    end = observe(kept[:, -1]).full().ravel()
-    watched, ended = recorder.watched(end), perf_counter()
-    if watched["diverged"] >= 0:
-        kept = kept[:, kept[0] * setting.step < watched["diverged"]]
-    if not kept.size:
-        raise SimulationError(
-            "the loop must have finite values at the start. Received values that are not. Check gains and disturbance."
-        )
-    took = {"preparation_seconds": began[1] - began[0], "stepping_seconds": ended - began[1]}
-    loop = recorder.loop
-    found = metrics(
-        watched,
-        controlled=loop.controller is not None,
-        step=setting.step,
-        steps=setting.steps,
-        settled_from=setting.settled_from,
-        seconds=ended - began[0],
-        sticks=loop.sticks,
-    )
-    columns = _columns(recorder, kept, signals)
-    described = recorder.scheme.described
-    further = {name: (columns.pop(name), *said) for name, said in described.items()}
-    kind = partial(SampledTrajectory, actuation=further) if further else Trajectory
-    return kind(
-        **columns,
-        moment_per_slip=loop.fault.shear_modulus * loop.fault.area,
-        metrics=found,
-        energy=None if watched["diverged"] >= 0 else recorder.energy(end),
-        events=events(watched),
-        provenance=provenance | took,
-        integral_units=loop.controller.integral_units if loop.controller else (),
-        name=f"{loop.fault.name}, {_law_title(loop.controller)}{loop.plant_title}",
-    )
-
-
-def _law_title(controller: Controller | None) -> str:
-    return controller.title if controller else "no control"
+    return trajectory(recorder, setting, kept, _provenance(recorder, method) | told, (began, began))
 
 
 def _step(recorder: Recorder, method: type[Integrator]) -> Any:
@@ -289,27 +203,6 @@ def _step(recorder: Recorder, method: type[Integrator]) -> Any:
 
     before = ca.SX.sym("z", recorder.size)
     return ca.Function("step", [before], [recorder.advance(before, method)])
-
-
-def _watchers(recorder: Recorder) -> tuple[Any, Any]:
-    """CasADi Functions of the vector: the watching of one instant, and all signals."""
-    import casadi as ca
-
-    vector = ca.SX.sym("z", recorder.size)
-    signals = recorder.signals(vector)
-    return (
-        ca.Function("observe", [vector], [recorder.observe(vector)]),
-        ca.Function("signals", [vector], list(signals.values()), ["z"], list(signals)),
-    )
-
-
-def _columns(recorder: Recorder, kept: Any, signals: Any) -> dict[str, Any]:
-    """Arrays of a trajectory from the kept vectors; without a controller nothing is followed."""
-    values = signals.call([kept])
-    columns = {name: value.full().ravel() for name, value in zip(signals.name_out(), values, strict=True)}
-    if recorder.loop.controller is None:
-        columns |= dict.fromkeys(("reference", "reference_rate", "matched_perturbation"))
-    return columns | {"integrals": kept[4 : 4 + len(recorder.loop.integrals)]}
 
 
 def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveIntegrator]) -> dict[str, Any]:

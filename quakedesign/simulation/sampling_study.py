@@ -1,5 +1,6 @@
 """How a sampled loop answers to its sampling period, to noise and to its input gain: tables and figures."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -60,15 +61,23 @@ class Study:
 
         return pd.DataFrame(self.rows())
 
-    def orders(self) -> dict[str, dict[str, float]]:
-        """Exponent n of error ~ levelⁿ by scheme and quantity: slope of the line of least squares in logarithms."""
-        import numpy as np
+    def orders(self) -> dict[str, dict[str, float | None]]:
+        """Exponent n of error ~ levelⁿ by scheme and quantity: slope of the line of least squares in logarithms.
 
-        place = np.log(self.levels)
+        None where a run diverged or left no error.
+        """
         return {
-            scheme: {name: float(np.polyfit(place, np.log(values), 1)[0]) for name, values in found.items()}
+            scheme: {name: _slope(self.levels, values) for name, values in found.items()}
             for scheme, found in self.errors.items()
         }
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able facts; null stands for a run that diverged."""
+        errors = {
+            scheme: {name: [v if math.isfinite(v) else None for v in values] for name, values in found.items()}
+            for scheme, found in self.errors.items()
+        }
+        return {k: getattr(self, k) for k in ("title", "label", "unit")} | {"levels": [*self.levels], "errors": errors}
 
     def figure(self) -> Any:
         """Return a matplotlib Figure with one panel a quantity, one line a scheme."""
@@ -247,6 +256,14 @@ def weight_study(
     return _study(title, ("weight", ""), tuple(weights), ("compensated",), run)
 
 
+def _slope(levels: Sequence[float], values: Sequence[float]) -> float | None:
+    import numpy as np
+
+    if len(levels) < 2 or not all(0 < v < math.inf for v in (*levels, *values)):
+        return None
+    return float(np.polyfit(np.log(levels), np.log(values), 1)[0])
+
+
 def _study(
     title: str,
     parameter: tuple[str, str],
@@ -268,7 +285,7 @@ def _errors(run: "Trajectory", matched: bool) -> dict[str, float]:
     """Largest errors of a run; that of e3 from the instants that it keeps."""
     import numpy as np
 
-    metrics, infinite = run.metrics, float("inf")
+    metrics, infinite = run.metrics, math.inf
     found = {"slip_error": metrics.max_slip_error, "slip_rate_error": metrics.max_slip_rate_error}
     if "diverged" in run.events:
         return dict.fromkeys([*found, "matched_error"] if matched else found, infinite)

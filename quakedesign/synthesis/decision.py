@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 
-from quakedesign.certificates import Certificate, Verdict, loop_of
+from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
 from quakedesign.controllers import LoopField, Subject, law, model_of
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational
@@ -45,15 +45,29 @@ def certify(
     UnknownNameError
         For the name of an unknown law.
     """
-    name, model = model_of(subject)
-    exact = exact_gains(subject, gains)
-    uncertain = _ranges(name, model, lipschitz, gain_range)
     try:
-        loop = loop_of(name, model, gains=exact, uncertain=uncertain)
+        loop = closed_loop(subject, gains, lipschitz=lipschitz, gain_range=gain_range)
         certificate = refute(loop, subject) or find_certificate(loop, subject=subject)
     except CertificateError:
         return Verdict.UNDECIDED, None
     return (certificate.check(subject), certificate) if certificate else (Verdict.UNDECIDED, None)
+
+
+def closed_loop(
+    subject: Subject, gains: tuple[Number, ...], *, lipschitz: Number, gain_range: tuple[Number, Number] = (1, 1)
+) -> Loop:
+    """Loop with exact gains for |d| ≤ lipschitz and all β of a range.
+
+    Raises
+    ------
+    ParameterError, UnknownNameError
+        As `certify`.
+    CertificateError
+        When the law has parts that certificates do not know.
+    """
+    name, model = model_of(subject)
+    exact = exact_gains(subject, gains)
+    return loop_of(name, model, gains=exact, uncertain=_ranges(name, model, lipschitz, gain_range))
 
 
 def exact_gains(subject: Subject, gains: tuple[Number, ...]) -> dict[str, Fraction]:

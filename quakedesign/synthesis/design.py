@@ -1,19 +1,14 @@
 """From a fault to gains with a proof, and from given gains to a verdict."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
 from quakedesign.certificates.linear_premises import linear_premises, sectors
 from quakedesign.certificates.premises import (
-    Domain,
     Errors,
-    Premise,
-    Variant,
     coefficient_range,
-    feedforward_variants,
     largest_matched_rate,
     least_authority,
     sliding_mode_premises,
@@ -22,88 +17,21 @@ from quakedesign.controllers import Controller, SlidingMode, control_law, family
 from quakedesign.controllers.feed_forward import NONE, FeedForward, feed_forward
 from quakedesign.errors import CertificateError, KinkError, ParameterError, UnknownNameError
 from quakedesign.fault import Fault
+from quakedesign.synthesis.designed import Design
 from quakedesign.synthesis.finishing import claims_of, finish
+from quakedesign.synthesis.linear.analysis import why_undecided
+from quakedesign.synthesis.linear.polytope import error_loop
+from quakedesign.synthesis.linear.redesign import sampled_design
+from quakedesign.synthesis.linear.riccati import riccati_design
 from quakedesign.synthesis.lyapunov import find_certificate
 from quakedesign.synthesis.quadratic import quadratic_margin
-from quakedesign.synthesis.riccati import riccati_design
 
 DESIGNABLE = ("cta", "elqr")
 _HEADROOM = Fraction(11, 10)
 _SHARES = (Fraction(99, 100), Fraction(9, 10), Fraction(1, 2))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Design:
-    """A controller for one fault, what is proved of it, and under which premises.
-
-    Attributes
-    ----------
-    fault : Fault
-    name : str
-        Name of the control law.
-    verdict : Verdict
-    controller : Controller or None
-        None only when no gains with a proof were found.
-    certificate : Certificate or None
-        Proof for the base gains (λ = 1), or the counterexample.
-    premises : tuple of Premise
-    domain : Domain or None
-        Certified domain of the self-consistent premise on |h'|.
-    details : mapping
-        What synthesis decided: exact numbers as texts.
-    """
-
-    fault: Fault
-    name: str
-    verdict: Verdict
-    controller: Controller | None
-    certificate: Certificate | None
-    premises: tuple[Premise, ...]
-    domain: Domain | None = None
-    details: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def gains(self) -> dict[str, Fraction]:
-        """Exact gains; for a sliding mode also ``scale`` λ, ``divisor`` μ0N̂0 [m²/kg] and a feed-forward that is on."""
-        law = self.controller
-        if not isinstance(law, SlidingMode):
-            return dict(law.gains) if law else {}
-        added = {} if law.feedforward == NONE else law.feedforward.coefficients
-        known = {f"feedforward_{name}": value for name, value in added.items()}
-        return {**law.gains, "scale": law.scale, "divisor": law.divisor, **known}
-
-    @property
-    def title(self) -> str:
-        """Name for people."""
-        return control_law(self.name).title
-
-    def with_premise(self, premise: Premise) -> "Design":
-        """Return the design with one more premise, such as one read off a run."""
-        return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
-
-    def feedforward_variants(self) -> tuple[Variant, ...]:
-        """Premises and domain of the same gains with every named feed-forward, its own first; none for other laws.
-
-        Takes a few seconds.
-        """
-        if not isinstance(self.controller, SlidingMode):
-            return ()
-        return feedforward_variants(self.fault, self.controller, self.certificate)
-
-    def _repr_html_(self) -> str:
-        from html import escape
-
-        gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in self.gains.items())
-        rows = "".join(
-            f"<tr><td>{escape(p.name)}</td><td>{p.required:.4g} {p.unit}</td><td>{p.certified:.4g} {p.unit}</td>"
-            f"<td>{'yes' if p.holds else 'no'}</td></tr>"
-            for p in self.premises
-        )
-        head = "<tr><th>premise</th><th>required</th><th>certified</th><th>holds</th></tr>"
-        return f"<b>{self.title}: {self.verdict}</b><br>{escape(gains)}<table>{head}{rows}</table>"
-
-
-def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none") -> Design:
+def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none", held: bool = False) -> Design:
     """Find gains with a proof for a fault.
 
     2-CTA: base gains from the literature are proved for the fault's range of β and scaled by λ = ρ⁶ (ρ rational, so
@@ -118,30 +46,36 @@ def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none") 
     feedforward : str
         What a sliding mode adds to ν from what is known of the plant: ``"none"``, ``"nominal"`` or ``"centred"``, see
         `quakedesign.controllers.feed_forward`. It enlarges the certified domain; the e-LQR takes none.
+    held : bool
+        For the e-LQR: gains that are proved with p held over the fault's sampling time as well, slower than the others.
 
     Returns
     -------
     Design
-        With verdict ``UNDECIDED`` and no controller when no proof was found.
+        With verdict ``UNDECIDED`` and ``reason`` in its details when no proof was found.
 
     Raises
     ------
     UnknownNameError
         For a controller that cannot be designed, or an unknown feed-forward.
     ParameterError
-        For a feed-forward with a law that takes none.
+        For a feed-forward with a law that takes none, or a sliding mode that shall be designed for a held pressure.
     """
     if controller not in DESIGNABLE:
         raise UnknownNameError(f"controller to design must be one of {', '.join(DESIGNABLE)}. Received {controller!r}.")
     fault.require_memoryless("design")
     added = feed_forward(feedforward, fault, least_authority(fault))
     if issubclass(control_law(controller), SlidingMode):
+        if held:
+            raise ParameterError(
+                f"a design for a held pressure is one of the e-LQR. Received {controller}. Leave it out."
+            )
         return _design_sliding_mode(fault, controller, added)
     if added != NONE:
         raise ParameterError(
             f"a feed-forward is part of sliding-mode laws. Received {feedforward!r} with {controller}. Leave it out."
         )
-    return _design_linear(fault)
+    return _design_held(fault) if held else _design_linear(fault)
 
 
 def _design_sliding_mode(fault: Fault, name: str, added: FeedForward) -> Design:
@@ -222,9 +156,35 @@ def _design_linear(fault: Fault) -> Design:
         "R": found.R,
         "poles": [[float(z.real), float(z.imag)] for z in found.E],
         "fastest_pole": found.fastest_pole,
-        "rate": str(certificate.claims["rate"]) if certificate else None,
     }
-    return _judged(fault, found.controller, certificate, details)
+    return _judged_linear(fault, found.controller, certificate, details)
+
+
+def _design_held(fault: Fault) -> Design:
+    try:
+        found = sampled_design(fault)
+    except ParameterError as error:
+        return Design(
+            fault=fault,
+            name="elqr",
+            verdict=Verdict.UNDECIDED,
+            controller=None,
+            certificate=None,
+            premises=(),
+            details={"reason": str(error)},
+        )
+    certificate = find_certificate(linear_loop(fault, found.controller), 2)
+    details = {"method": found.method, "held_for": str(found.step)}
+    return _judged_linear(fault, found.controller, certificate, details)
+
+
+def _judged_linear(
+    fault: Fault, controller: Controller, certificate: Certificate | None, details: Mapping[str, Any]
+) -> Design:
+    more: dict[str, Any] = {"rate": str(certificate.claims["rate"]) if certificate else None}
+    if certificate is None:
+        more["reason"] = why_undecided(error_loop(tuple(controller.gains.values()), sectors(fault)))
+    return _judged(fault, controller, certificate, {**details, **more})
 
 
 def assess(fault: Fault, controller: Controller) -> Design:
@@ -235,7 +195,7 @@ def assess(fault: Fault, controller: Controller) -> Design:
     """
     fault.require_memoryless("a verdict on gains")
     if not isinstance(controller, SlidingMode):
-        return _judged(fault, controller, find_certificate(linear_loop(fault, controller), 2), {})
+        return _judged_linear(fault, controller, find_certificate(linear_loop(fault, controller), 2), {})
     limit = controller.lipschitz_limit / controller.scale
     beta = coefficient_range(fault, controller.divisor)
     for share in _SHARES if limit > 0 else ():

@@ -13,7 +13,7 @@ from quakedesign.errors import CertificateError
 from quakedesign.rationals import nearest
 from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.polynomial import monomial
-from quakedesign.sos.solve.joint import Demand, JointProgram
+from quakedesign.sos.solve.joint import Demand, JointProgram, Proposal
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.finishing import bounds_of, claims_of, finish
@@ -64,6 +64,14 @@ def _of_degree(loop: Loop, degree: int, subject: Subject | None) -> Certificate 
     proposal = JointProgram(family.demands).solve(family.demands)
     if proposal is None or not proposal.margin > 1e-9:
         return None
+    return finished(loop, family, proposal, scale, subject)
+
+
+def finished(
+    loop: Loop, family: "Family", proposal: Proposal, scale: Sequence[Fraction], subject: Subject | None = None
+) -> Certificate | None:
+    """Certificate from a proposal of a family in scaled variables, with the shortest rounding that has a proof."""
+    degree = sum(exponents_of(family.monomials[0], loop.states))
     for digits in _DIGITS:
         lyapunov = family.function(proposal.decision, digits)
         margins = (

@@ -1,5 +1,6 @@
 """certify and design for the e-LQR on the command line."""
 
+import importlib.resources
 import json
 from fractions import Fraction
 
@@ -74,8 +75,10 @@ def test_held_is_for_the_elqr(capsys, tmp_path):
 
 
 def test_a_held_design_is_reported_with_its_peaks(capsys, tmp_path):
-    out = tmp_path / "o"
-    arguments = ("design", "lab-fault", "--controller", "elqr", "--held", "--out", str(out), "--json")
+    text = (importlib.resources.files("quakedesign.fault") / "presets" / "lab-fault.toml").read_text()
+    path, out = tmp_path / "short.toml", tmp_path / "o"
+    path.write_text(text.replace('"lab-fault"', '"short"').replace("1 hour", "1 minute"))
+    arguments = ("design", str(path), "--controller", "elqr", "--held", "--out", str(out), "--json")
     code, said, _ = run(capsys, *arguments)
     found = json.loads(said)["controllers"]["elqr"]
     assert code == 0

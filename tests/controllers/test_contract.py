@@ -168,7 +168,9 @@ def test_the_units_of_gains_and_states_fit_together(acting, metre, second, kilog
 
 def test_the_loop_has_a_rate_for_every_state(law):
     loop = law.loop_field()
-    known = {*loop.states, *loop.gains, *loop.constants, *loop.uncertain}
+    known = {*loop.states, *loop.gains, *loop.constants, *loop.uncertain, *loop.roots}
+    assert set(loop.roots.values()) <= {*loop.gains, *loop.constants}
+    assert set(loop.units) <= set(loop.states)
     assert set(loop.field) == set(loop.states)
     assert [str(g) for g in loop.gains] == list(law.gain_units)
     assert set().union(*(rate.free_symbols for rate in loop.field.values())) <= known

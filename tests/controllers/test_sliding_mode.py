@@ -42,6 +42,11 @@ def ours(name, scale, at):
     return np.array([float(v) for v in to_numpy([nu, rate], dict(zip((E1, E2, XI), at, strict=True)))])
 
 
+def with_roots(loop, values):
+    """Values of gains and of the roots that stand for √gain."""
+    return values | {root: np.sqrt(values[of]) for root, of in loop.roots.items()}
+
+
 POINTS = np.random.default_rng(7).uniform(-2, 2, (12, 3))
 
 
@@ -78,7 +83,8 @@ def test_the_printed_closed_loop_of_the_dia_does_not_scale():
 def test_the_loop_is_homogeneous_with_the_weights_and_degree_minus_one(name):
     loop = control_law(name).loop_field()
     assert list(loop.states.values()) == [3, 2, 1]
-    values = dict(zip(loop.gains, map(float, GAINS[name]), strict=True)) | dict.fromkeys(loop.uncertain, 0.7)
+    values = with_roots(loop, dict(zip(loop.gains, map(float, GAINS[name]), strict=True)))
+    values |= dict.fromkeys(loop.uncertain, 0.7)
     epsilon = 0.3
     for at in POINTS:
         near = {s: epsilon**w * v for (s, w), v in zip(loop.states.items(), at, strict=True)}
@@ -93,13 +99,15 @@ def test_the_loop_is_that_of_the_paper(name):
     # eqs. clsystem1 and clsystem2 with λ = 1: e1' = e2, e2' = β(ν without ξ1 + e3), e3' = ξ1' + h'
     loop = control_law(name).loop_field()
     beta, d = 1.3, -0.2
-    values = dict(zip(loop.gains, map(float, GAINS[name]), strict=True)) | dict(
-        zip(loop.uncertain, (beta, d), strict=True)
-    )
+    values = with_roots(loop, dict(zip(loop.gains, map(float, GAINS[name]), strict=True)))
+    values |= dict(zip(loop.uncertain, (beta, d), strict=True))
+    # a state may stand for an error in another unit, as f1 = k_I1^{3/2} e1 does
+    units = np.array([float(to_numpy([sp.sympify(loop.units.get(s, 1))], values)[0]) for s in loop.states])
     for a, b, c in POINTS:
-        found = to_numpy(list(loop.field.values()), values | dict(zip(loop.states, (a, b, c), strict=True)))
+        at = dict(zip(loop.states, (a, b, c) / units, strict=True))
+        found = np.array([float(v) for v in to_numpy(list(loop.field.values()), values | at)])
         nu, rate = by_hand(name, 1.0)(a, b, c)
-        assert [float(v) for v in found] == pytest.approx([b, beta * nu, rate + d], rel=1e-12)
+        assert found * units == pytest.approx([b, beta * nu, rate + d], rel=1e-12)
 
 
 @pytest.mark.parametrize("name", LAWS)

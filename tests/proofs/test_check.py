@@ -10,7 +10,7 @@ import re
 import subprocess
 import sys
 from fractions import Fraction
-from math import log2
+from math import log2, sqrt
 from pathlib import Path
 
 import pytest
@@ -30,12 +30,14 @@ def square(times, basis, *gram):
     return {"times": times, "basis": basis, "gram": list(gram)}
 
 
-def witness(obligation, *squares, multiplier=None):
+def witness(obligation, *squares, multiplier=None, equalities=(), inequalities=()):
     size = len(squares[0]["times"])
     return {
         "obligation": obligation,
         "multiplier": multiplier or {",".join("0" * size): "1"},
         "squares": list(squares),
+        "equalities": list(equalities),
+        "inequalities": list(inequalities),
     }
 
 
@@ -49,6 +51,8 @@ def relay():
         "states": {"x": 1},
         "domain": "cells",
         "uncertain": {},
+        "roots": {},
+        "lifts": {},
         "field": {"x": [["-1", ["k"], [["x", "0", "s"]]]]},
         "V": [["1", [], [["x", "2", "a"]]]],
         "claims": {"positive": "1/2", "decrease": "1"},
@@ -84,6 +88,8 @@ def decay():
         "states": {"x": 1},
         "domain": "reals",
         "uncertain": {},
+        "roots": {},
+        "lifts": {},
         "field": {"x": [["-1", ["k"], [["x", "1", "s"]]]]},
         "V": [["1", [], [["x", "2", "a"]]]],
         "claims": {"positive": "1/4", "rate": "1"},
@@ -108,6 +114,8 @@ def oscillator():
         "states": {"x": 1, "y": 1},
         "domain": "reals",
         "uncertain": {},
+        "roots": {},
+        "lifts": {},
         "field": {
             "x": [["1", [], [["y", "1", "s"]]]],
             "y": [["-1", [], [["x", "1", "s"]]], ["-1/3", ["c"], [["y", "1", "s"]]]],
@@ -160,6 +168,8 @@ def weighted_pair():
         "states": {"x": 2, "y": 1},
         "domain": "cells",
         "uncertain": {"d": ["-1/2", "1/2"]},
+        "roots": {},
+        "lifts": {},
         "field": {
             "x": [["-1/2", ["k"], [["x", "1/2", "s"]]]],
             "y": [["-1", [], [["y", "0", "s"]]], ["1", ["d"], []]],
@@ -197,6 +207,123 @@ def bounded_pair():
     return document
 
 
+def rooted_relay():
+    """x' = -s sign(x) with s = sqrt(2) in [7/5, 3/2]: -V' - u = 2su - u, 9/5 u and 2u at the ends."""
+    document = relay()
+    document["roots"] = {"s": ["k", "7/5", "3/2"]}
+    document["field"]["x"][0][1] = ["s"]
+    document["witnesses"][1:] = [
+        witness("decrease + s=7/5", square([1], [[0]], "9/5")),
+        witness("decrease + s=3/2", square([1], [[0]], "2")),
+    ]
+    return document
+
+
+def settling_relay():
+    """The relay with V' <= -2 sqrt(V), V = v^2: (u + v)(4u - 2v) = 2u^2 + 2uv - 2(v^2 - u^2)."""
+    document = relay()
+    document["claims"]["decay"] = "2"
+    squares = square([0, 0], [[1, 0]], "2"), square([1, 1], [[0, 0]], "2")
+    multiplier = {"1,0": "1", "0,1": "1"}
+    document["witnesses"].append(witness("decay +", *squares, multiplier=multiplier, equalities=[{"0,0": "-2"}]))
+    return document
+
+
+def nested_root():
+    """x' = -[n]^(1/3), n = x, V = |x|^(4/3), weight 3, so that -V' = 4/3 uw with w^3 = u^3.
+
+    The cells +- and -+ have the equality w^3 + u^3 = 0. V - u^4/2 = u^4/2. With M = u^2 + uw + w^2 and
+    (w - u) M = w^3 - u^3: M (4/3 uw - u^2/3) = M u^2 + 4/3 u (w^3 - u^3).
+    """
+    document = relay()
+    document |= {"gains": {"k": "2"}, "states": {"x": 3}, "lifts": {"n": [["1/2", ["k"], [["x", "1", "s"]]]]}}
+    document |= {"field": {"x": [["-1", [], [["n", "1/3", "s"]]]]}, "V": [["1", [], [["x", "4/3", "a"]]]]}
+    document["claims"] = {"positive": "1/2", "decrease": "1/3"}
+    form, multiplier = square([0, 0], [[2, 0], [1, 1]], "1", "1/2", "1"), {"2,0": "1", "1,1": "1", "0,2": "1"}
+    document["witnesses"] = [
+        witness("positive +", square([0], [[2]], "1/2")),
+        witness("decrease ++", form, multiplier=multiplier, equalities=[{"1,0": "4/3"}]),
+        witness("decrease --", form, multiplier=multiplier, equalities=[{"1,0": "-4/3"}]),
+    ]
+    return document
+
+
+def nested_sum():
+    """x' = -2x - n, y' = -2y - n, n = x + y, V = x^2 + y^2: -V' = 4u^2 + 4w^2 + 2 (s u + r w) t z.
+
+    With h = tz - su - rw that minus (u^2 + w^2) is 3u^2 + 3w^2 + 2z^2 - 2tz h. The cells ++- and --+ are left out.
+    """
+    document = oscillator_on_cells()
+    document |= {"constants": {}, "lifts": {"n": [["1", [], [["x", "1", "s"]]], ["1", [], [["y", "1", "s"]]]]}}
+    document["field"] = {name: [["-2", [], [[name, "1", "s"]]], ["-1", [], [["n", "1", "s"]]]] for name in "xy"}
+    document |= {"V": [["1", [], [[name, "2", "a"]]] for name in "xy"], "claims": {"positive": "1/2", "decrease": "1"}}
+    basis = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    document["witnesses"] = [witness("positive ++", square([0, 0], [[1, 0], [0, 1]], "1/2", "0", "1/2"))]
+    for cell in ("+++", "+-+", "+--", "-++", "-+-", "---"):
+        form = square([0, 0, 0], basis, "3", "0", "0", "3", "0", "2")
+        cofactor = {"0,0,1": "-2" if cell[2] == "+" else "2"}
+        document["witnesses"].append(witness(f"decrease {cell}", form, equalities=[cofactor]))
+    return document
+
+
+def nested_sign():
+    """x' = -2 sign(x) - sign(n), the same for y, n = x + y and a term of another degree whose gain is zero.
+
+    -V' = 4u + 4w + 2g with g = t (su + rw) >= 0; the cells - share the witnesses of the cells +.
+    """
+    document = nested_sum()
+    document |= {"gains": {"c": "0"}, "constants": {"k": "2"}, "roots": {"s": ["k", "7/5", "3/2"]}}
+    document["lifts"]["n"].append(["7", ["c", "s"], [["x", "3", "a"]]])
+    document["field"] = {name: [["-2", [], [[name, "0", "s"]]], ["-1", [], [["n", "0", "s"]]]] for name in "xy"}
+    squares = square([1, 0], [[0, 0]], "3"), square([0, 1], [[0, 0]], "3")
+    document["witnesses"][1:] = [
+        witness(f"decrease {cell} s=7/5", *squares, inequalities=[[square([0, 0], [[0, 0]], "2")]])
+        for cell in ("+++", "+-+", "+--")
+    ]
+    return document
+
+
+def driven():
+    """x' = -3bx + u + v with b in [1, 2], |u|, |v| <= 1/2, |v'| <= 1, by two sets.
+
+    30x^2 and u: 12u^2 - 60x(u - 3bx) - 90x^2 = (180b - 90)x^2 - 60xu + 12u^2; 30/25 x^2 - x^2 = x^2/5.
+    10x^2 + v^2: 10v^2 + v'^2/2 - 20x(v - 3bx) - 2vv' - 30x^2 - 3v^2 = (60b - 30)x^2 - 20xv + 7v^2 - 2vv' + v'^2/2,
+    of leading minors 30, 110 and 25 for b = 1; (10x^2 + v^2)/4 - x^2 = 3/2 x^2 + v^2/4.
+    """
+    document = decay()
+    del document["V"], document["claims"]
+    document["uncertain"] = {"b": ["1", "2"]}
+    document["field"]["x"] = [["-1", ["b", "k"], [["x", "1", "s"]]], ["1", ["u"], []], ["1", ["v"], []]]
+    x2, v2, three = ["30", [], [["x", "2", "a"]]], ["1", [], [["v", "2", "a"]]], [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    ten = ["10", [], [["x", "2", "a"]]]
+    document["inputs"] = {
+        "u": {
+            "limits": ["1/2"],
+            "sets": [{"V": [x2], "decay": "3", "shares": ["3"], "borrowed": ["0"]}],
+            "bounds": {"y": {"bound": "1/5", "weights": ["1"]}},
+        },
+        "v": {
+            "limits": ["1/2", "1"],
+            "sets": [{"V": [ten, v2], "decay": "3", "shares": ["5/2", "1/2"], "borrowed": ["0"]}],
+            "bounds": {"y": {"bound": "1/2", "weights": ["1"]}},
+        },
+    }
+    document["outputs"] = {"y": [["1", [], [["x", "1", "s"]]]]}
+    document["witnesses"] = [
+        witness("invariant u 0 b=1", square([0, 0], three[:2], "90", "-30", "12")),
+        witness("invariant u 0 b=2", square([0, 0], three[:2], "270", "-30", "12")),
+        witness("output u y", square([0], [[1]], "1/5")),
+        witness("invariant v 0 b=1", square([0, 0, 0], three, "30", "-10", "0", "7", "-1", "1/2")),
+        witness("invariant v 0 b=2", square([0, 0, 0], three, "90", "-10", "0", "7", "-1", "1/2")),
+        witness("output v y", square([0, 0], [[1, 0], [0, 1]], "3/2", "0", "1/4")),
+    ]
+    for entry in document["witnesses"]:
+        entry["squares"][0]["basis"] = [
+            row[: len(entry["squares"][0]["times"])] for row in entry["squares"][0]["basis"]
+        ]
+    return document
+
+
 def refuted(document, **refutation):
     for key in ("V", "claims", "witnesses"):
         del document[key]
@@ -227,6 +354,7 @@ def inhomogeneous_rest():
 
 PROOFS = [relay, disturbed_relay, decay, oscillator, oscillator_on_cells, weighted_pair]
 PROOFS += [bounded_oscillator, bounded_pair]
+PROOFS += [rooted_relay, settling_relay, nested_root, nested_sum, nested_sign, driven]
 REFUTATIONS = [overpowered_relay, sliding_rest, inhomogeneous_rest]
 
 
@@ -285,6 +413,71 @@ def test_the_statement_says_everything_that_was_verified():
         "homogeneous degrees: V 3, dV/dt 2",
         "conclusion: the origin is globally asymptotically stable, in finite time",
     )
+
+
+def test_roots_lifts_and_settling_times_are_stated():
+    assert "root: s in [7/5, 3/2] is the positive square root of k" in verify(rooted_relay()).statement
+    assert "dV/dt <= -2 * V^(1/2)" in verify(settling_relay()).statement
+    assert "settling time: the origin is reached within 1 * V(0)^(1/2)" in verify(settling_relay()).statement
+    lines = verify(nested_sign()).statement
+    assert 'argument of a nested power: n = 1*x + 1*y + 0 for ["7", ["c", "s"], [["x", "3", "a"]]]' in lines
+    assert "dx/dt = -1*sign(n)*|n|^(1/3)" in verify(nested_root()).statement
+
+
+def test_bounds_under_inputs_add_up():
+    """And 7/10 is above the true supremum 2 * (1/2) / 3."""
+    statement = verify(driven()).statement
+    assert "input, measurable in time: |v| <= 1/2, |dv/dt| <= 1" in statement
+    assert "under u alone: |y| <= 1/5" in statement
+    ending = "from rest, under all inputs within their limits, |y| <= 7/10 at all times"
+    assert statement[-1] == f"conclusion: {ending}"
+
+
+def test_cells_without_interior_need_no_witness_and_admit_none():
+    document = nested_sum()
+    thin = copy.deepcopy(document["witnesses"][1]) | {"obligation": "decrease ++-"}
+    document["witnesses"].insert(2, thin)
+    assert "next witness" in refusal(document)
+
+
+def test_a_lift_that_is_zero_on_open_sets_is_refused():
+    """x' = x + m, n = x, m = n - x = 0 is unstable, V = x^2, but z P = P (z - 0) for the variable z = 0 of m.
+
+    With h = tw - su and k = rz - (tw - su) every P has z P = rP h + rP k: no square is needed.
+    """
+    document = relay()
+    document["lifts"] = {
+        "n": [["1", [], [["x", "1", "s"]]]],
+        "m": [["1", [], [["n", "1", "s"]]], ["-1", [], [["x", "1", "s"]]]],
+    }
+    document["field"] = {"x": [["1", [], [["x", "1", "s"]]], ["1", [], [["m", "1", "s"]]]]}
+    for s, r in itertools.product((1, -1), repeat=2):
+        cofactor = {"2,0,0": str(-3 * r), "1,0,1": str(-2 * s)}
+        cell = "".join("+" if sign > 0 else "-" for sign in (s, s, r))
+        entry = witness(f"decrease {cell}", square([0] * 3, [[0] * 3], "1"), multiplier={"0,0,1": "1"})
+        document["witnesses"] += [entry | {"squares": [], "equalities": [cofactor] * 2}]
+    del document["witnesses"][1]
+    assert "zero on a null set only" in refusal(document)
+
+
+def test_lifts_may_be_nested():
+    """With y of its own in its argument the second lift is zero on a null set only: m = [n]^1 + y, n = x."""
+    document = nested_sum()
+    document["lifts"] = {
+        "n": [["1", [], [["x", "1", "s"]]]],
+        "m": [["1", [], [["n", "1", "s"]]], ["1", [], [["y", "1", "s"]]]],
+    }
+    document["field"] = {name: [["-2", [], [[name, "1", "s"]]], ["-1", [], [["m", "1", "s"]]]] for name in "xy"}
+    del document["witnesses"][1:]
+    for s, r, t in itertools.product((1, -1), repeat=3):
+        if s != r or r == t:  # else tz = sw + rv has no solution of positive numbers
+            # -V' - u^2 - v^2 = 3u^2 + 3v^2 + 2tz(su + rv); su = sw - h, sw + rv = tz - k
+            basis = [[int(i == j) for j in range(4)] for i in range(4)]
+            form = square([0] * 4, basis[:2] + basis[3:], "3", "0", "0", "3", "0", "2")
+            cofactors = [{"0,0,0,1": str(-2 * t)}] * 2
+            cell = "".join("+" if sign > 0 else "-" for sign in (s, r, s, t))
+            document["witnesses"].append(witness(f"decrease {cell}", form, equalities=cofactors))
+    assert verify(document).verdict == "proved"
 
 
 def test_bounds_of_states_are_stated_in_the_order_of_the_states():
@@ -697,7 +890,88 @@ BROKEN = {
         [("witnesses", 0, "squares", [square([0], [[1]], "1"), square([0], [[1]], "-1/2")])],
         "positive definite",
     ),
+    # roots
+    "root of nothing": (rooted_relay, [("roots", "s", 0, "q")], "gain or constant"),
+    "root of a list": (rooted_relay, [("roots", "s", 0, [])], "gain or constant"),
+    "root of a negative": (rooted_relay, [("gains", "k", "-2")], "positive number"),
+    "root of zero": (rooted_relay, [("gains", "k", "0"), ("roots", "s", ["k", "0", "1"])], "positive number"),
+    "root below its range": (rooted_relay, [("gains", "k", "1")], "contains the root"),
+    "root above its range": (rooted_relay, [("gains", "k", "3")], "contains the root"),
+    "root negative": (rooted_relay, [("roots", "s", 1, "-7/5")], "contains the root"),
+    "root both negative": (rooted_relay, [("roots", "s", ["k", "-2", "-1"])], "contains the root"),
+    "root reversed": (rooted_relay, [("roots", "s", ["k", "7/5", "-3"])], "lower end first"),
+    "root squared": (rooted_relay, [("field", "x", 0, 1, ["s", "s"])], "affine"),
+    "root in V": (rooted_relay, [("V", 0, 1, ["s"])], "uncertain"),
+    "root named like a gain": (rooted_relay, [("roots", "k", ["k", "0", "2"])], "different"),
+    "five roots": (rooted_relay, [("roots", {f"s{i}": ["k", "0", "2"] for i in range(5)})], "roots"),
+    # lifts
+    "lift unused": (nested_sum, [("lifts", "m", [["1", [], [["x", "1", "s"]]]])], "used"),
+    "lift used where disregarded": (
+        nested_sign,
+        [("lifts", {"m": X2, **nested_sign()["lifts"]}), ("lifts", "n", 2, 2, [["m", "1", "s"]])],
+        "used",
+    ),
+    "lift in itself": (nested_sum, [("lifts", "n", 0, 2, [["n", "1", "s"]])], "earlier lift"),
+    "lift in V": (nested_sum, [("V", 0, 2, [["n", "2", "a"]])], "power of a state"),
+    "lift of two degrees": (nested_sum, [("lifts", "n", 0, 2, [["x", "2", "s"]])], "form of one degree"),
+    "lift empty": (nested_sum, [("lifts", "n", [])], "form of one degree"),
+    "lift that varies": (nested_sign, [("lifts", "n", 0, 1, ["s"])], "that vary"),
+    "lift with a nonzero term": (nested_sign, [("gains", "c", "1")], "that vary"),
+    "lift to a fraction": (nested_sum, [("field", "x", 1, 2, [["n", "1/2", "s"]])], "integers"),
+    "lift twice": (nested_sum, [("field", "x", 1, 2, [["n", "1", "s"], ["n", "1", "a"]])], "at most once"),
+    "lift on reals": (decay, [("lifts", {"n": [["1", [], [["x", "1", "s"]]]]})], "lifts"),
+    "lift named like a state": (nested_sum, [("lifts", {"x": X2})], "different"),
+    "lift of other degree": (
+        nested_root,  # of degree 3 for x > 0 and 6 for x < 0
+        [("lifts", "n", [[f"{c}/2", [], [["x", a, kind]]] for c, a, kind in ("11s", "11a", "12s", ("-1", "2", "a"))])],
+        "of one degree on all cells",
+    ),
+    "equalities missing": (nested_sum, [("witnesses", 1, "equalities", [])], "equalities"),
+    "equality without lift": (relay, [("witnesses", 0, "equalities", [{"0": "1"}])], "equalities"),
+    "inequality without lift": (relay, [("witnesses", 0, "inequalities", [[]])], "inequalities"),
+    "inequality indefinite": (nested_sign, [("witnesses", 1, "inequalities", 0, 0, "gram", ["-2"])], "definite"),
+    "three squares of one variable": (relay, [("witnesses", 0, "squares", [square([0], [[1]], "1/6")] * 3)], "squares"),
+    # decay
+    "decay too large": (settling_relay, [("claims", "decay", "3")], "identity"),
+    "decay of zero": (settling_relay, [("claims", "decay", "0")], "positive"),
+    "decay on reals": (decay, [("claims", "decay", "1")], "unknown keys"),
+    "decay without witness": (relay, [("claims", "decay", "1")], "an object"),
+    # bounds
+    "bound with V": (driven, [("V", X2)], "unknown keys"),
+    "bound on cells": (driven, [("domain", "cells")], "reals"),
+    "bound with a root": (driven, [("roots", "s", ["k", "1", "2"])], "reals, without roots"),
+    "no inputs": (driven, [("inputs", {})], "inputs"),
+    "no outputs": (driven, [("outputs", {})], "outputs"),
+    "input unused": (driven, [("field", "x", 2, 1, ["u"])], "used"),
+    "input twice": (driven, [("field", "x", 2, 1, ["v", "v"])], "affine"),
+    "product of inputs": (driven, [("field", "x", 2, 1, ["u", "v"])], "linear"),
+    "input times state": (driven, [("field", "x", 2, 2, [["x", "1", "s"]])], "linear"),
+    "constant push": (driven, [("field", "x", 2, 1, ["k"])], "linear"),
+    "cubic field": (driven, [("field", "x", 0, 2, [["x", "3", "s"]])], "linear"),
+    "limit of zero": (driven, [("inputs", "u", "limits", ["0"])], "positive"),
+    "three limits": (driven, [("inputs", "v", "limits", ["1", "1", "1"])], "1 to 2"),
+    "share negative": (driven, [("inputs", "v", "sets", 0, "shares", ["7/2", "-1/2"])], "non-negative"),
+    "shares above the decay": (driven, [("inputs", "u", "sets", 0, "shares", ["4"])], "sum <= 3"),
+    "borrowed from itself": (
+        driven,
+        [("inputs", "u", "sets", 0, "shares", ["2"]), ("inputs", "u", "sets", 0, "borrowed", ["1"])],
+        "zero for the set itself",
+    ),
+    "borrowed too much": (driven, [("inputs", "u", "sets", 0, "borrowed", ["1"])], "sum <= 0"),
+    "weights above one": (driven, [("inputs", "u", "bounds", "y", "weights", ["2"])], "sum <= 1"),
+    "weight negative": (driven, [("inputs", "u", "bounds", "y", "weights", ["-1"])], "non-negative"),
+    "bound of an input zero": (driven, [("inputs", "u", "bounds", "y", "bound", "0")], "positive"),
+    "bound too small": (driven, [("inputs", "u", "bounds", "y", "bound", "1/10")], "identity"),
+    "limit too large": (driven, [("inputs", "u", "limits", ["1"])], "identity"),
+    "set not around the input": (driven, [("inputs", "v", "limits", ["2", "1"])], "input alone"),
+    "input in V without a rate": (driven, [("inputs", "u", "sets", 0, "V", 0, 2, [["u", "2", "a"]])], "of a state"),
+    "uncertain in a set": (driven, [("inputs", "u", "sets", 0, "V", 0, 1, ["b"])], "product of gains"),
+    "uncertain in an output": (driven, [("outputs", "y", 0, 1, ["b"])], "product of gains"),
+    "quartic set": (driven, [("inputs", "u", "sets", 0, "V", 0, 2, [["x", "4", "a"]])], "of degree 2"),
+    "cubic output": (driven, [("outputs", "y", 0, 2, [["x", "3", "s"]])], "of degree 1"),
+    "output of zero": (driven, [("outputs", "y", [])], "form of one degree"),
     # refutations
+    "refutation with roots": (overpowered_relay, [("roots", {"s": ["k", "1", "2"]})], "empty"),
     "refutation with V": (overpowered_relay, [("V", X2)], "unknown keys"),
     "refutation on reals": (
         overpowered_relay,
@@ -982,7 +1256,7 @@ def test_a_changed_witness_is_always_refused(make):
 @pytest.mark.parametrize("make", PROOFS)
 def test_a_changed_exponent_in_a_multiplier_is_refused(make):
     for index, entry in enumerate(make()["witnesses"]):
-        (key,) = entry["multiplier"]
+        key = min(entry["multiplier"])
         raised = key[:-1] + "1"
         assert refusal(edited(make(), ("witnesses", index, "multiplier", {raised: "1"})))
 
@@ -1005,6 +1279,11 @@ def test_sampling_tells_true_statements_from_false_ones():
     assert not looks_true(edited(relay(), ("claims", "positive", "2")))
     assert not looks_true(edited(oscillator(), ("claims", "rate", "1/2")))
     assert not looks_true(edited(bounded_oscillator(), ("claims", "bound_x", "3")))
+    assert not looks_true(edited(rooted_relay(), ("gains", "k", "1/5")))
+    assert not looks_true(edited(settling_relay(), ("claims", "decay", "5")))
+    assert not looks_true(edited(nested_root(), ("claims", "decrease", "3/2")))
+    assert not looks_true(edited(nested_sign(), ("field", "x", 1, 0, "3")))
+    assert not looks_true(edited(driven(), ("inputs", "u", "limits", ["3"])))
     assert not looks_true(edited(overpowered_relay(), ("refutation", "parameters", "d", "1")))
 
 
@@ -1022,7 +1301,14 @@ def evaluate(terms, point, numbers):
 
 
 def known_numbers(document):
-    return {name: float(Fraction(text)) for name, text in (document["gains"] | document["constants"]).items()}
+    numbers = {name: float(Fraction(text)) for name, text in (document["gains"] | document["constants"]).items()}
+    return numbers | {name: sqrt(numbers[square]) for name, (square, _, _) in document["roots"].items()}
+
+
+def with_lifts(document, point, numbers):
+    for lift, terms in document["lifts"].items():
+        point = {**point, lift: evaluate(terms, point, numbers)}
+    return point
 
 
 def slope(document, point, numbers):
@@ -1031,7 +1317,7 @@ def slope(document, point, numbers):
     for state, terms in document["field"].items():
         up, down = ({**point, state: point[state] + sign * step} for sign in (1, -1))
         rise = evaluate(document["V"], up, numbers) - evaluate(document["V"], down, numbers)
-        total += rise / (2 * step) * evaluate(terms, point, numbers)
+        total += rise / (2 * step) * evaluate(terms, with_lifts(document, point, numbers), numbers)
     return total
 
 
@@ -1039,6 +1325,8 @@ def looks_true(document, samples=60):
     """Sample the two inequalities; for a refutation, add up the field beside the point."""
     if "refutation" in document:
         return balances(document)
+    if "inputs" in document:
+        return contains_the_worst_case(document)
     generator, numbers, weights = random.Random(2), known_numbers(document), document["states"]
     claims = {key: float(Fraction(text)) for key, text in document["claims"].items()}
     decay = claims["rate" if document["domain"] == "reals" else "decrease"]
@@ -1052,7 +1340,8 @@ def looks_true(document, samples=60):
             bound = 2 * decay * value
         else:  # the degree of V' follows from doubling u
             far = {state: number * 2 ** weights[state] for state, number in x.items()}
-            bound = decay * power_sum(x, weights, round(log2(slope(document, far, numbers) / rate)))
+            n = round(log2(slope(document, far, numbers) / rate))
+            bound = max(decay * power_sum(x, weights, n), claims.get("decay", 0.0) * value ** (n / m))
         if value < claims["positive"] * power_sum(x, weights, m) - 1e-6 or rate > -bound + 1e-4:
             return False
         for state, weight in weights.items():
@@ -1063,6 +1352,25 @@ def looks_true(document, samples=60):
 
 def power_sum(point, weights, degree):
     return sum(abs(point[state]) ** (degree / weight) for state, weight in weights.items())
+
+
+def contains_the_worst_case(document):
+    """For x' = -ax + sum b_i u_i and y = cx the supremum of |y|, with constant inputs, is |c| sum |b_i u_i| / min a."""
+    numbers, ((state, terms),) = known_numbers(document), document["field"].items()
+    ranges = {name: [float(Fraction(end)) for end in ends] for name, ends in document["uncertain"].items()}
+    inputs = {name: float(Fraction(entry["limits"][0])) for name, entry in document["inputs"].items()}
+    slopes, pushes = [], []
+    for values in itertools.product(*ranges.values()):
+        numbers |= dict(zip(ranges, values, strict=True)) | dict.fromkeys(inputs, 0.0)
+        slopes.append(-evaluate(terms, {state: 1.0}, numbers))
+        sizes = [abs(evaluate(terms, {state: 0.0}, {**numbers, name: limit})) for name, limit in inputs.items()]
+        pushes.append(sum(sizes))
+    for output, factors in document["outputs"].items():
+        claimed = sum(Fraction(entry["bounds"][output]["bound"]) for entry in document["inputs"].values())
+        worst = abs(evaluate(factors, {state: 1.0}, numbers)) * max(pushes) / min(slopes)
+        if min(slopes) <= 0 or claimed < worst - 1e-9:
+            return False
+    return True
 
 
 def balances(document):

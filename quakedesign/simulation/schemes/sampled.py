@@ -16,6 +16,7 @@ from quakedesign.simulation.schemes import lawful
 from quakedesign.simulation.schemes.base import Scheme
 from quakedesign.simulation.schemes.control_step import SIGNALS, ControlStep, control_step
 from quakedesign.simulation.schemes.lawful import Law, Values
+from quakedesign.simulation.sensing.base import Sensor
 
 MOST_SUBSTEPS = 100
 
@@ -64,7 +65,8 @@ class Sampled(Scheme):
     substeps : int
         Steps of the integrator per sample, 1 … 100.
     actuator : Actuator
-    measurement : Measurement
+    measurement : Measurement or Sensor
+        A sensor is told the true slip alone, once per sample of its own period.
     authority : float or None
         Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
 
@@ -77,7 +79,7 @@ class Sampled(Scheme):
 
     substeps: int = 1
     actuator: Actuator = DIRECT
-    measurement: Measurement = EXACT
+    measurement: Measurement | Sensor = EXACT
     authority: float | None = None
 
     def __post_init__(self) -> None:
@@ -107,8 +109,10 @@ class Sampled(Scheme):
         return authority_range(loop)[0]
 
     def memory(self, loop: ClosedLoop, step: float) -> dict[str, float]:
-        """See `Scheme.memory`."""
+        """See `Scheme.memory`; refuses a sensor that was made for another step."""
         self.actuator.require_resolved(step / self.substeps)
+        if isinstance(self.measurement, Sensor):
+            self.measurement.require_step(step)
         parts = self._parts(loop)
         return {f"{name}_{i}": float(v) for name, values in parts.items() for i, v in enumerate(values)}
 

@@ -8,6 +8,7 @@ from typing import Any
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.claim import require
 from quakedesign.certificates.linear_premises import Sectors, rest_pressure, sectors
+from quakedesign.certificates.tracking import needed_inputs, reference_rates
 from quakedesign.controllers import Controller
 from quakedesign.controllers.elqr import PressureLimits
 from quakedesign.errors import ParameterError, UnknownNameError
@@ -16,7 +17,6 @@ from quakedesign.rationals import rational
 from quakedesign.synthesis.linear.peak import PeakBound
 from quakedesign.synthesis.linear.peak_search import find_peak_bound
 from quakedesign.synthesis.linear.polytope import ErrorLoop, error_loop
-from quakedesign.synthesis.linear.tracking import disturbance_inputs, reference_rates, tracking_inputs
 
 CLASSES = ("amplitude", "rate")
 PREMISES = (
@@ -191,10 +191,9 @@ def _without_limits(controller: Controller) -> Controller:
 
 def _channels(fault: Fault, controller: Controller, needed: Sectors, kind: str) -> dict[str, dict[str, Fraction]]:
     """Inputs that are bounded apart: the disturbance, and everything that the reference causes."""
-    tracking = tracking_inputs(fault, _without_limits(controller), needed)
-    found = {f"reference_{name}": {name: bound} for name, bound in tracking.items()}
-    disturbance = disturbance_inputs(fault, kind == "rate")
-    return ({"disturbance": disturbance} if disturbance else {}) | found
+    found = needed_inputs(fault, _without_limits(controller), needed, kind == "rate")
+    names = {name: "force" if name == "disturbance" else name.removeprefix("reference_") for name in found}
+    return {name: dict(zip((names[name], "force_rate"), limits, strict=False)) for name, limits in found.items()}
 
 
 def loop_for(fault: Fault, controller: Controller) -> ErrorLoop:

@@ -1,5 +1,8 @@
 """What can be said about a given K on a fault, as plain values for the command line and for reports."""
 
+from collections.abc import Sequence
+from fractions import Fraction
+from math import isfinite
 from typing import Any
 
 from quakedesign.certificates import Verdict
@@ -15,7 +18,9 @@ from quakedesign.synthesis.linear.sampled import hold_verdict, largest_step
 from quakedesign.synthesis.linear.theorem import both_tests, printed_row
 
 
-def linear_facts(fault: Fault, controller: ExtendedLQR, *, step: float | str | None = None) -> dict[str, Any]:
+def linear_facts(
+    fault: Fault, controller: ExtendedLQR, *, step: float | str | Fraction | None = None
+) -> dict[str, Any]:
     """Bounds, both tests of Theorem 2, sampled stability and the cost of both kinds of feedback.
 
     Parameters
@@ -29,25 +34,42 @@ def linear_facts(fault: Fault, controller: ExtendedLQR, *, step: float | str | N
     -------
     dict
         Keys ``inverse_optimal`` (whether K is optimal for a Q that covers the uncertainty; None when undecided),
-        ``tests``, ``bounds``, ``smallest_gain``, ``sampling`` and ``feedback``; SI.
+        ``tests``, ``bounds``, ``smallest_gain``, ``held`` (see `held_facts`) and ``feedback``; SI.
     """
     gains, problem = tuple(controller.gains.values()), LinearProblem.of(fault)
     tests = both_tests(problem, gains, printed_row(fault))
     period = rational(fault.sampling_time if step is None else step, "step")
-    held, longest, least = hold_verdict(problem, gains, period), largest_step(problem, gains), smallest_gain(problem)
+    least = smallest_gain(problem)
     decided = {Verdict.PROVED: True, Verdict.REFUTED: False, Verdict.UNDECIDED: None}
     return {
         "inverse_optimal": decided[tests.sound.verdict],
         "tests": tests.to_dict(),
         "bounds": uncertainty_bounds(fault).to_dict(),
         "smallest_gain": {"k1": least.slip, "k2": least.rate},
-        "sampling": {
-            "constant": held.to_dict(),
-            "varying": str(varying_verdict(problem, gains, period).verdict),
-            "largest_step": float(longest.proved) if longest else None,
-        },
+        "held": held_facts(problem, gains, period),
         "feedback": [
             {"feedback": c.feedback, "lag": c.lag, "largest_term": c.largest_term, "pressure": c.pressure}
             for c in (compare_feedback(fault, gains) if gains[3] else ())
         ],
+    }
+
+
+def held_facts(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction) -> dict[str, Any]:
+    """What is decided of a K when p is held over a sampling period [s]; SI.
+
+    Returns
+    -------
+    dict
+        ``step``; ``verdict`` for constant parameters anywhere in the box, ``varying`` for any course of them; the
+        spectral ``radius`` of a period (largest over the vertices, measured); ``witness`` (β, s, w) of a refutation;
+        ``largest_step`` up to which every period is proved for constant parameters, None when the loop is unstable.
+    """
+    held, longest = hold_verdict(problem, gains, step), largest_step(problem, gains)
+    return {
+        "step": float(step),
+        "verdict": str(held.verdict),
+        "varying": str(varying_verdict(problem, gains, step).verdict),
+        "radius": held.radius if isfinite(held.radius) else None,
+        "witness": [float(v) for v in held.witness] if held.witness else None,
+        "largest_step": float(longest.proved) if longest else None,
     }

@@ -86,14 +86,14 @@ def varying_proof(
     return (
         multiplier > 0
         and definite(P)
-        and all(definite(_decrease(problem, gains, step, v, P, multiplier)) for v in problem.vertices())
+        and all(definite(decrease_form(problem, gains, step, v, P, multiplier)) for v in problem.vertices())
     )
 
 
-def _decrease(
+def decrease_form(
     problem: LinearProblem, K: Sequence[Fraction], step: Fraction, vertex: Vertex, P: Matrix, weight: Fraction
 ) -> Matrix:
-    """Matrix (5 × 5) of minus the form in (x, δ)."""
+    """Matrix (5 × 5) of minus the form in (x, δ) at a vertex, for P and λ in the units of the problem."""
     return total(_first(problem, K, vertex, P), times(weight, _second(problem, K, step, vertex)))
 
 

@@ -10,7 +10,7 @@ from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
-from quakedesign.sos.solve.search import solve
+from quakedesign.sos.solve.conic import solve
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.finishing import finish
 from quakedesign.synthesis.linear.polytope import Polytope, modal_scaling, polytope_of

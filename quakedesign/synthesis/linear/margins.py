@@ -1,6 +1,6 @@
 """How much of the box a given K tolerates: friction slope, range of β, decay rate. Each proved, beside its limit."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -256,22 +256,3 @@ def supremum(loop_at: Callable[[Fraction], Loop], limit: Fraction, steps: int = 
         found = CommonQuadratic(polytope_of(loop_at(middle)))()
         low, high = (middle, high) if found is not None and found.rate > 0 else (low, middle)
     return float(low)
-
-
-def analysis(fault: Fault, controller: Controller) -> Mapping[str, Any]:
-    """Every certified margin of a given K with its limits, as plain values; what a verdict on gains prints."""
-    from quakedesign.synthesis.linear.frequency import frequency_facts
-
-    needed = sectors(fault)
-    decay = decay_rate(sector_loop(controller, needed))
-    slope, span = friction_slope_margin(fault, controller), gain_range(fault, controller)
-    loop = error_loop(tuple(controller.gains.values()), needed)
-    facts = [frequency_facts(loop, corner) for corner in loop.corners()]
-    return {
-        "verdict": "proved" if decay is not None else "undecided",
-        "decay_rate": str(decay.certified) if decay else None,
-        "decay_limit": decay.limit if decay else None,
-        **(slope.to_dict() if slope else {"friction_slope_margin": None}),
-        **(span.to_dict() if span else {}),
-        "frequency": [{name: getattr(f, name) for name in f.__slots__} for f in facts],
-    }

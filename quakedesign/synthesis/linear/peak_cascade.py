@@ -7,7 +7,7 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
-from quakedesign.sos.solve.search import solve
+from quakedesign.sos.solve.conic import solve
 from quakedesign.synthesis.linear.peak import Ellipsoid, PeakBound
 from quakedesign.synthesis.linear.peak_search import ScaledInputs, short
 from quakedesign.synthesis.linear.polytope import ErrorLoop

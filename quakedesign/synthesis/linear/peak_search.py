@@ -7,7 +7,7 @@ from typing import Any
 
 from quakedesign.errors import CertificateError
 from quakedesign.rationals import nearest
-from quakedesign.sos.solve.search import solve
+from quakedesign.sos.solve.conic import solve
 from quakedesign.synthesis.linear.peak import ENTERS, Ellipsoid, PeakBound, tightest_bound
 from quakedesign.synthesis.linear.polytope import ERROR_STATES, ErrorLoop, modal_scaling
 

@@ -16,8 +16,8 @@ from quakedesign.errors import CertificateError, ParameterError, UnknownNameErro
 from quakedesign.fault import Disturbance
 from quakedesign.synthesis.linear.certified_peaks import certified_peaks, loop_for
 from quakedesign.synthesis.linear.disturbance_search import bang_bang, rate_limited, switched
-from quakedesign.synthesis.linear.tracking import disturbance_inputs, reference_rates, tracking_inputs
-from quakedesign.synthesis.riccati import riccati_design
+from quakedesign.certificates.tracking import disturbance_inputs, reference_rates, tracking_inputs
+from quakedesign.synthesis.linear.riccati import riccati_design
 
 
 @pytest.fixture(scope="module")

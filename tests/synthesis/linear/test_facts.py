@@ -13,17 +13,17 @@ def test_the_facts_of_the_published_gains_can_be_written_as_json():
     facts = json.loads(json.dumps(linear_facts(LAB, qd.published("lab-fault")["elqr"])))
     assert facts["inverse_optimal"] is True
     assert facts["tests"]["sound"]["verdict"] == "proved"
-    assert facts["sampling"]["constant"]["verdict"] == "refuted"
-    assert 0.6e-3 < facts["sampling"]["largest_step"] < 0.7e-3
+    assert facts["held"]["verdict"] == "refuted"
+    assert 0.6e-3 < facts["held"]["largest_step"] < 0.7e-3
     assert [f["feedback"] for f in facts["feedback"]] == ["error", "state"]
-    assert linear_facts(LAB, qd.published("lab-fault")["elqr"], step="0.5e-3")["sampling"]["varying"] == "proved"
+    assert linear_facts(LAB, qd.published("lab-fault")["elqr"], step="0.5e-3")["held"]["varying"] == "proved"
 
 
 def test_a_destabilising_gain_has_facts_too():
     good = qd.published("lab-fault")["elqr"]
     facts = linear_facts(LAB, replace(good, gains={n: -k for n, k in good.gains.items()}))
     assert facts["inverse_optimal"] is False
-    assert facts["sampling"]["largest_step"] is None
+    assert facts["held"]["largest_step"] is None
 
 
 def test_without_double_integral_action_there_is_no_way_to_compare():

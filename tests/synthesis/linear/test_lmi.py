@@ -16,7 +16,8 @@ from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.lmi import CommonQuadratic, robust_stability, sector_loop, synthesise
 from quakedesign.synthesis.linear.polytope import Polytope, polytope_of
-from quakedesign.synthesis.riccati import riccati_design, vertex_poles
+from quakedesign.synthesis.linear.riccati import riccati_design
+from quakedesign.synthesis.linear.scaled_design import vertex_poles
 
 CHECKER = Path(__file__).parents[3] / "proofs" / "check.py"
 

@@ -12,8 +12,8 @@ from quakedesign.certificates.linear_premises import sectors
 from quakedesign.controllers import published
 from quakedesign.synthesis.linear.frequency import slip_limit, stable_quartic
 from quakedesign.synthesis.linear.lmi import sector_loop
+from quakedesign.synthesis.linear.analysis import analysis
 from quakedesign.synthesis.linear.margins import (
-    analysis,
     decay_rate,
     friction_slope_margin,
     gain_range,
@@ -21,7 +21,7 @@ from quakedesign.synthesis.linear.margins import (
     supremum,
 )
 from quakedesign.synthesis.linear.polytope import error_loop
-from quakedesign.synthesis.riccati import riccati_design
+from quakedesign.synthesis.linear.riccati import riccati_design
 
 
 @pytest.fixture(scope="module", params=["real-fault", "lab-fault"])
@@ -122,7 +122,7 @@ def test_the_margin_over_uncertain_inertia_is_refused_for_nothing():
 def test_the_analysis_is_plain():
     fault = qd.load_fault("real-fault")
     designed = riccati_design(fault).controller
-    facts = json.loads(json.dumps(analysis(fault, designed)))
+    facts = json.loads(json.dumps(analysis(fault, designed).to_dict()))
     assert facts["verdict"] == "proved"
     assert F(facts["friction_slope_margin"]) < F(facts["linear_limit"])
     assert 0 < F(facts["decay_rate"]) <= facts["decay_limit"]

@@ -15,8 +15,8 @@ from quakedesign.sos.exact.definiteness import full_matrix
 from quakedesign.synthesis.linear.certified_peaks import loop_for
 from quakedesign.synthesis.linear.disturbance_search import bang_bang, rate_limited, switched
 from quakedesign.synthesis.linear.peak_cascade import cascade, separated
-from quakedesign.synthesis.linear.tracking import disturbance_inputs, tracking_inputs
-from quakedesign.synthesis.riccati import riccati_design
+from quakedesign.certificates.tracking import disturbance_inputs, tracking_inputs
+from quakedesign.synthesis.linear.riccati import riccati_design
 
 
 @pytest.fixture(scope="module")

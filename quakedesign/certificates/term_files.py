@@ -1,0 +1,61 @@
+"""Numbers and sums of terms in a certificate file, read and written."""
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.certificates.claim import Loop
+from quakedesign.sos.exact.strict import listed, need, read_rational
+from quakedesign.symbolic.terms import Term
+
+LIMITS = {
+    "roots": 4,
+    "lifts": 4,
+    "states": 6,
+    "uncertain": 8,
+    "parameters": 64,
+    "terms": 200,
+    "basis": 200,
+    "witnesses": 4096,
+    "inputs": 8,
+    "outputs": 8,
+    "sets": 12,
+}
+"""Largest number of each in a file."""
+
+
+def read_terms(raw: Any, loop: Loop, powers: Sequence[str]) -> tuple[Term, ...]:
+    """Sum of terms with powers of the given names; parameters are all others of the loop."""
+    return tuple(_term(entry, loop, powers) for entry in listed(raw, "terms", LIMITS["terms"]))
+
+
+def _term(raw: Any, loop: Loop, powers: Sequence[str]) -> Term:
+    number, names, entries = listed(raw, "a term", length=3)
+    coefficient = read_rational(number)
+    need(coefficient != 0, "a term must not be zero")
+    known = {*loop.gains, *loop.constants, *loop.ranges, *loop.inputs}
+    parameters = tuple(listed(names, "parameters", 32))
+    need(all(isinstance(n, str) and n in known for n in parameters), "a term has an unknown parameter")
+    factors = tuple(_factor(entry, powers) for entry in listed(entries, "factors", len(powers)))
+    need(len({f[0] for f in factors}) == len(factors), "a state occurs twice in a term")
+    return Term(coefficient, parameters, factors)
+
+
+def _factor(raw: Any, powers: Sequence[str]) -> tuple[str, Fraction, str]:
+    state, exponent, kind = listed(raw, "a factor", length=3)
+    power = read_rational(exponent)
+    need(isinstance(state, str) and state in powers, "a factor has an unknown state")
+    need(
+        kind in ("s", "a") and 0 <= power <= 24 and (kind == "s" or power > 0), "a factor has a wrong kind or exponent"
+    )
+    return state, power, kind
+
+
+def texts(values: Mapping[str, Fraction]) -> dict[str, str]:
+    """Numbers by name."""
+    return {name: str(v) for name, v in values.items()}
+
+
+def plain_terms(terms: tuple[Term, ...]) -> list[Any]:
+    """Inverse of `read_terms`."""
+    return [[str(t.coefficient), list(t.parameters), [[s, str(e), k] for s, e, k in t.factors]] for t in terms]

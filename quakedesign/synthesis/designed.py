@@ -1,0 +1,111 @@
+"""A controller for one fault with what is proved of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.certificates import Certificate, Verdict
+from quakedesign.certificates.premises import Domain, Premise, Variant, feedforward_variants
+from quakedesign.controllers import Controller, SlidingMode, control_law
+from quakedesign.controllers.feed_forward import NONE
+from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks, certified_peaks
+from quakedesign.synthesis.linear.facts import held_facts
+from quakedesign.synthesis.linear.problem import LinearProblem
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """A controller for one fault, what is proved of it, and under which premises.
+
+    Attributes
+    ----------
+    fault : Fault
+    name : str
+        Name of the control law.
+    verdict : Verdict
+    controller : Controller or None
+        None only when no gains with a proof were found.
+    certificate : Certificate or None
+        Proof for the base gains (λ = 1), or the counterexample.
+    premises : tuple of Premise
+    domain : Domain or None
+        Certified domain of the self-consistent premise on |h'|.
+    details : mapping
+        What synthesis decided: exact numbers as texts.
+    """
+
+    fault: Fault
+    name: str
+    verdict: Verdict
+    controller: Controller | None
+    certificate: Certificate | None
+    premises: tuple[Premise, ...]
+    domain: Domain | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def gains(self) -> dict[str, Fraction]:
+        """Exact gains; for a sliding mode also ``scale`` λ, ``divisor`` μ0N̂0 [m²/kg] and a feed-forward that is on."""
+        law = self.controller
+        if not isinstance(law, SlidingMode):
+            return dict(law.gains) if law else {}
+        added = {} if law.feedforward == NONE else law.feedforward.coefficients
+        known = {f"feedforward_{name}": value for name, value in added.items()}
+        return {**law.gains, "scale": law.scale, "divisor": law.divisor, **known}
+
+    @property
+    def title(self) -> str:
+        """Name for people."""
+        return control_law(self.name).title
+
+    def with_premise(self, premise: Premise) -> "Design":
+        """Return the design with one more premise, such as one read off a run."""
+        return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
+
+    def feedforward_variants(self) -> tuple[Variant, ...]:
+        """Premises and domain of the same gains with every named feed-forward, its own first; none for other laws.
+
+        Takes a few seconds.
+        """
+        if not isinstance(self.controller, SlidingMode):
+            return ()
+        return feedforward_variants(self.fault, self.controller, self.certificate)
+
+    def certified_peaks(self, disturbance_class: str = "amplitude") -> CertifiedPeaks | None:
+        """How far an e-LQR lets slip, slip rate and pressure go at most; see `quakedesign.synthesis.linear`.
+
+        Parameters
+        ----------
+        disturbance_class : str
+            ``"amplitude"``: any disturbance as large as the fault's; ``"rate"``: and no faster.
+
+        Returns
+        -------
+        CertifiedPeaks or None
+            None when nothing is certified, or for another law.
+        """
+        if self.controller is None or isinstance(self.controller, SlidingMode):
+            return None
+        return certified_peaks(self.fault, self.controller, disturbance_class=disturbance_class)
+
+    def held_facts(self) -> dict[str, Any] | None:
+        """What is decided of an e-LQR when p is held over the fault's sampling time; None for another law."""
+        if self.controller is None or isinstance(self.controller, SlidingMode):
+            return None
+        gains = tuple(self.controller.gains.values())
+        return held_facts(LinearProblem.of(self.fault), gains, rational(self.fault.sampling_time))
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in self.gains.items())
+        rows = "".join(
+            f"<tr><td>{escape(p.name)}</td><td>{p.required:.4g} {p.unit}</td><td>{p.certified:.4g} {p.unit}</td>"
+            f"<td>{'yes' if p.holds else 'no'}</td></tr>"
+            for p in self.premises
+        )
+        head = "<tr><th>premise</th><th>required</th><th>certified</th><th>holds</th></tr>"
+        return f"<b>{self.title}: {self.verdict}</b><br>{escape(gains)}<table>{head}{rows}</table>"

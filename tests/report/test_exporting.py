@@ -1,0 +1,28 @@
+"""What the command line says about an export."""
+
+import json
+
+from quakedesign.controllers import published
+from quakedesign.fault import load_fault
+from quakedesign.report.exporting import export_answer, export_lines
+
+LAB = load_fault("lab-fault")
+LAW = published("lab-fault")["cta"]
+
+
+def test_files_facts_and_the_premise_of_the_differentiator_are_told(tmp_path):
+    answer = export_answer(LAB, LAW, tmp_path / "c", scheme="implicit", differentiator_bound=1e4)
+    assert answer["measurement"] == {"slip": "m"}
+    assert all((tmp_path / "c" / name).is_file() for name in ("controller.h", "controller.c"))
+    (premise,) = answer["premises"]
+    assert (premise["name"], premise["certified"]) == ("differentiator", 1e4)
+    assert json.loads(json.dumps(answer, allow_nan=False)) == answer
+    said = "\n".join(export_lines(answer))
+    assert "premise differentiator" in said
+    assert "scheme: implicit" in said
+
+
+def test_without_a_differentiator_there_is_no_premise(tmp_path):
+    answer = export_answer(LAB, LAW, tmp_path / "c")
+    assert answer["premises"] == []
+    assert list(answer["measurement"]) == ["slip", "slip_rate"]

@@ -1,0 +1,145 @@
+"""The sampling report: rows, orders, sensitivities; and what issue and README promise for the real fault."""
+
+import io
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from quakedesign.controllers import control_law
+from quakedesign.controllers.feed_forward import feed_forward
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.report.sampling import (
+    COLUMNS,
+    noise_levels,
+    order_rows,
+    sampling_report,
+    study_rows,
+)
+from quakedesign.report.sampling_output import print_sampling, write_sampling
+from quakedesign.simulation import Study
+
+REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
+OWN = replace(LAB, name="own")  # without published gains
+BASE = control_law("cta").from_values(("7", "5", "2.3", "1.1"), divisor="4/1385")
+LINEAR = control_law("elqr").from_values(("4.17e7", "6.94e5", "4.17e6", "1.39e4"))
+
+
+@pytest.fixture(scope="module")
+def report():
+    return sampling_report(OWN, LINEAR, schemes=("implicit", "explicit"), duration=0.2)
+
+
+def test_every_scheme_has_a_row_and_every_question_a_study(report):
+    assert [row.scheme for row in report.rows] == ["implicit", "explicit"]
+    assert list(report.studies) == ["slip_noise", "rate_noise", "input_gain"]
+    assert {len(row.cells()) for row in report.rows} == {len(COLUMNS)}
+
+
+def test_json_holds_all_of_it(report):
+    found = json.loads(json.dumps(report.to_dict(), allow_nan=False))
+    assert set(found) == {"fault", "schemes", "orders", "slip_noise", "rate_noise", "input_gain"}
+    assert found["orders"] is None
+    first = found["schemes"][0]
+    assert (first["law"], first["origin"], first["scale"], first["on_trajectory"]) == ("elqr", "given", None, None)
+    assert first["metrics"]["max_slip_error"] > 0
+    assert first["energy_residual"] < 1e-3
+    assert len(found["input_gain"]["levels"]) == 3
+
+
+def test_the_folder_and_the_terminal_show_it(report, tmp_path):
+    from rich.console import Console
+
+    write_sampling(report, tmp_path / "out")
+    names = {str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*.*")}
+    assert names == {"results.json", *(f"figures/{n}.png" for n in report.studies)}
+    console = Console(width=80, record=True, file=io.StringIO())
+    print_sampling(report, console)
+    said = console.export_text()
+    assert "e-LQR" in said
+    assert all(len(line) <= 80 for line in said.splitlines() if line.startswith(("implicit", "explicit")))
+
+
+def test_a_sliding_mode_is_run_with_other_scales_against_the_bound_times_the_scale():
+    """No certificate of a 2-CTA exceeds λ(k3 − k4), ERRATA after row 29; with feed-forward e3 is not ξ1 + h."""
+    law = BASE.with_feedforward(feed_forward("nominal", LAB, BASE.divisor))
+    found = sampling_report(OWN, law, scales=("1/2",), schemes=("explicit",), duration=0.1)
+    assert [float(row.controller.scale) for row in found.rows] == [1, 0.5]
+    assert [row.premise.certified for row in found.rows] == pytest.approx([1.2, 0.6])
+    assert "orders" not in found.studies
+
+
+def test_a_linear_law_has_no_scale():
+    with pytest.raises(ParameterError, match="scale belongs"):
+        sampling_report(OWN, LINEAR, scales=("2",), duration=0.1)
+
+
+def study(values):
+    errors = {"explicit": {"slip_error": values, "slip_rate_error": (1.0, 10.0, 100.0)}}
+    return Study(title="t", label="T_s", unit="s", levels=(0.1, 1.0, 10.0), errors=errors)
+
+
+def test_orders_are_exponents_and_a_run_that_diverged_has_none():
+    cubic, lost = study((1e-3, 1.0, 1e3)), study((1e-3, 1.0, math.inf))
+    head, rows = order_rows(cubic)
+    assert head[1:3] == ("order of |e1|", "order of |e2|")
+    assert rows == [("explicit", "3.00", "1.00", "1.0e-03", "1.0e+00")]
+    assert order_rows(lost)[1][0][1] == "–"
+    assert lost.to_dict()["errors"]["explicit"]["slip_error"] == [1e-3, 1.0, None]
+    assert study_rows(cubic)[1][0] == ("explicit", "|e1| [m]", "1.0e-03", "1.0e+00", "1.0e+03")
+
+
+def test_levels_of_noise_follow_from_the_task():
+    assert noise_levels(REAL, "slip_noise")[0] == pytest.approx(1e-8 * REAL.reference.target_slip, rel=0.05)
+    rates = noise_levels(LAB, "rate_noise")
+    assert rates[2] == pytest.approx(LAB.reference.target_slip / LAB.reference.operation_time, rel=0.05)
+    assert rates == tuple(sorted(rates))
+
+
+@pytest.fixture(scope="module")
+def promised():
+    from quakedesign.synthesis import design
+
+    return sampling_report(REAL, design(REAL, "cta"), scales=("1/1000",))
+
+
+def errors(row):
+    return row.run.metrics.max_slip_error, row.run.metrics.max_slip_rate_error
+
+
+def within(row):
+    return None not in errors(row) and errors(row)[0] < 1e-5 and errors(row)[1] < 6e-6
+
+
+@pytest.mark.slow
+def test_the_implicit_scheme_keeps_the_rate_error_below_ten_micrometres_per_second(promised):
+    """At λ = 1e-3; the designed λ = 2.5e-4 leaves 1.4e-5 m/s."""
+    rates = {float(r.controller.scale): errors(r)[1] for r in promised.rows if r.scheme == "implicit"}
+    assert rates[1e-3] < 1e-5 < min(rates[s] for s in rates if s < 1e-3) < 1.5e-5
+
+
+@pytest.mark.slow
+def test_the_compensated_scheme_alone_reaches_both_limits_at_once(promised):
+    assert {r.scheme for r in promised.rows if within(r)} == {"compensated"}
+    assert all(within(r) for r in promised.rows if r.scheme == "compensated")
+    assert sum(r.origin == "published" for r in promised.rows) == 6
+    assert all(0 < r.premise.ratio < 1 for r in promised.rows if r.scheme == "compensated")
+
+
+@pytest.mark.slow
+def test_its_sensitivity_stands_beside_it(promised):
+    gain = promised.studies["input_gain"].errors["compensated"]
+    assert max(gain["slip_error"]) < 1e-5
+    assert max(gain["slip_rate_error"]) < 6e-6
+    for name in ("slip_noise", "rate_noise"):
+        found = promised.studies[name].errors["compensated"]
+        assert found["slip_error"][1] < 1e-5
+        assert found["slip_rate_error"][1] < 6e-6
+        assert found["slip_rate_error"][-1] > 1e-4  # noise is not compensated
+
+
+@pytest.mark.slow
+def test_the_orders_of_the_explicit_scheme_are_three_two_and_one(promised):
+    assert list(promised.studies["orders"].orders()["explicit"].values()) == pytest.approx((3, 2, 1), abs=0.12)

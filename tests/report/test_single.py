@@ -1,0 +1,90 @@
+"""One run as the command line asks for it: gains, options, premises."""
+
+from fractions import Fraction
+
+import pytest
+
+from quakedesign.controllers.feed_forward import feed_forward
+from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.fault import load_fault
+from quakedesign.report.single import chosen_controller, run_single
+from quakedesign.simulation import Load, Measurement
+
+LAB = load_fault("lab-fault")
+USUAL = {"step": None, "scheme": "continuous", "method": "dormand-prince", "plant": "smooth", "substeps": 1}
+BASE = ("7", "5", "2.3", "1.1")
+
+
+def told(law, **more):
+    known = {"duration", "load", "noise", "differentiator_bound", "filter_order"}
+    rest = {k: v for k, v in more.items() if k not in known}
+    return run_single(LAB, law, tell=lambda _: None, **{k: more[k] for k in known & set(more)}, **(USUAL | rest))
+
+
+def test_scale_and_feed_forward_are_exact():
+    law = chosen_controller(LAB, "cta", BASE, scale="1/1000", feedforward="centred")
+    assert law.scale == Fraction(1, 1000)
+    assert law.feedforward == feed_forward("centred", LAB, law.divisor)
+    assert chosen_controller(LAB, "cta", BASE).feedforward.name == "none"
+
+
+@pytest.mark.parametrize("more", [{"scale": "2"}, {"feedforward": "nominal"}])
+def test_a_linear_law_has_neither_scale_nor_feed_forward(more):
+    with pytest.raises(ParameterError, match="belong to a sliding mode"):
+        chosen_controller(LAB, "elqr", ("published",), **more)
+
+
+def test_an_unknown_feed_forward_is_refused():
+    with pytest.raises(UnknownNameError, match="centred"):
+        chosen_controller(LAB, "cta", BASE, feedforward="magic")
+
+
+def test_designed_gains_are_those_of_the_design(monkeypatch):
+    from types import SimpleNamespace
+
+    from quakedesign.report import single
+
+    law = chosen_controller(LAB, "cta", BASE)
+    for found in (law, None):
+        monkeypatch.setattr(single, "design", lambda fault, name, found=found: SimpleNamespace(controller=found))
+        if found is None:
+            with pytest.raises(ParameterError, match="no gains with a proof"):
+                chosen_controller(LAB, "cta", ("designed",))
+        else:
+            assert chosen_controller(LAB, "cta", ("designed",)) is law
+
+
+def test_without_a_law_a_duration_decides_what_is_run():
+    natural, _ = told(None)
+    own, premises = told(None, duration=0.02, load=Load(drift=1e-6))
+    assert natural.metrics.peak_slip_rate > 0.05 > own.metrics.peak_slip_rate
+    assert (own.provenance["drift"], premises) == (1e-6, [])
+
+
+@pytest.mark.parametrize(
+    ("more", "named"),
+    [
+        ({"step": 1e-3}, "step"),
+        ({"load": Load(drift=1.0)}, "load"),
+        ({"noise": Measurement(slip_noise=1.0)}, "measurement"),
+        ({"scheme": "explicit"}, "scheme"),
+    ],
+)
+def test_the_natural_earthquake_takes_no_options(more, named):
+    with pytest.raises(ParameterError, match=f"Received {named}"):
+        told(None, **more)
+
+
+def test_a_differentiator_comes_with_its_premise():
+    law = chosen_controller(LAB, "cta", ("published",))
+    found = {}
+    for bound in (1.0, 1e4):
+        run, premises = told(law, scheme="implicit", duration=0.2, differentiator_bound=bound)
+        names = [p.name for p in premises]
+        assert names == ["on_trajectory", "differentiator"]
+        assert run.provenance["measurement"].startswith("OutputFeedback")
+        found[bound] = premises[1]
+    assert found[1e4].certified == 1e4
+    assert not found[1.0].holds
+    assert found[1e4].holds == (found[1e4].required <= 1e4)
+    assert found[1e4].unit == "m/s^2"

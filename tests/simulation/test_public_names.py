@@ -1,0 +1,32 @@
+"""The room offers its public values by name and loads no numerical library before one is needed."""
+
+import subprocess
+import sys
+
+import pytest
+
+import quakedesign.simulation as room
+from quakedesign.simulation.actuators.base import Stage, stages
+from quakedesign.simulation.schemes import Scheme, schemes
+
+
+def test_every_stage_of_an_actuator_has_its_name_in_the_room():
+    offered = {item for item in vars(room).values() if isinstance(item, type) and issubclass(item, Stage)}
+    assert offered == set(stages().values())
+
+
+@pytest.mark.parametrize("name", sorted(schemes()))
+def test_every_scheme_is_made_by_name(name):
+    assert isinstance(room.simulation_scheme(name), Scheme)
+
+
+def test_the_names_are_all_there_and_sorted():
+    assert room.__all__ == sorted(room.__all__, key=lambda name: (name.islower(), name))
+    assert all(hasattr(room, name) for name in room.__all__)
+
+
+def test_the_import_loads_no_numerical_library():
+    heavy = "numpy scipy casadi matplotlib pandas xarray control dask".split()
+    code = f"import sys, quakedesign.simulation; print(*[name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
