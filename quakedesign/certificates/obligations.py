@@ -128,10 +128,36 @@ class Obligations:
             degrees[lift] = found.pop()
         return degrees
 
+    def _require_null_zeros(self, arguments: Mapping[str, Polynomial]) -> None:
+        """Refuse a lift whose argument could vanish on more than a null set, on one cell.
+
+        As a polynomial in those states on which no lift inside it depends, it must have a coefficient without lifts:
+        a nonzero polynomial in the other states. Else its variable could be zero on an open set, where a multiplier
+        that holds it proves nothing.
+        """
+        states = tuple(self.loop.states)
+        depends: dict[str, set[str]] = {}
+        for position, (lift, argument) in enumerate(arguments.items()):
+            earlier = list(arguments)[:position]
+            inner = {name for e in argument for name, x in zip(earlier, e[len(states) :], strict=False) if x}
+            inside = set[str]().union(*(depends[name] for name in inner))
+            own = {s for e in argument for s, x in zip(states, e, strict=False) if x}
+            parts: dict[tuple[int, ...], bool] = {}
+            for e in argument:
+                key = tuple(x for s, x in zip(states, e, strict=False) if s not in inside)
+                parts[key] = parts.get(key, False) or any(e[len(states) :])
+            require(False in parts.values(), f"the argument of {lift} may vanish on an open set.")
+            depends[lift] = inside | own
+
     def _cell(self, signs: Mapping[str, int]) -> Cell | None:
         """Cell with its conditions; None where a condition leaves it without interior."""
         values, weights = self._fixed_values(), {**self.loop.states, **self.lift_degrees}
         equalities, inequalities = [], []
+        whole = {
+            lift: cell_polynomial(self._live(terms, values), weights, signs, values)
+            for lift, terms in self.loop.lifts.items()
+        }
+        self._require_null_zeros(whole)
         for lift, terms in self.loop.lifts.items():
             argument = self._kept(cell_polynomial(self._live(terms, values), weights, signs, values))
             if lift in self.with_variable:
