@@ -104,12 +104,12 @@ def dia():
 
 
 def test_the_nested_power_of_the_2_dia_becomes_one_cubic_equality():
-    """METHODS.md: w³ = s2·y³ + k_I1^{3/2}·s1·x³, and −V̇ is a form of degree 4 in (x, y, z, w)."""
+    """With f1 = k_I1^{3/2}·e1: w³ = s2·y³ + s1·x³, and −V̇ is a form of degree 4 in (x, y, z, w)."""
     _, lifted = dia()
     (one,) = lifted.lifts
     (s1, u1), (s2, u2), _ = lifted.states.values()
     assert one.power == 3
-    assert sp.expand(one.polynomial - (s2 * u2**3 + kappa**3 * s1 * u1**3)) == 0
+    assert sp.expand(one.polynomial - (s2 * u2**3 + s1 * u1**3)) == 0
     for cell in lifted.cells():
         degrees = {
             sum(e)
