@@ -50,6 +50,8 @@ def whole_folder(target: Path) -> Iterator[Path]:
             _swap(partial, target)
         finally:
             shutil.rmtree(partial, ignore_errors=True)
+    except OutputError:
+        raise
     except OSError as error:
         raise OutputError(f"{target} cannot be written: {error.strerror}. Choose another folder.") from None
 

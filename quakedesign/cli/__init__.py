@@ -6,11 +6,23 @@ import sys
 
 from cyclopts import CycloptsError
 
-from quakedesign.cli import campaign, design, figures, loop, plant, polynomial, proof
+from quakedesign.cli import campaign, design, figures, gain_map, loop, plant, polynomial, proof, synthesis
 from quakedesign.cli.shared import app
 from quakedesign.errors import QuakedesignError
 
-__all__ = ["app", "campaign", "design", "figures", "loop", "main", "plant", "polynomial", "proof"]
+__all__ = [
+    "app",
+    "campaign",
+    "design",
+    "figures",
+    "gain_map",
+    "loop",
+    "main",
+    "plant",
+    "polynomial",
+    "proof",
+    "synthesis",
+]
 
 
 def main(arguments: list[str] | None = None) -> None:

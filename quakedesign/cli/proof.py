@@ -18,6 +18,7 @@ def certify(
     *,
     gains: Gains,
     lipschitz: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    maximize: str | None = None,
     gain_range: tuple[str, str] | None = None,
     box: str | None = None,
     feedback: str | None = None,
@@ -41,8 +42,12 @@ def certify(
         Exact numbers: decimals, exponents or p/q; four for cta and elqr (SI).
     lipschitz
         For a sliding mode: bound on |h'|, in the unit of ν per second.
+    maximize
+        For a sliding mode: lipschitz (the largest bound on |h'|; with --lipschitz also the smallest scale for that),
+        beta (the upper end of its range), beta-factor (f in [b/f, b·f]) or decay (with a bound on the settling time).
     gain_range
-        For a sliding mode: b_m and b_M, the range of the control coefficient β; 1 1 unless given.
+        For a sliding mode: b_m and b_M, the range of the control coefficient β; 1 1 unless given. One value b twice to
+        maximise the range.
     box
         For the e-LQR: uncertainty box, paper or ten-percent.
     feedback
@@ -62,16 +67,14 @@ def certify(
 
     new_file(out, "certificate file", force=force)
     about_fault = {"FAULT": fault, "--box": box, "--feedback": feedback, "--step": step, "--peaks": peaks}
-    about_rate = {"--lipschitz": lipschitz, "--gain-range": gain_range}
+    about_rate = {"--lipschitz": lipschitz, "--maximize": maximize, "--gain-range": gain_range}
     if law_of(law).loop_field().domain == "reals":
         _refuse_options(law, about_rate, "needs a FAULT instead")
         if fault is None:
             raise ParameterError(f"certify {law} needs a fault. Received none. Give a preset or a file after {law}.")
         return _certify_on_fault(fault, gains, box, feedback or "error", step, peaks, out, force, json)
     _refuse_options(law, about_fault, "needs --lipschitz instead")
-    if lipschitz is None:
-        raise ParameterError(f"certify {law} needs a bound on |h'|. Received none. Give --lipschitz.")
-    return _certify_for_rate(law, gains, lipschitz, gain_range or ("1", "1"), out, json)
+    return _certify_for_rate(law, gains, lipschitz, maximize, gain_range or ("1", "1"), out, json)
 
 
 def _refuse_options(law: str, options: Mapping[str, Any], remedy: str) -> None:
@@ -87,33 +90,21 @@ def _refuse_options(law: str, options: Mapping[str, Any], remedy: str) -> None:
 
 
 def _certify_for_rate(
-    law: str, gains: tuple[str, ...], lipschitz: str, gain_range: tuple[str, str], out: Path | None, json: bool
-) -> int:
-    """Verdict on a sliding mode."""
-    from time import perf_counter
+    law: str, gains: tuple[str, ...], lipschitz: str | None, maximize: str | None, gain_range: tuple[str, str],
+    out: Path | None, json: bool,
+) -> int:  # fmt: skip
+    """Verdict on a sliding mode, or how far its gains reach."""
+    from quakedesign.report.certified import certified
 
-    from quakedesign.rationals import rational
-    from quakedesign.synthesis import certify as decide
-
-    began = perf_counter()
-    verdict, certificate = decide(law, gains, lipschitz=lipschitz, gain_range=gain_range)
-    if certificate is not None and out is not None:
-        certificate.save(out)
-    found = {
-        "verdict": str(verdict),
-        "lipschitz": str(rational(lipschitz)),
-        "gain_range": [str(rational(v)) for v in gain_range],
-        "decay": str(certificate.claims["decrease"]) if certificate and certificate.claims else None,
-        "certificate": str(out) if certificate is not None and out is not None else None,
-        "seconds": perf_counter() - began,
-    }
+    answer = certified(law, gains, lipschitz=lipschitz, maximize=maximize, gain_range=gain_range)
+    if answer.certificate is not None and out is not None:
+        answer.certificate.save(out)
     if json:
-        print_json(found)
+        print_json({**answer.facts, "certificate": str(out) if answer.certificate is not None and out else None})
     else:
-        low, high = gain_range
-        line = f"{found['verdict']}: {law} {' '.join(gains)}, |h'| <= {lipschitz}, beta from {low} to {high}"
-        console().print(line, markup=False)
-    return 0 if found["verdict"] == "proved" else 1
+        for line in answer.lines:
+            console().print(line, markup=False)
+    return 0 if str(answer.verdict) == "proved" else 1
 
 
 def _certify_on_fault(

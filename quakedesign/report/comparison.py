@@ -219,7 +219,7 @@ def headline(entry: Entry) -> str:
         return f"undecided: {design.details.get('reason', 'no gains with a proof were found')}"
     verdict = {
         Verdict.PROVED: "proved in continuous time",
-        Verdict.REFUTED: "refuted: a counterexample checks in exact arithmetic",
+        Verdict.REFUTED: f"refuted: {design.details.get('reason', 'a counterexample checks in exact arithmetic')}",
         Verdict.UNDECIDED: f"undecided: {design.details.get('reason', 'no certificate')}",
     }[design.verdict]
     parts = [verdict, *_broken(design.premises)]

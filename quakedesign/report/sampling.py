@@ -15,7 +15,7 @@ from quakedesign.simulation.sampling_study import QUANTITIES, SCHEMES
 from quakedesign.synthesis import Design
 from quakedesign.synthesis.sampling import on_trajectory
 
-PUBLISHED_SCHEMES = ("continuous", "explicit")
+PUBLISHED_SCHEMES = ("continuous", "explicit", "compensated")
 DECADES = 3
 PERIODS = 650  # of the longest T_s that the runs for the orders take
 SHARE = 1 / 16  # of the task that a run for the sensitivity to noise takes
@@ -103,7 +103,7 @@ class SamplingReport:
     ----------
     fault : Fault
     rows : tuple of Row
-        The law under every scheme, then the published ones.
+        The law under every scheme, then the published ones: as in the paper, held, and with the compensated scheme.
     studies : dict of str to Study
         ``orders`` (of a sliding mode without feed-forward), ``slip_noise``, ``rate_noise``, ``input_gain``.
     """

@@ -54,6 +54,7 @@ def last_success(
     *,
     floor: Fraction = Fraction(0),
     limit: Fraction | None = None,
+    most: Fraction | None = None,
     only_above: bool = False,
 ) -> Bracket:
     """Bracket around the last number at which a search succeeds, by Newton's rule kept inside what is known.
@@ -68,6 +69,8 @@ def last_success(
         Smallest number that makes sense.
     limit : Fraction, optional
         No search can succeed there or beyond, so none is made.
+    most : Fraction, optional
+        Success there is enough.
     only_above : bool
         Stop where the search does not succeed at `first`.
 
@@ -80,7 +83,8 @@ def last_success(
     for _ in range(_MOST):
         answer, slope = ask(x)
         bracket = bracket.told(x, answer)
-        if bracket.closed(limit) or bracket.high == floor or (only_above and bracket.low is None):
+        enough = most is not None and bracket.low is not None and bracket.low >= most
+        if bracket.closed(limit) or enough or bracket.high == floor or (only_above and bracket.low is None):
             break
         x = max(floor, _short(_next(bracket, x, _root(x, answer, slope), floor, limit)))
     return bracket

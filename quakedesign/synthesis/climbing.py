@@ -26,9 +26,9 @@ from quakedesign.synthesis.tangent import Neighbourhood, neighbourhood
 if TYPE_CHECKING:
     from quakedesign.synthesis.objectives import Objective
 
-MARGIN = 1e-6
+MARGIN, FAINT = 1e-6, 1e-9
 _TRUST = 3.0
-_FIRST, _LAST, _LARGEST = 0.1, 1e-3, 0.2
+_FIRST, _LAST, _LARGEST = 0.1, 1e-3, 0.35
 _AGAIN, _WORTH, _GROWTH = 0.03, 3e-3, 1.2
 _ROOT_SHARE = 0.5
 
@@ -125,7 +125,7 @@ def climb(setting: Setting, state: State, *, free: bool = True, until: float | N
         if found is None:
             share /= 3
             continue
-        state, share = found, min(_LARGEST, 1.3 * share)
+        state, share = found, min(_LARGEST, 1.5 * share)
         if objective.better(state.level, states[-1].level):
             states.append(state)
     return states
@@ -190,9 +190,7 @@ def _around(
         return None
 
 
-def _limits(
-    setting: Setting, loop: Loop, level: float, around: Neighbourhood, sizes: Mapping[str, float]
-) -> Limits:
+def _limits(setting: Setting, loop: Loop, level: float, around: Neighbourhood, sizes: Mapping[str, float]) -> Limits:
     """|a_j| and shares of the changes at most one, the norm of the gains as the objective asks."""
     count = len(around.monomials)
     bound = setting.objective.norm_bound(level)
@@ -215,7 +213,14 @@ def _shares(setting: Setting, loop: Loop, around: Neighbourhood) -> list[float]:
     return [share / float(size) for size, share in zip(around.sizes, shares, strict=True)]
 
 
-def look(setting: Setting, loop: Loop, level: float, lyapunov: tuple[Term, ...] = (), beyond: float | None = None):
+def look(
+    setting: Setting,
+    loop: Loop,
+    level: float,
+    lyapunov: tuple[Term, ...] = (),
+    beyond: float | None = None,
+    least: float = MARGIN,
+) -> State | None:
     """State at fixed gains and level with the largest margin; None without one, or where it is no better than `beyond`.
 
     Parameters
@@ -226,6 +231,8 @@ def look(setting: Setting, loop: Loop, level: float, lyapunov: tuple[Term, ...] 
     lyapunov : tuple of Term
         V of a state nearby; only a rate needs it.
     beyond : float, optional
+    least : float
+        Margin that counts.
 
     Returns
     -------
@@ -240,7 +247,7 @@ def look(setting: Setting, loop: Loop, level: float, lyapunov: tuple[Term, ...] 
         return None
     limits = _limits(setting, loop, level, around, {})
     found = around.program.largest(around.demands, around.fixed, limits)
-    if found is None or not found.margin > MARGIN:
+    if found is None or not found.margin > least:
         return None
     function = around.function(found.decision)
     return State(loop=loop, level=level, lyapunov=function, margin=found.margin)

@@ -1,6 +1,7 @@
 """From a fault to gains with a proof, and from given gains to a verdict."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -19,7 +20,7 @@ from quakedesign.errors import CertificateError, KinkError, ParameterError, Unkn
 from quakedesign.fault import Fault
 from quakedesign.synthesis.designed import Design
 from quakedesign.synthesis.finishing import claims_of, finish
-from quakedesign.synthesis.linear.analysis import why_undecided
+from quakedesign.synthesis.linear.analysis import unstable_vertex, why_undecided
 from quakedesign.synthesis.linear.polytope import error_loop
 from quakedesign.synthesis.linear.redesign import sampled_design
 from quakedesign.synthesis.linear.riccati import riccati_design
@@ -67,9 +68,7 @@ def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none", 
     added = feed_forward(feedforward, fault, least_authority(fault))
     if issubclass(control_law(controller), SlidingMode):
         if held:
-            raise ParameterError(
-                f"a design for a held pressure is one of the e-LQR. Received {controller}. Leave it out."
-            )
+            raise ParameterError(f"held is for the e-LQR. Received it with {controller}. Leave it out.")
         return _design_sliding_mode(fault, controller, added)
     if added != NONE:
         raise ParameterError(
@@ -181,10 +180,14 @@ def _design_held(fault: Fault) -> Design:
 def _judged_linear(
     fault: Fault, controller: Controller, certificate: Certificate | None, details: Mapping[str, Any]
 ) -> Design:
+    """Design of an e-LQR; refuted where a constant vertex of the box is not stable, undecided where no V was found."""
     more: dict[str, Any] = {"rate": str(certificate.claims["rate"]) if certificate else None}
-    if certificate is None:
-        more["reason"] = why_undecided(error_loop(tuple(controller.gains.values()), sectors(fault)))
-    return _judged(fault, controller, certificate, {**details, **more})
+    if certificate is not None:
+        return _judged(fault, controller, certificate, {**details, **more})
+    loop = error_loop(tuple(controller.gains.values()), sectors(fault))
+    verdict = Verdict.UNDECIDED if unstable_vertex(loop) is None else Verdict.REFUTED
+    found = _judged(fault, controller, None, {**details, **more, "reason": why_undecided(loop)})
+    return replace(found, verdict=verdict)
 
 
 def assess(fault: Fault, controller: Controller) -> Design:

@@ -1,6 +1,6 @@
 """Gains and Lyapunov function found together for an objective; gains without a proof are never returned."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -9,17 +9,16 @@ from itertools import islice
 from multiprocessing import get_context
 
 from quakedesign.certificates import Certificate, Loop
-from quakedesign.controllers import Subject, family, model_of
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.controllers import Subject
+from quakedesign.errors import ParameterError
 from quakedesign.synthesis.climbing import Setting, State, climb, short, with_gains
-from quakedesign.synthesis.decision import Number, closed_loop
-from quakedesign.synthesis.lyapunov import candidate_degrees
-from quakedesign.synthesis.objectives import SmallestNorm, objective_for
-from quakedesign.synthesis.stretching import scaled_norm, stretch_exponents
+from quakedesign.synthesis.decision import Number
+from quakedesign.synthesis.gain_question import Question, begin_with, question
+from quakedesign.synthesis.objectives import SmallestNorm
+from quakedesign.synthesis.stretching import scaled_norm
 
 _STRETCHES = (1.0, 1.5, 4.0)
 _DRAWS = 12
-_SPREAD, _WIDTH = 0.4, 3.0
 _TRIES = 6
 _INSIDE = 0.98
 
@@ -33,7 +32,7 @@ class Compared:
     gains : mapping of str to Fraction
         Scaled to the same L̄ and β.
     value : float or None
-        Proved; None where no proof was found, or where the gains exceed the bound on the norm.
+        Proved; None where no proof was found.
     norm : float
         ‖k_i/L̄^{p_i}‖₂.
     ratio : float or None
@@ -127,84 +126,24 @@ def synthesise(
     UnknownNameError
         For an unknown law or objective.
     """
-    loop = closed_loop(subject, _ones(subject), lipschitz=lipschitz, gain_range=gain_range)
-    _require(loop, starts, workers)
-    name, model = model_of(subject)
-    exponents = stretch_exponents(loop, {"d": 1})
-    known = [with_gains(loop, gains) for gains in _literature(name, loop, exponents)]
-    if bound is None and known:
-        bound = min(scaled_norm(one, exponents) for one in known)
-    chosen = objective_for(objective, loop, bound)
-    units = {str(state): unit for state, unit in model.units.items()}
-    steps = tuple(degrees) if degrees is not None else candidate_degrees(loop)[:2]
-    setting = Setting(objective=chosen, exponents=exponents, units=units, degree=steps[0])
-    first = list(islice(_starts(known, loop, exponents, seed), max(starts, 1) * _DRAWS))
-    states = _climbed(setting, first, starts, workers)
-    found = _best(setting, states, steps, subject)
+    asked = question(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
+    if starts < 1 or workers < 1:
+        raise ParameterError(f"starts and workers must be at least 1. Received {starts} and {workers}.")
+    first = list(islice(begin_with(asked, seed), starts * _DRAWS))
+    found = _best(asked, _climbed(asked.setting, first, starts, workers))
     if found is None:
         return None
     certificate, value = found
-    beside = (_compared(setting, one, steps, subject, value) for one in known) if compare else ()
     return Synthesis(
-        law=name,
+        law=asked.loop.law,
         objective=objective,
-        unit=chosen.unit,
+        unit=asked.setting.objective.unit,
         gains=dict(certificate.loop.gains),
         certificate=certificate,
         value=value,
-        norm=scaled_norm(certificate.loop, exponents),
-        compared=tuple(beside),
+        norm=scaled_norm(certificate.loop, asked.setting.exponents),
+        compared=tuple(beside(asked, one, value) for one in asked.known) if compare else (),
     )
-
-
-def _ones(subject: Subject) -> tuple[Number, ...]:
-    return (1,) * len(model_of(subject)[1].gains)
-
-
-def _require(loop: Loop, starts: int, workers: int) -> None:
-    if not ("d" in loop.uncertain and loop.uncertain["d"][1] > 0):
-        raise ParameterError(f"synthesis needs a positive bound on |d|. Received the ranges {dict(loop.uncertain)}.")
-    if starts < 1 or workers < 1:
-        raise ParameterError(f"starts and workers must be at least 1. Received {starts} and {workers}.")
-
-
-def _literature(name: str, loop: Loop, exponents: Mapping[str, Fraction]) -> list[dict[str, Fraction]]:
-    """Gains that are known for a law, scaled to the loop's L̄ and to the least β."""
-    try:
-        bound, sets = family(name)
-    except UnknownNameError:
-        return []
-    return [_scaled(loop, {n: float(k) for n, k in one.gains.items()}, float(bound), exponents) for one in sets]
-
-
-def _scaled(
-    loop: Loop, gains: Mapping[str, float], bound: float, exponents: Mapping[str, Fraction]
-) -> dict[str, Fraction]:
-    """Gains for |d| ≤ bound and β = 1 carried over to the loop's ranges, with four digits."""
-    beta = float(loop.uncertain["beta"][0]) if "beta" in loop.uncertain else 1.0
-    of_beta = stretch_exponents(loop, {"beta": 1})
-    ratio = float(loop.uncertain["d"][1]) / bound
-    moved = {n: k * ratio ** float(exponents[n]) * beta ** float(of_beta[n]) for n, k in gains.items()}
-    return short(loop, moved)
-
-
-def _starts(
-    known: Sequence[Loop], loop: Loop, exponents: Mapping[str, Fraction], seed: int
-) -> Iterator[Loop]:
-    """Gains from the literature, then random ones around them, or of any size where there are none."""
-    import numpy as np
-
-    yield from known
-    rng = np.random.default_rng(seed)
-    bound = float(loop.uncertain["d"][1])
-    while True:
-        near = known[int(rng.integers(len(known)))].gains if known else {}
-        spread = rng.normal(0, _SPREAD, len(loop.gains)) if near else rng.uniform(0, _WIDTH, len(loop.gains))
-        factors = dict(zip(loop.gains, np.exp(spread).tolist(), strict=True))
-        if near:
-            yield with_gains(loop, short(loop, {n: float(k) * factors[n] for n, k in near.items()}))
-        else:
-            yield with_gains(loop, _scaled(loop, factors, 1.0, exponents))
 
 
 def _climbed(setting: Setting, first: Sequence[Loop], wanted: int, workers: int) -> list[list[State]]:
@@ -248,21 +187,17 @@ def _stretched(setting: Setting, loop: Loop, factor: float) -> Loop:
     return with_gains(loop, short(loop, gains))
 
 
-def _best(
-    setting: Setting, climbs: Sequence[Sequence[State]], degrees: Sequence[int], subject: Subject
-) -> tuple[Certificate, float] | None:
+def _best(asked: Question, climbs: Sequence[Sequence[State]]) -> tuple[Certificate, float] | None:
     """Proof of the best state, after the best climb has gone on with higher degrees."""
-    best = _in_order(setting, climbs)
-    if not best:
-        return None
-    stages = [(setting, best)]
-    for degree in degrees[1:]:
-        higher = replace(setting, degree=degree)
+    best = _in_order(asked.setting, climbs)
+    stages = [(asked.setting, best)]
+    for degree in asked.degrees[1:] if best else ():
+        higher = replace(asked.setting, degree=degree)
         begin = next(filter(None, (higher.objective.start(higher, s.loop) for s in best[:2])), None)
         if begin is not None:
-            stages.append((higher, _in_order(higher, [climb(higher, begin)])))
-            best = stages[-1][1]
-    return next(filter(None, (_proved(at, states, subject) for at, states in reversed(stages))), None)
+            best = _in_order(higher, [climb(higher, begin)])
+            stages.append((higher, best))
+    return next(filter(None, (_proved(at, states, asked.subject) for at, states in reversed(stages))), None)
 
 
 def _in_order(setting: Setting, climbs: Sequence[Sequence[State]]) -> list[State]:
@@ -282,17 +217,24 @@ def _proved(setting: Setting, states: Sequence[State], subject: Subject) -> tupl
     return None
 
 
-def _compared(setting: Setting, loop: Loop, degrees: Sequence[int], subject: Subject, value: float) -> Compared:
-    """The same question about given gains, with V of every degree; whatever their norm."""
-    objective = replace(setting.objective, bound=None)
+def beside(asked: Question, loop: Loop, value: float) -> Compared:
+    """The same question about given gains, whatever their norm, with V of every degree, against a value.
+
+    Parameters
+    ----------
+    asked : Question
+    loop : Loop
+        With the gains.
+    value : float
+    """
+    objective = replace(asked.setting.objective, bound=None)
     reached = []
-    for degree in degrees:
-        at = replace(setting, objective=objective, degree=degree)
+    for degree in asked.degrees:
+        at = replace(asked.setting, objective=objective, degree=degree)
         begin = objective.start(at, loop)
         states = _in_order(at, [climb(at, begin, free=False)]) if begin else []
-        found = _proved(at, states, subject) if states else None
+        found = _proved(at, states, asked.subject)
         reached += [found[1]] if found else []
     best = (max(reached) if objective.larger else min(reached)) if reached else None
     ratio = None if best is None else (value / best if objective.larger else best / value)
-    norm = scaled_norm(loop, setting.exponents)
-    return Compared(gains=dict(loop.gains), value=best, norm=norm, ratio=ratio)
+    return Compared(gains=dict(loop.gains), value=best, norm=scaled_norm(loop, asked.setting.exponents), ratio=ratio)

@@ -1,25 +1,22 @@
-"""What gains can be best in: an order of levels, what a level asks of a loop, and the proof and the figure at the end."""
+"""What gains can be best in: an order of levels, what a level asks of a loop, the proof and the figure at the end."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.certificates.obligations import Obligations, degree
 from quakedesign.controllers import Subject
 from quakedesign.errors import ParameterError, UnknownNameError
-from quakedesign.synthesis.climbing import Setting, State, look
+from quakedesign.synthesis.climbing import FAINT, Setting, State, look
 from quakedesign.synthesis.finishing import GIVE_AWAY, bounds_of, finish, with_largest_decay
 from quakedesign.synthesis.lyapunov import find_certificate
 from quakedesign.synthesis.pacing import box, fastest, least_margins, on_box, rounded
 from quakedesign.synthesis.scales import balance, below
 from quakedesign.synthesis.stretching import scaled_norm
-
-if TYPE_CHECKING:
-    import sympy as sp
 
 _ROOM = 1e-3
 _HALVINGS = 8
@@ -65,9 +62,7 @@ class Objective(ABC):
         """Bound on the norm of the gains."""
         return self.bound
 
-    def kept(
-        self, gains: Mapping[str, float], loop: Loop, exponents: Mapping[str, Fraction]
-    ) -> dict[str, float]:
+    def kept(self, gains: Mapping[str, float], loop: Loop, exponents: Mapping[str, Fraction]) -> dict[str, float]:
         """Gains drawn back to the bound on their norm, if they are beyond."""
         scale = float(loop.uncertain["d"][1])
         norm = sum((k / scale ** float(exponents[name])) ** 2 for name, k in gains.items()) ** 0.5
@@ -111,7 +106,7 @@ class SmallestNorm(Objective):
 
     def start(self, setting: Setting, loop: Loop) -> State | None:
         """State at the gains."""
-        return look(setting, loop, scaled_norm(loop, setting.exponents))
+        return look(setting, loop, scaled_norm(loop, setting.exponents), least=FAINT)
 
     def figure(self, certificate: Certificate, setting: Setting) -> float:
         """Norm of the gains."""
@@ -193,7 +188,7 @@ class LargestRange(Objective):
 
     def start(self, setting: Setting, loop: Loop) -> State | None:
         """State with the range asked for, or a hundredth to either side."""
-        return look(setting, loop, self.first)
+        return look(setting, loop, self.first, least=FAINT)
 
     def figure(self, certificate: Certificate, setting: Setting) -> float:
         """ρ."""
@@ -226,4 +221,6 @@ def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
         raise ParameterError(f"the objective {name} needs a loop with an uncertain beta. Received {loop.law}.")
     low, high = loop.uncertain["beta"]
     middle = low if low == high else Fraction(f"{float(low * high) ** 0.5:.6g}")
-    return LargestRange(bound=bound, middle=middle, first=max(1.01, float(max(high / middle, middle / low)) * (1 + 1e-6)))
+    return LargestRange(
+        bound=bound, middle=middle, first=max(1.01, float(max(high / middle, middle / low)) * (1 + 1e-6))
+    )

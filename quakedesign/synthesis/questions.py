@@ -20,6 +20,7 @@ from quakedesign.synthesis.sweep import Screened, Sweep
 
 _STEPS_BACK = (Fraction(0), TOLERANCE / 4, TOLERANCE / 2, 10 * TOLERANCE, 100 * TOLERANCE)
 _FAR = Fraction(10) ** 12
+_WIDE = 10**6  # a range of β that is wide enough
 _HAIR = Fraction(1, 10**9)  # so that a range of β has two ends even where it is asked to be a point
 
 
@@ -35,7 +36,7 @@ class Reach:
         Proved exactly; None where the search finds nothing at all.
     beyond : Fraction or None
         Smallest number at which the search found nothing, at most value·(1 + 1e-4) unless a proof could not be
-        finished; None where `limit` is as near.
+        finished; None where `limit` is as near, or where there seems to be no end.
     limit : Fraction or None
         No Lyapunov function exists there, of whatever kind; None where none is known.
     degrees : tuple of int
@@ -91,6 +92,7 @@ class _Line:
     floor: Fraction
     first: Fraction
     limit: Fraction | None
+    most: Fraction | None = None
 
 
 def largest_lipschitz(
@@ -183,7 +185,9 @@ def largest_gain_range(
     def direction(x: float) -> dict[str, float]:
         return {"beta+": b, "beta-": -b / x**2} if symmetric else {"beta+": 1.0}
 
-    line = _Line("beta-factor" if symmetric else "beta", at, direction, floor, Fraction(11, 10) * floor, None)
+    line = _Line(
+        "beta-factor" if symmetric else "beta", at, direction, floor, Fraction(11, 10) * floor, None, _WIDE * floor
+    )
     return _reach(line, subject, _chosen(degrees, base), began)
 
 
@@ -269,8 +273,14 @@ class _Search:
     def above(self, value: Fraction | None) -> Bracket:
         """Bracket, with `low` only where it exceeds what is proved."""
         first = self.line.first if value is None else value * (1 + TOLERANCE * Fraction(9, 10))
-        limits = {"floor": self.line.floor, "limit": self.line.limit}
-        return last_success(self.ask, first, **limits, only_above=value is not None)
+        return last_success(
+            self.ask,
+            first,
+            floor=self.line.floor,
+            limit=self.line.limit,
+            most=self.line.most,
+            only_above=value is not None,
+        )
 
     def proved(self, bracket: Bracket) -> tuple[Fraction, Certificate] | None:
         """Number at or below that of a bracket, and its certificate."""

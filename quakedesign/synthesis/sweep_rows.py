@@ -83,7 +83,9 @@ def rows_of(loop: Loop, monomials: Sequence[Term]) -> tuple[Row, ...]:
 
 def _functions(columns: Sequence[Obligations]) -> Iterator[Row]:
     for cell in columns[0].sign_cells():
-        parts = [(j, e, (), c) for j, column in enumerate(columns) for e, c in column.potential(cell.signs).items()]
+        parts: list[Part] = [
+            (j, e, (), c) for j, column in enumerate(columns) for e, c in column.potential(cell.signs).items()
+        ]
         yield from _row(parts, columns[0])
 
 

@@ -8,23 +8,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from itertools import product
+from typing import Any
 
 from quakedesign.certificates import Loop
-from quakedesign.certificates.obligations import Obligation, Obligations, power_sum
+from quakedesign.certificates.obligations import Obligation, power_sum
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.rationals import nearest
 from quakedesign.sos import Polynomial
 from quakedesign.sos.solve.joint import Demand
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.symbolic.terms import Term, cell_polynomial
+from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.affine import AffineProgram
 from quakedesign.synthesis.scales import exponents_of, lifted_scale, scaled
-from quakedesign.synthesis.sweep_rows import ends_of, values_of
+from quakedesign.synthesis.gain_rows import Kin, Row, rows_of
+from quakedesign.synthesis.sweep_rows import values_of
 
-Part = tuple[int, tuple[int, ...], tuple[str, ...], float]
-"""j, exponents, names multiplied, coefficient."""
-Form = dict[tuple[int, ...], float]
+Form = dict[tuple[int, ...], Any]
+"""Polynomial with floats."""
 _GRID = 1 << 40
 
 
@@ -48,58 +48,6 @@ class Pace:
     rate: float
     degrees: tuple[int, int]
     forms: Mapping[str, Form]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """V, or −V̇ beside V, on one cell (and vertex), with gains and ends of ranges left as names.
-
-    Attributes
-    ----------
-    cell : str
-        Signs of the states.
-    function, fall : tuple of Part
-        V, and −V̇; the latter is empty for the row of V itself.
-    equalities, inequalities : tuple of Polynomial
-    """
-
-    cell: str
-    function: tuple[Part, ...]
-    fall: tuple[Part, ...] = ()
-    equalities: tuple[Polynomial, ...] = ()
-    inequalities: tuple[Polynomial, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Structure:
-    """All of a loop that the rows depend on, to tell whether they can be used again."""
-
-    loop: tuple
-    inside: tuple[tuple[str, Fraction], ...]
-    points: tuple[tuple[str, bool, bool], ...]
-    degree: int
-
-    @classmethod
-    def of(cls, loop: Loop, degree: int) -> "Structure":
-        """Structure of a loop and a degree of V; numbers count only inside nested powers."""
-        names = {p for terms in loop.lifts.values() for term in terms for p in term.parameters}
-        known = {**loop.parameters, **{name: low for name, (low, _) in loop.ranges.items()}}
-        fixed = (loop.law, tuple(loop.states.items()), tuple(loop.field.items()), tuple(loop.lifts.items()))
-        inside = tuple(sorted((name, known[name]) for name in names))
-        return cls(fixed, inside, tuple((n, a == b, a == -b) for n, (a, b) in loop.ranges.items()), degree)
-
-
-class _Known:
-    """A loop that is the same as another one of its structure."""
-
-    def __init__(self, loop: Loop, degree: int) -> None:
-        self.loop, self.structure = loop, Structure.of(loop, degree)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Known) and self.structure == other.structure
-
-    def __hash__(self) -> int:
-        return hash(self.structure)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,13 +109,13 @@ def neighbourhood(
     """
     monomials = signed_monomials(loop.states, degree, loop.domain)
     sizes = tuple(Fraction(_power(scale, exponents_of(term, loop.states))) for term in monomials)
-    known = _Known(loop, degree)
+    kin = Kin(loop, degree)
     now = {(t.parameters, t.factors): float(t.coefficient) for t in lyapunov}
     present = [now.get((t.parameters, t.factors), 0.0) for t in monomials]
     values = values_of(loop)
     others = [values_of(other) for other in changed]
     demands, fixed = [], []
-    for row, template, whole in _templates(known, scale, pace is not None):
+    for row, template, whole in _templates(kin, scale, pace is not None):
         parts = [_faster(row, j, values, pace, 1 / float(size)) for j, size in enumerate(sizes)]
         moves = [_moved(row, present, values, other, pace) for other in others]
         rest = _rest(row, pace)
@@ -178,10 +126,8 @@ def neighbourhood(
         margin = power_sum(len(loop.states), power, len(whole))
         demands.append(Demand(template=template, parts=grown, margin=margin))
         fixed.append(rest)
-    program = _program(known, scale, pace is not None, len(changed))
-    return Neighbourhood(
-        monomials=monomials, sizes=sizes, program=program, demands=tuple(demands), fixed=tuple(fixed)
-    )
+    program = _program(kin, scale, pace is not None, len(changed))
+    return Neighbourhood(monomials=monomials, sizes=sizes, program=program, demands=tuple(demands), fixed=tuple(fixed))
 
 
 def _power(base: Sequence, exponents: Sequence[int]):
@@ -250,62 +196,11 @@ def _times(left: Form, right: Form) -> Form:
 
 
 @lru_cache(maxsize=32)
-def _rows(known: _Known) -> tuple[Row, ...]:
-    loop, degree = known.loop, known.structure.degree
-    columns = [Obligations(loop, (term,)) for term in signed_monomials(loop.states, degree, loop.domain)]
-    found: dict[tuple, Row] = {}
-    for row in (*_functions(columns), *_falls(loop, columns)):
-        conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
-        found.setdefault((row.function, row.fall, conditions), row)
-    return tuple(found.values())
-
-
-def _functions(columns: Sequence[Obligations]):
-    for cell in columns[0].sign_cells():
-        yield Row(cell=cell.name, function=_potential(columns, cell.signs))
-
-
-def _potential(columns: Sequence[Obligations], signs: Mapping[str, int]) -> tuple[Part, ...]:
-    return tuple(
-        (j, e, (), float(c)) for j, column in enumerate(columns) for e, c in column.potential(signs).items()
-    )
-
-
-def _falls(loop: Loop, columns: Sequence[Obligations]):
-    first, ends = columns[0], ends_of(loop)
-    weights = {**loop.states, **first.lift_degrees}
-    kept = [i for i, name in enumerate(weights) if name in loop.states or name in first.with_variable]
-    terms = [(j, term) for j, column in enumerate(columns) for term in column.derivative]
-    for cell in first.cells:
-        plain = [(j, term.parameters, *_single(term, weights, cell.signs)) for j, term in terms]
-        function = _potential(columns, cell.signs)
-        word = "".join("+" if cell.signs[s] > 0 else "-" for s in loop.states)
-        for choice in product(*ends.values()):
-            vertex = dict(zip(ends, choice, strict=True))
-            total: dict[tuple, float] = {}
-            for j, names, exponents, coefficient in plain:
-                chosen = [vertex.get(name, (name, 1)) for name in names]
-                key = (j, tuple(exponents[i] for i in kept), tuple(sorted(name for name, _ in chosen)))
-                sign = math.prod(factor for _, factor in chosen)
-                total[key] = total.get(key, 0.0) - float(coefficient) * sign
-            parts = tuple(sorted((*key, c) for key, c in total.items() if c))
-            yield Row(
-                cell=word, function=function, fall=parts, equalities=cell.equalities, inequalities=cell.inequalities
-            )
-
-
-def _single(term: Term, weights: Mapping[str, int], signs: Mapping[str, int]) -> tuple[tuple[int, ...], Fraction]:
-    """Exponents and coefficient of one term on a cell, its parameters left out."""
-    bare = cell_polynomial((Term(term.coefficient, (), term.factors),), weights, signs, {})
-    return next(iter(bare.items()))
-
-
-@lru_cache(maxsize=32)
-def _templates(known: _Known, scale: tuple[Fraction, ...], paced: bool):
+def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool):
     """Every row with its set and monomials in scaled variables, and the scale of all of these."""
     found = []
-    loop = known.loop
-    for row in _rows(known):
+    loop = kin.loop
+    for row in rows_of(kin):
         whole = lifted_scale(row.equalities, scale)
         parts = row.fall or row.function
         degree = sum(parts[0][1])
@@ -316,7 +211,10 @@ def _templates(known: _Known, scale: tuple[Fraction, ...], paced: bool):
             form = dict(unit)
             for _ in range(power - 1):
                 form = _times(form, unit)
-            support, degree = {**{e: None for e in _raised(support, unit, power - degree)}, **dict.fromkeys(form)}, power
+            support, degree = (
+                {**{e: None for e in _raised(support, unit, power - degree)}, **dict.fromkeys(form)},
+                power,
+            )
         margin = power_sum(len(loop.states), degree, len(whole))
         conditions = (tuple(_normal(scaled(p, whole)) for p in group) for group in (row.equalities, row.inequalities))
         one = Obligation("", dict.fromkeys((*support, *margin), Fraction(1)), *conditions)
@@ -333,10 +231,12 @@ def _raised(support, unit: Form, times: int):
 
 
 @lru_cache(maxsize=32)
-def _program(known: _Known, scale: tuple[Fraction, ...], paced: bool, changes: int) -> AffineProgram:
-    loop, degree = known.loop, known.structure.degree
+def _program(kin: Kin, scale: tuple[Fraction, ...], paced: bool, changes: int) -> AffineProgram:
+    loop, degree = kin.loop, kin.structure.degree
     count = len(signed_monomials(loop.states, degree, loop.domain)) + changes
-    return AffineProgram([Demand(template=t, parts=[{}] * count, margin={}) for _, t, _ in _templates(known, scale, paced)])
+    return AffineProgram(
+        [Demand(template=t, parts=[{}] * count, margin={}) for _, t, _ in _templates(kin, scale, paced)]
+    )
 
 
 def _normal(polynomial: Polynomial) -> dict:

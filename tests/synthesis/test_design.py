@@ -10,7 +10,7 @@ import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.controllers import published
-from quakedesign.errors import UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Disturbance
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis.design import assess, smallest_root
@@ -119,3 +119,30 @@ def test_the_same_input_gives_the_same_digits(real):
 def test_an_unknown_controller_is_one_clear_message(real):
     with pytest.raises(UnknownNameError, match=r"must be one of cta, elqr\. Received 'pid'"):
         qd.design(real, "pid")
+
+
+def test_a_design_for_a_held_pressure_is_proved_as_such_and_slower(real):
+    held, free = qd.design(real, "elqr", held=True), qd.design(real, "elqr")
+    assert held.verdict is free.verdict is Verdict.PROVED
+    assert (held.details["method"], held.details["held_for"]) == ("continuous", "23/125")
+    facts, other = held.held_facts(), free.held_facts()
+    assert (facts["verdict"], facts["varying"], other["verdict"]) == ("proved", "proved", "refuted")
+    # the sampled loop itself, at the vertices (ERRATA 22)
+    assert facts["radius"] < 1 < other["radius"]
+    assert other["largest_step"] < 0.184 < facts["largest_step"]
+    assert all(held.gains[k] < free.gains[k] for k in held.gains)
+
+
+def test_a_period_that_nothing_holds_is_undecided_with_a_reason(real):
+    slow = qd.design(replace(real, sampling_time=100.0), "elqr", held=True)
+    assert slow.verdict is Verdict.UNDECIDED
+    assert slow.controller is None
+    assert "Sample faster" in slow.details["reason"]
+    assert slow.certified_peaks() is None
+    assert slow.held_facts() is None
+
+
+def test_a_sliding_mode_has_no_held_design_and_no_peaks(real):
+    with pytest.raises(ParameterError, match="held is for the e-LQR"):
+        qd.design(real, "cta", held=True)
+    assert assess(real, published("real-fault")["cta"]).certified_peaks() is None

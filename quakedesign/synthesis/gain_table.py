@@ -1,0 +1,69 @@
+"""By how much synthesised gains beat those from the literature, one objective after the other."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from quakedesign.controllers import Subject
+from quakedesign.synthesis.decision import Number
+from quakedesign.synthesis.gain_question import question
+from quakedesign.synthesis.gains import Compared, Synthesis, beside, synthesise
+from quakedesign.synthesis.objectives import OBJECTIVES
+from quakedesign.synthesis.stretching import scaled_norm
+
+_SAME = 1 + 1e-9
+
+
+def improvements(
+    subject: Subject,
+    objectives: Sequence[str] = OBJECTIVES,
+    *,
+    lipschitz: Number = 1,
+    gain_range: tuple[Number, Number] = (1, 1),
+    degrees: Iterable[int] | None = None,
+    starts: int = 2,
+    seed: int = 0,
+    workers: int = 1,
+) -> list[dict[str, Any]]:
+    """Rows of a table: gains from the literature against synthesised ones, both proved for the same ranges.
+
+    For objectives with a bound on the norm, the gains to beat set it, so that every row is about equal norms.
+
+    Parameters
+    ----------
+    subject : str, type of Law or LoopField
+    objectives : sequence of str
+    lipschitz, gain_range, degrees, starts, seed, workers
+        As `synthesise`.
+
+    Returns
+    -------
+    list of dict
+        ``objective``, ``unit``, ``published`` and ``synthesised`` (gains as floats), ``published_value``, ``value``
+        (both proved, or None) and ``ratio``, how many times better.
+    """
+    chosen = None if degrees is None else tuple(degrees)
+    options: dict[str, Any] = {"lipschitz": lipschitz, "gain_range": gain_range, "degrees": chosen}
+    more: dict[str, Any] = {"starts": starts, "seed": seed, "workers": workers, "compare": False}
+    rows = []
+    for name in objectives:
+        asked = question(subject, name, **options)
+        found = None if asked.setting.objective.bounded else synthesise(subject, name, **options, **more)
+        for loop in asked.known:
+            bound = scaled_norm(loop, asked.setting.exponents) * _SAME
+            mine = found or synthesise(subject, name, **options, **more, bound=bound)
+            rows.append(
+                _row(name, asked.setting.objective.unit, mine, beside(asked, loop, mine.value if mine else 0.0))
+            )
+    return rows
+
+
+def _row(name: str, unit: str, mine: Synthesis | None, theirs: Compared) -> dict[str, Any]:
+    return {
+        "objective": name,
+        "unit": unit,
+        "published": tuple(map(float, theirs.gains.values())),
+        "synthesised": tuple(map(float, mine.gains.values())) if mine else None,
+        "published_value": theirs.value,
+        "value": mine.value if mine else None,
+        "ratio": theirs.ratio if mine else None,
+    }
