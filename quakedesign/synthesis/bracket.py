@@ -8,7 +8,7 @@ from quakedesign.synthesis.sweep import SURE, Screened
 
 TOLERANCE = Fraction(1, 10_000)
 """Relative width of a bracket: the search succeeds at x and not at x(1 + TOLERANCE)."""
-_BELOW, _ABOVE = Fraction(6, 10) * TOLERANCE, Fraction(3, 10) * TOLERANCE  # where the ends of the bracket are wanted
+_BELOW, _ABOVE = TOLERANCE / 2, TOLERANCE / 5  # where the ends of the bracket are wanted
 _MOST = 40
 _STRIDE = 8
 _CREEPS = 6

@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 from quakedesign.certificates import Loop
 from quakedesign.symbolic.terms import Term
 
 _STARTS = 6
-_GROWTH = 3.0  # e-foldings that count as without end
-_ALIKE = 0.7  # share of it that must be left with finer steps, or it was the steps' chatter
+_GROWTH = 1.0  # e-foldings worth a second look
+_AGAIN = 1.4  # so many times more in twice the time with half the steps, or it was chatter, or passes
 _UNCOUNTED = 0.25  # share of a run at its beginning
 
 
@@ -33,24 +33,25 @@ class Escape:
 def escape(loop: Loop, *, steps: int = 6000, seed: int = 0) -> Escape | None:
     """Run that grows for parameters that jump between their ends, at two step sizes alike; None if none is found.
 
-    Every uncertain parameter follows the sign of one state, or of the rate of one state, from several starts.
+    Every uncertain parameter follows a sign: of a state or its rate where it must change with the state's sign, of a
+    product of two where it must not.
 
     Parameters
     ----------
     loop : Loop
     steps : int
-        Of the coarse runs; every step moves the state by at most 1/200 of its size.
+        Of the first runs; every step moves the state by at most 1/200 of its size.
     seed : int
         Of the starts.
     """
     field = _Field(loop)
-    plays = list(product(*(_choices(loop, low < high) for low, high in loop.uncertain.values())))
+    plays = list(product(*(_choices(loop, name) for name in loop.uncertain)))
     coarse = field.growths(plays, steps, 1 / 200, seed)
     for i in sorted(range(len(plays)), key=lambda i: -coarse[i])[:3]:
         if coarse[i] < _GROWTH:
             break
-        fine = field.growths(plays[i : i + 1], 4 * steps, 1 / 800, seed)[0]
-        if fine > _ALIKE * coarse[i]:
+        fine = field.growths(plays[i : i + 1], 4 * steps, 1 / 400, seed)[0]
+        if fine > _AGAIN * coarse[i]:
             told = (f"{name} follows {play}" for name, play in zip(loop.uncertain, plays[i], strict=True))
             return Escape(growth=float(fine), strategy=", ".join(told))
     return None
@@ -58,20 +59,30 @@ def escape(loop: Loop, *, steps: int = 6000, seed: int = 0) -> Escape | None:
 
 @dataclass(frozen=True, slots=True)
 class _Play:
-    """What a parameter follows: the sign of a state, or of its rate at the middle of all ranges, or the opposite."""
+    """The sign that a parameter follows: that of a product of states and of rates at the middle of all ranges."""
 
-    state: str
-    rate: bool
+    names: tuple[str, ...]
     sign: int
 
     def __str__(self) -> str:
-        prime = "'" if self.rate else ""
-        return f"{'' if self.sign > 0 else '-'}{self.state}{prime}"
+        return ("" if self.sign > 0 else "-") + "·".join(self.names)
 
 
-def _choices(loop: Loop, ranged: bool) -> list[_Play]:
-    everything = [_Play(s, rate, sign) for s in loop.states for rate in (False, True) for sign in (1, -1)]
-    return everything if ranged else everything[:1]
+def _choices(loop: Loop, name: str) -> list[_Play]:
+    low, high = loop.uncertain[name]
+    rates = {state: f"{state}'" for state in loop.states}
+    if _is_even(loop, name):
+        products = [*rates.items(), *combinations(loop.states, 2)]
+    else:
+        products = [(one,) for pair in rates.items() for one in pair]
+    everything = [_Play(names, sign) for names in products for sign in (1, -1)]
+    return everything if low < high else everything[:1]
+
+
+def _is_even(loop: Loop, name: str) -> bool:
+    """Whether the loop is odd in its states when the parameter stays as it is."""
+    terms = (term for rates in loop.field.values() for term in rates if name in term.parameters)
+    return all(sum(kind == "s" for _, _, kind in term.factors) % 2 == 1 for term in terms)
 
 
 class _Field:
@@ -114,27 +125,28 @@ class _Field:
         x = np.tile(np.random.default_rng(seed).normal(size=(len(self.states), _STARTS)), len(plays))
         middle, ends = self._parameters()
         growth = np.zeros(x.shape[1])
-        followed = {name: self._columns([play[i] for play in plays]) for i, name in enumerate(self.loop.uncertain)}
+        followed = {name: self._followed([play[i] for play in plays]) for i, name in enumerate(self.loop.uncertain)}
+        columns = np.arange(x.shape[1])
         for step in range(steps):
             size = (np.abs(x) ** (1 / self.weights)).sum(axis=0)
             x = x / size**self.weights
             growth += np.log(size) if step > steps * _UNCOUNTED else 0.0
-            signs = np.sign(np.concatenate([x, self.rates(x, middle)]))
+            signs = np.sign(np.concatenate([x, self.rates(x, middle), np.ones((1, x.shape[1]))]))
             chosen = dict(middle)
             for name, (low, high) in ends.items():
-                row, sign = followed[name]
-                up = signs[row, np.arange(x.shape[1])] * sign > 0
-                chosen[name] = np.where(up, high, low)
+                first, second, sign = followed[name]
+                chosen[name] = np.where(signs[first, columns] * signs[second, columns] * sign > 0, high, low)
             speed = self.rates(x, chosen)
             x = x + pace * speed / np.abs(speed).max(axis=0)
         return growth.reshape(len(plays), _STARTS).max(axis=1)
 
-    def _columns(self, plays: Sequence[_Play]) -> tuple[Any, Any]:
-        """Row of states and rates that every column follows, and the sign."""
+    def _followed(self, plays: Sequence[_Play]) -> tuple[Any, Any, Any]:
+        """Rows of the two signs that every column multiplies, in states, rates and a one; and the sign before them."""
         import numpy as np
 
-        rows = [self.states.index(p.state) + len(self.states) * p.rate for p in plays]
-        return np.repeat(rows, _STARTS), np.repeat([p.sign for p in plays], _STARTS)
+        rows = {name: i for i, name in enumerate((*self.states, *(f"{s}'" for s in self.states), ""))}
+        pairs = np.array([[rows[name] for name in (*play.names, "")[:2]] for play in plays])
+        return (*np.repeat(pairs, _STARTS, axis=0).T, np.repeat([play.sign for play in plays], _STARTS))
 
     def _parameters(self) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
         """All numbers with ranges at their middle, and the ends of the ranges."""

@@ -91,10 +91,11 @@ def bounds_of(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction])
     m, size = degree(function, "V"), len(loop.states)
     different = list({tuple(sorted(p.items())): p for p in function}.values())
     claims = {}
+    programs: dict[tuple, JointProgram] = {}
     for i, state in enumerate(loop.states):
         corner = {tuple(m * (j == i) for j in range(size)): Fraction(1)}
         obligations = [Obligation(state, p) for p in different]
-        gamma = below(0.9 * min(_largest(one, corner, loop.domain, scale, 0) for one in obligations))
+        gamma = below(0.9 * min(_largest(one, corner, loop.domain, scale, 0, programs) for one in obligations))
         if gamma > 0:
             claims[f"bound_{state}"] = gamma
     return claims
@@ -123,8 +124,18 @@ def with_largest_decay(
     return finish(loop, lyapunov, {**certificate.claims, "decay": kappa}, subject)
 
 
-def _largest(one: Obligation, direction: Mapping, domain: str, scale: Sequence[Fraction], level: int) -> float:
-    """Largest g for which the solver finds P − g·direction in the cone, 0 if it finds none; proves nothing."""
+def _largest(
+    one: Obligation,
+    direction: Mapping,
+    domain: str,
+    scale: Sequence[Fraction],
+    level: int,
+    programs: dict[tuple, JointProgram] | None = None,
+) -> float:
+    """Largest g for which the solver finds P − g·direction in the cone, 0 if it finds none; proves nothing.
+
+    Programmes of equal structure, up to the numbers of P, are shared by those who hand over the same `programs`.
+    """
     whole = lifted_scale(one.equalities, scale)
     size = max(abs(c) for c in scaled(one.polynomial, whole).values())
     moved = Obligation(
@@ -136,9 +147,11 @@ def _largest(one: Obligation, direction: Mapping, domain: str, scale: Sequence[F
     (corner,) = direction
     unit = whole[next(i for i, x in enumerate(corner) if x)] ** sum(corner) / size
     support = dict.fromkeys((*moved.polynomial, corner), Fraction(1))
-    template = statement_of(
-        Obligation(one.name, support, moved.equalities, moved.inequalities), domain, power_of_sum(len(whole), level)
-    )
+    kind = Obligation(one.name, support, moved.equalities, moved.inequalities)
+    template = statement_of(kind, domain, power_of_sum(len(whole), level))
     demand = Demand(template=template, parts=(moved.polynomial,), margin=direction)
-    found = JointProgram([demand]).solve([demand])
+    known = {} if programs is None else programs
+    program = known.get(kind.key) or JointProgram([demand])
+    known[kind.key] = program
+    found = program.solve([demand])
     return 0.0 if found is None else max(0.0, found.margin) / float(unit)

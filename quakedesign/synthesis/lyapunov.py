@@ -70,9 +70,12 @@ def _of_degree(loop: Loop, degree: int, subject: Subject | None) -> Certificate 
 def finished(
     loop: Loop, family: "Family", proposal: Proposal, scale: Sequence[Fraction], subject: Subject | None = None
 ) -> Certificate | None:
-    """Certificate from a proposal of a family in scaled variables, with the shortest rounding that has a proof."""
+    """Certificate from a proposal of a family in scaled variables, with the shortest rounding that has a proof.
+
+    Roundings that are coarser than the margin are not tried.
+    """
     degree = sum(exponents_of(family.monomials[0], loop.states))
-    for digits in _DIGITS:
+    for digits in [d for d in _DIGITS if d * proposal.margin > 1] or _DIGITS[-1:]:
         lyapunov = family.function(proposal.decision, digits)
         margins = (
             below(proposal.margin * float(min(1 / r**degree for r in scale))),

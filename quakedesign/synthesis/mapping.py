@@ -17,7 +17,7 @@ from quakedesign.synthesis.questions import necessary_limit, prove
 from quakedesign.synthesis.sweep import SURE, Sweep
 
 Place = tuple[int, int]
-_FAST, _FINE = 1e-8, 1e-10
+_FAST = 1e-8
 _DOUBTFUL = 1e-6
 
 
@@ -97,14 +97,14 @@ class Screener:
         sweep = self._sweep(loop)
         answer = None if sweep is None else sweep.solve(loop, accuracy=_FAST)
         if sweep is not None and answer is not None and abs(answer.margin) < _DOUBTFUL:
-            answer = sweep.solve(loop, accuracy=_FINE)
+            answer = sweep.solve(loop)
         return answer is not None and answer.margin > SURE
 
     def proof(self, place: Place, level: int) -> tuple[Place, int, str | None, int]:
         """Text of a certificate of a point at a level, or None; and solves."""
         before, loop = self._solves(), self.sheet.at(place, level)
         sweep = self._sweep(loop)
-        answer = None if sweep is None else sweep.solve(loop, accuracy=_FINE)
+        answer = None if sweep is None else sweep.solve(loop)
         certificate = None
         if sweep is not None and answer is not None and answer.found:
             certificate = prove(sweep, loop, answer, self.sheet.subject)

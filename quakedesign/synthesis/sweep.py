@@ -24,6 +24,8 @@ from quakedesign.synthesis.sweep_rows import ends_of, rows_of, values_of
 
 SURE = 5e-10
 """Margins above this count as found; the solver's answers are about as accurate as that."""
+ACCURACY = 1e-10
+"""What the solver is asked for unless told."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +106,7 @@ class Sweep:
         scale = balance(loop)
         return Frame(scale=scale, pace=self._in_units(scale).pace(self._features(values_of(loop))))
 
-    def solve(self, loop: Loop, frame: Frame | None = None, accuracy: float = 1e-10) -> Screened | None:
+    def solve(self, loop: Loop, frame: Frame | None = None, accuracy: float = ACCURACY) -> Screened | None:
         """Largest margin at one point; None if the solver fails.
 
         Parameters

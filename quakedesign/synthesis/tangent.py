@@ -19,8 +19,8 @@ from quakedesign.sos.solve.joint import Demand
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.affine import AffineProgram
-from quakedesign.synthesis.scales import exponents_of, lifted_scale, scaled
 from quakedesign.synthesis.gain_rows import Kin, Row, rows_of
+from quakedesign.synthesis.scales import exponents_of, lifted_scale, scaled
 from quakedesign.synthesis.sweep_rows import values_of
 
 Form = dict[tuple[int, ...], Any]

@@ -146,3 +146,12 @@ def test_a_sliding_mode_has_no_held_design_and_no_peaks(real):
     with pytest.raises(ParameterError, match="held is for the e-LQR"):
         qd.design(real, "cta", held=True)
     assert assess(real, published("real-fault")["cta"]).certified_peaks() is None
+
+
+def test_a_simulation_that_holds_the_pressure_agrees_with_both_verdicts(real):
+    short = {"scheme": "explicit", "duration": 400.0}
+    held = qd.simulate(real, qd.design(real, "elqr", held=True).controller, **short)
+    free = qd.simulate(real, qd.design(real, "elqr").controller, **short)
+    assert "diverged" not in held.events
+    assert held.metrics.max_slip_error < 1e-4
+    assert "diverged" in free.events

@@ -10,13 +10,13 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.tracking import disturbance_inputs, reference_rates, tracking_inputs
 from quakedesign.controllers import published
 from quakedesign.controllers.elqr import PressureLimits
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
 from quakedesign.fault import Disturbance
 from quakedesign.synthesis.linear.certified_peaks import certified_peaks, loop_for
 from quakedesign.synthesis.linear.disturbance_search import bang_bang, rate_limited, switched
-from quakedesign.certificates.tracking import disturbance_inputs, reference_rates, tracking_inputs
 from quakedesign.synthesis.linear.riccati import riccati_design
 
 

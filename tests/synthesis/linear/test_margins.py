@@ -10,9 +10,9 @@ import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.controllers import published
+from quakedesign.synthesis.linear.analysis import analysis
 from quakedesign.synthesis.linear.frequency import slip_limit, stable_quartic
 from quakedesign.synthesis.linear.lmi import sector_loop
-from quakedesign.synthesis.linear.analysis import analysis
 from quakedesign.synthesis.linear.margins import (
     decay_rate,
     friction_slope_margin,

@@ -9,13 +9,13 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.tracking import disturbance_inputs, tracking_inputs
 from quakedesign.controllers import published
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.definiteness import full_matrix
 from quakedesign.synthesis.linear.certified_peaks import loop_for
 from quakedesign.synthesis.linear.disturbance_search import bang_bang, rate_limited, switched
 from quakedesign.synthesis.linear.peak_cascade import cascade, separated
-from quakedesign.certificates.tracking import disturbance_inputs, tracking_inputs
 from quakedesign.synthesis.linear.riccati import riccati_design
 
 

@@ -8,12 +8,12 @@ import sympy as sp
 
 import quakedesign as qd
 from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.tracking import fed_forward
 from quakedesign.controllers import Signals, published
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic import plant
 from quakedesign.synthesis.design import linear_loop
 from quakedesign.synthesis.linear.polytope import ErrorLoop, Polytope, error_loop, modal_scaling, polytope_of
-from quakedesign.certificates.tracking import fed_forward
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,67 @@
+"""`synthesise` on the command line."""
+
+import json
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.cli import main
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main(["synthesise", *arguments])
+    out, err = capsys.readouterr()
+    return stop.value.code, out, err
+
+
+FAST = ("--degree", "4", "--starts", "1", "--workers", "1")
+
+
+def test_gains_and_their_certificate(capsys, tmp_path):
+    path = tmp_path / "gains.json"
+    code, out, _ = run(capsys, "super-twisting", "--lipschitz", "0.5", *FAST, "--out", str(path), "--json")
+    found = json.loads(out)
+    certificate = qd.load_certificate(path)
+    assert code == 0
+    assert found["verdict"] == str(certificate.check()) == "proved"
+    assert found["gains"] == {name: str(k) for name, k in certificate.loop.gains.items()}
+    assert found["lipschitz"] == "1/2"
+    assert found["gain_range"] == ["1", "1"]
+    assert found["value"] == found["norm"]
+    assert {"objective", "unit", "compared", "certificate", "seconds"} < set(found)
+
+
+def test_an_existing_file_is_kept(capsys, tmp_path):
+    path = tmp_path / "gains.json"
+    path.write_text("mine")
+    code, _, err = run(capsys, "super-twisting", *FAST, "--out", str(path))
+    assert code == 2
+    assert "--force" in err
+    assert path.read_text() == "mine"
+
+
+def test_nothing_proved_is_exit_code_one(capsys, monkeypatch):
+    from quakedesign.synthesis import gains
+
+    monkeypatch.setattr(gains, "synthesise", lambda *a, **k: None)
+    code, out, _ = run(capsys, "cta", "--json")
+    assert code == 1
+    assert json.loads(out)["verdict"] == "undecided"
+    code, out, _ = run(capsys, "cta")
+    assert code == 1
+    assert out.startswith("undecided")
+
+
+def test_people_get_a_table(capsys):
+    code, out, _ = run(capsys, "super-twisting", *FAST)
+    assert code == 0
+    assert out.startswith("proved: super-twisting with k1 = ")
+    assert "these" in out
+
+
+@pytest.mark.parametrize("arguments", [("pid",), ("cta", "--objective", "speed"), ("cta", "--lipschitz", "-1")])
+def test_input_that_cannot_be_understood(capsys, arguments):
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert err.count("\n") == 1

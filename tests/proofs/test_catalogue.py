@@ -1,0 +1,108 @@
+"""Shipped certificates: both checkers accept each, the library writes the same bytes, each is what its name says."""
+
+import importlib.util
+import json
+from fractions import Fraction as F
+from pathlib import Path
+
+import pytest
+
+from quakedesign.certificates import certificate_text, load_certificate, loop_of
+from quakedesign.certificates.command import check_files
+from quakedesign.controllers import law
+from quakedesign.sos.exact import files as polynomial_files
+
+ROOT = Path(__file__).parents[2] / "proofs"
+FILES = sorted((ROOT / "certificates").glob("*.json"))
+POLYNOMIALS = [p for p in FILES if p.stem.startswith("motzkin")]
+LOOPS = [p for p in FILES if p not in POLYNOMIALS]
+each = pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
+each_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda p: p.stem)
+
+# L̄ and [b_m, b_M] of every file; the four 2-CTA sets are those of Torres-González et al. (2017) for L̄ = 1
+STATEMENTS = {
+    "super-twisting_1.5_1.1": ("1", "1", "1"),
+    "cta_7_5_2.3_1.1": ("1", "1", "1"),
+    "cta_13_7.5_2.3_1.1": ("1", "1", "1"),
+    "cta_19_10_2.3_1.1": ("1", "1", "1"),
+    "cta_25_15_2.3_1.1": ("1", "1", "1"),
+    "dia_1_20_1_0": ("3/10", "1", "57/40"),
+    "dia_1_20_1_0.1": ("3/10", "1", "1"),
+    "cta3_1_2_2_0.05_0.02_0.01": ("1/200", "1", "1"),
+}
+
+SPECIFICATION = importlib.util.spec_from_file_location("catalogue_check", ROOT / "check.py")
+checker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(checker)
+
+
+def test_the_catalogue_is_complete():
+    assert {p.stem for p in LOOPS} == {*STATEMENTS, "elqr_real-fault", "elqr_lab-fault"}
+    assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
+
+
+@each
+def test_both_checkers_agree(path):
+    expected = "refuted" if path.stem == "motzkin_not-sos" else "proved"
+    ((verdict, _),) = check_files([path]).values()
+    assert verdict == expected
+    assert checker.check(path.read_text()).verdict == expected
+
+
+@each
+def test_the_library_writes_the_same_bytes(path):
+    text = path.read_text()
+    if path in POLYNOMIALS:
+        assert polynomial_files.text(*polynomial_files.load(text)) == text
+    else:
+        assert certificate_text(load_certificate(path)) == text
+
+
+@pytest.mark.parametrize("name", STATEMENTS)
+def test_a_name_says_law_and_gains(name):
+    certificate = load_certificate(ROOT / "certificates" / f"{name}.json")
+    wanted, *gains = name.split("_")
+    lipschitz, low, high = map(F, STATEMENTS[name])
+    assert certificate.loop.law == wanted
+    assert list(certificate.loop.gains.values()) == [F(g) for g in gains]
+    assert certificate.loop.uncertain == {"beta": (low, high), "d": (-lipschitz, lipschitz)}
+    values = dict(certificate.loop.gains)
+    derived = loop_of(wanted, law(wanted).loop_field(), gains=values, uncertain=certificate.loop.uncertain)
+    assert derived == certificate.loop
+
+
+@pytest.mark.parametrize("fault", ["real-fault", "lab-fault"])
+def test_linear_certificates_cover_their_faults(fault):
+    path = ROOT / "certificates" / f"elqr_{fault}.json"
+    ((verdict, lines),) = check_files([path], fault).values()
+    assert verdict == "proved"
+    assert any(fault in line for line in lines)
+
+
+def test_the_polynomial_is_that_of_motzkin():
+    known = {(4, 2): 1, (2, 4): 1, (0, 0): 1, (2, 2): -3}  # x⁴y² + x²y⁴ + 1 − 3x²y²
+    for path in POLYNOMIALS:
+        asked, _ = polynomial_files.load(path.read_text())
+        assert asked.polynomial == known
+        squared = {(0, 0): 1, (2, 0): 1, (0, 2): 1}
+        assert asked.multiplier == ({(0, 0): 1} if path.stem == "motzkin_not-sos" else squared)
+
+
+@each_loop
+def test_a_changed_number_is_refused_by_both(path, tmp_path):
+    raw = json.loads(path.read_text())
+    gram = next(s for w in raw["witnesses"] for s in w["squares"])["gram"]
+    gram[0] = str(F(gram[0]) * F(1001, 1000))
+    text = json.dumps(raw)
+    changed = tmp_path / "changed.json"
+    changed.write_text(text)
+    ((verdict, _),) = check_files([changed]).values()
+    assert verdict.startswith("invalid")
+    with pytest.raises(checker.Refused):
+        checker.check(text)
+
+
+@pytest.mark.parametrize("name", [n for n in STATEMENTS if not n.startswith(("dia_1_20_1_0.1", "cta3"))])
+def test_most_files_bound_the_settling_time(name):
+    certificate = load_certificate(ROOT / "certificates" / f"{name}.json")
+    assert certificate.claims["decay"] > 0

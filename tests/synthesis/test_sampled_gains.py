@@ -1,0 +1,46 @@
+"""Gains chosen by their sampled errors: measured again, proved, and better than the published ones."""
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.certificates import Verdict
+from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.synthesis.sampled_gains import sampling, synthesise_sampled
+
+
+@pytest.fixture(scope="module")
+def fault():
+    return qd.load_fault("real-fault")
+
+
+def test_the_scale_makes_the_unit_bound_enough_for_the_fault(fault):
+    trial = sampling(fault)
+    from quakedesign.certificates.premises import Errors, largest_matched_rate
+
+    needed = largest_matched_rate(fault, trial.divisor, Errors())
+    assert 1.1 * float(needed) <= float(trial.scale) <= 1.25 * float(needed)
+    assert trial.step == fault.sampling_time
+    assert trial.duration == 4000 * fault.sampling_time
+
+
+def test_smaller_gains_chatter_less_and_have_a_proof(fault):
+    trial = sampling(fault, scheme="explicit", duration=1000 * fault.sampling_time)
+    found = synthesise_sampled(trial, degrees=(5,), rounds=8)
+    assert found.certificate.check() is Verdict.PROVED
+    assert found.certificate.loop.uncertain["d"] == (-1, 1)
+    run = qd.simulate(
+        fault, trial.controller(tuple(found.gains.values())), scheme="explicit", duration=trial.duration, samples=2
+    )
+    assert run.metrics.max_slip_rate_error == found.value
+    assert found.unit == "m/s"
+    assert found.value < found.compared[0].value < found.compared[-1].value
+    assert found.compared[0].ratio == pytest.approx(found.compared[0].value / found.value)
+
+
+def test_bad_input_gets_one_clear_message(fault):
+    with pytest.raises(ParameterError, match="sliding modes"):
+        sampling(fault, "elqr")
+    with pytest.raises(ParameterError, match="metric must be one of"):
+        sampling(fault, metric="speed")
+    with pytest.raises(UnknownNameError):
+        sampling(fault, "pid")
