@@ -169,18 +169,25 @@ def continuous_derivatives(right: sp.Expr, left: sp.Expr) -> int:
     return 5
 
 
+ERRORS = sp.symbols("e1 e2 e3", real=True)
+
+
 def lyapunov_rate(law: str, V: sp.Expr, gains: dict[str, Fraction]) -> tuple[sp.Expr, list[sp.Symbol]]:
     """V̇ along the toolkit's loop field off the kinks, in e1, e2, e3, beta and d."""
     loop = control_law(law).loop_field()
     numbers = dict(zip(loop.gains, (sp.Rational(str(g)) for g in gains.values()), strict=True))
+    numbers |= {root: sp.sqrt(numbers[of]) for root, of in loop.roots.items()}
+    units = [sp.sympify(loop.units.get(state, 1)).subs(numbers) for state in loop.states]
+    back = {state: e / unit for state, e, unit in zip(loop.states, ERRORS, units, strict=True)}
+    field = [unit * rate.subs(numbers).subs(back) for unit, rate in zip(units, loop.field.values(), strict=True)]
     with off_kinks():
-        rate = sum(sp.diff(V, state) * f for state, f in loop.field.items())
-    return sp.expand(rate.subs(numbers)), [*loop.states, *loop.uncertain]
+        rate = sum(sp.diff(V, e) * f for e, f in zip(ERRORS, field, strict=True))
+    return sp.expand(rate), [*ERRORS, *loop.uncertain]
 
 
 def paper_function(law: str) -> sp.Expr:
     """V of the 2-CTA that certifies (7, 5, 2.3, 1.1) at β = 1; V of the 2-DIA for k_I1, k_I2 = 2, 5 and γ1 = 2.01."""
-    e1, e2, e3 = control_law(law).loop_field().states
+    e1, e2, e3 = ERRORS
     third = sp.Rational(5, 3)
     if law == "cta":
         a = [sp.Rational(text) for text in ("1", "0.349", "0.0712", "-0.0238", "1.21e-3", "5.4e-5")]

@@ -235,6 +235,8 @@ def beside(asked: Question, loop: Loop, value: float) -> Compared:
         states = _in_order(at, [climb(at, begin, free=False)]) if begin else []
         found = _proved(at, states, asked.subject)
         reached += [found[1]] if found else []
+        if reached and not objective.bounded:  # then V does not matter
+            break
     best = (max(reached) if objective.larger else min(reached)) if reached else None
     ratio = None if best is None else (value / best if objective.larger else best / value)
     return Compared(gains=dict(loop.gains), value=best, norm=scaled_norm(loop, asked.setting.exponents), ratio=ratio)

@@ -1,0 +1,88 @@
+"""Answers about given gains in facts and words."""
+
+from decimal import ROUND_CEILING, ROUND_FLOOR
+from fractions import Fraction as F
+
+import pytest
+
+from quakedesign.certificates import Verdict
+from quakedesign.errors import ParameterError
+from quakedesign.report.certified import certified, rounded
+
+KEYS = {"verdict", "lipschitz", "gain_range", "decay", "settling", "limit", "counterexample", "certificate", "seconds"}
+TWISTING = ("super-twisting", ("0.7", "2"))
+
+
+def test_a_bound_is_proved():
+    answer = certified(*TWISTING, lipschitz="0.5")
+    assert set(answer.facts) == KEYS
+    assert answer.verdict is Verdict.PROVED is answer.certificate.check()
+    assert (answer.facts["verdict"], answer.facts["lipschitz"], answer.facts["limit"]) == ("proved", "1/2", "2")
+    assert answer.lines[0] == "proved: super-twisting 0.7 2, |h'| <= 1/2, beta from 1 to 1"
+    assert "necessary limit: from |h'| = 2 on" in answer.lines[1]
+
+
+def test_the_largest_bound_is_told_with_what_limits_it_and_the_scale_for_a_larger_one():
+    answer = certified(*TWISTING, maximize="lipschitz", lipschitz=3)
+    facts = answer.facts
+    value, beyond = F(facts["lipschitz"]), F(facts["maximized"]["beyond"])
+    assert {"maximized", "degrees", "degree", "scale", "solves", *KEYS} == set(facts)
+    assert value < beyond <= value * F(10_001, 10_000)
+    assert F(facts["scale"]) == 3 / value
+    assert facts["maximized"]["value"] == facts["lipschitz"]
+    assert answer.certificate.loop.uncertain["d"][1] == value
+    said = "\n".join(answer.lines)
+    assert f"(exactly {value})" in said
+    assert "the search finds none of degree 3, 4, 6, 8, 10" in said
+    assert "lambda >=" in said
+
+
+@pytest.mark.parametrize("maximize", ["beta", "beta-factor"])
+def test_the_largest_range_is_told_as_a_range(maximize):
+    answer = certified("super-twisting", ("1.2", "2"), lipschitz=1, maximize=maximize, gain_range=(2, 2))
+    low, high = map(F, answer.facts["gain_range"])
+    value = F(answer.facts["maximized"]["value"])
+    assert (low, high) == ((2, value) if maximize == "beta" else (2 / value, 2 * value))
+    assert answer.certificate.loop.uncertain["beta"] == (low, high)
+
+
+def test_the_decay_comes_with_a_settling_time():
+    answer = certified("super-twisting", ("1.5", "1.1"), lipschitz="0.5", maximize="decay")
+    told = answer.facts["settling"]
+    assert F(answer.facts["decay"]) == answer.certificate.claims["decay"]
+    assert F(told["factor"]) * F(told["power"]) * F(answer.facts["decay"]) == 1
+    assert F(told["start"]) == F(1, 2)
+    assert 1 < told["seconds"] < 30
+    assert "settles within" in answer.lines[-1]
+
+
+def test_what_is_not_proved_is_told_with_what_speaks_against_it():
+    refuted = certified("super-twisting", ("3", "1"), lipschitz=1)
+    assert (refuted.facts["verdict"], refuted.facts["counterexample"]) == ("refuted", "exact")
+    undecided = certified("super-twisting", ("0.4", "1.5"), lipschitz=1)
+    assert (undecided.facts["verdict"], undecided.facts["counterexample"]) == ("undecided", "simulated")
+    assert "measured, not proved" in undecided.lines[-1]
+    never = certified("cta", ("7", "5", "2.3", "2.3"), maximize="lipschitz")
+    assert (never.facts["verdict"], never.facts["lipschitz"], never.facts["limit"]) == ("refuted", None, "0")
+
+
+@pytest.mark.parametrize(
+    ("wish", "message"),
+    [
+        ({}, "needs a bound on"),
+        ({"maximize": "beta"}, "needs a bound on"),
+        ({"maximize": "speed"}, "must be one of lipschitz, beta, beta-factor, decay"),
+        ({"maximize": "beta", "lipschitz": 1, "gain_range": (1, 2)}, "give one value twice"),
+        ({"lipschitz": "x"}, "lipschitz must be a finite number"),
+    ],
+)
+def test_bad_wishes_get_one_clear_message(wish, message):
+    with pytest.raises(ParameterError, match=message):
+        certified(*TWISTING, **wish)
+
+
+@pytest.mark.parametrize("value", [F(1, 3), F(2, 3), F(12345678, 10**12), F(10**9 + 1), F(5, 4)])
+def test_numbers_for_people_stay_on_the_safe_side(value):
+    low, high = F(rounded(value, ROUND_FLOOR)), F(rounded(value, ROUND_CEILING))
+    assert low <= value <= high
+    assert high - low <= value * F(1, 10**5)
