@@ -71,6 +71,7 @@ class _Play:
 def _choices(loop: Loop, name: str) -> list[_Play]:
     low, high = loop.uncertain[name]
     rates = {state: f"{state}'" for state in loop.states}
+    products: list[tuple[str, ...]]
     if _is_even(loop, name):
         products = [*rates.items(), *combinations(loop.states, 2)]
     else:
