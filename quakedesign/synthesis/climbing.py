@@ -184,7 +184,7 @@ def _around(
 ) -> Neighbourhood | None:
     rate = setting.objective.rate(level)
     try:
-        pace = pace_of(loop, lyapunov, rate) if rate else None
+        pace = pace_of(loop, lyapunov, rate, setting.degree) if rate else None
         return neighbourhood(loop, setting.degree, balance(loop), pace=pace, lyapunov=lyapunov, changed=changed)
     except (CertificateError, ValueError):
         return None

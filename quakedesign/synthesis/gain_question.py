@@ -94,10 +94,13 @@ def _scaled(
 
 
 def begin_with(asked: Question, seed: int) -> Iterator[Loop]:
-    """Gains from the literature, then random ones around them, or of any size where there are none."""
+    """Gains from the literature, the nearest to the bound on the norm first, then random ones around them.
+
+    Random ones of any size where there are none in the literature.
+    """
     import numpy as np
 
-    yield from asked.known
+    yield from sorted(asked.known, key=lambda one: _beyond(asked.setting, one))
     loop, rng = asked.loop, np.random.default_rng(seed)
     while True:
         near = asked.known[int(rng.integers(len(asked.known)))].gains if asked.known else {}
@@ -107,3 +110,9 @@ def begin_with(asked: Question, seed: int) -> Iterator[Loop]:
             yield with_gains(loop, short(loop, {n: float(k) * factors[n] for n, k in near.items()}))
         else:
             yield with_gains(loop, _scaled(loop, factors, 1.0, asked.setting.exponents))
+
+
+def _beyond(setting: Setting, loop: Loop) -> tuple[bool, float]:
+    """Order of gains: those within the bound on the norm before those beyond, the nearest to it first."""
+    bound, norm = setting.objective.bound, scaled_norm(loop, setting.exponents)
+    return (False, 0.0) if bound is None else (norm > bound * (1 + 1e-9), abs(bound - norm))

@@ -19,6 +19,7 @@ def improvements(
     *,
     lipschitz: Number = 1,
     gain_range: tuple[Number, Number] = (1, 1),
+    against: Sequence[int] | None = None,
     degrees: Iterable[int] | None = None,
     starts: int = 2,
     seed: int = 0,
@@ -32,6 +33,8 @@ def improvements(
     ----------
     subject : str, type of Law or LoopField
     objectives : sequence of str
+    against : sequence of int, optional
+        Which gains from the literature, counted from zero; all unless given.
     lipschitz, gain_range, degrees, starts, seed, workers
         As `synthesise`.
 
@@ -48,7 +51,7 @@ def improvements(
     for name in objectives:
         asked = question(subject, name, **options)
         found = None if asked.setting.objective.bounded else synthesise(subject, name, **options, **more)
-        for loop in asked.known:
+        for loop in asked.known if against is None else [asked.known[i] for i in against]:
             bound = scaled_norm(loop, asked.setting.exponents) * _SAME
             mine = found or synthesise(subject, name, **options, **more, bound=bound)
             rows.append(

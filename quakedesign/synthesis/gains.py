@@ -11,7 +11,7 @@ from multiprocessing import get_context
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.controllers import Subject
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis.climbing import Setting, State, climb, short, with_gains
+from quakedesign.synthesis.climbing import FAINT, Setting, State, climb, look, short, with_gains
 from quakedesign.synthesis.decision import Number
 from quakedesign.synthesis.gain_question import Question, begin_with, question
 from quakedesign.synthesis.objectives import SmallestNorm
@@ -21,6 +21,7 @@ _STRETCHES = (1.0, 1.5, 4.0)
 _DRAWS = 12
 _TRIES = 6
 _INSIDE = 0.98
+_SHARES = (1.0, 0.9, 0.7)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,9 +162,15 @@ def _climbed(setting: Setting, first: Sequence[Loop], wanted: int, workers: int)
 
 
 def attempt(setting: Setting, loop: Loop) -> list[State]:
-    """States of a climb from some gains, or from the same stretched; empty where there is no beginning."""
+    """States of a climb from some gains, or from the same stretched; empty where there is no beginning.
+
+    As far as the gains go by themselves, then with the gains moving.
+    """
     begin = next(filter(None, (_begin(setting, _stretched(setting, loop, s)) for s in _STRETCHES)), None)
-    return [] if begin is None else climb(setting, begin)
+    if begin is None:
+        return []
+    fixed = climb(setting, begin, free=False)
+    return [*fixed, *climb(setting, fixed[-1])]
 
 
 def _begin(setting: Setting, loop: Loop) -> State | None:
@@ -188,16 +195,26 @@ def _stretched(setting: Setting, loop: Loop, factor: float) -> Loop:
 
 
 def _best(asked: Question, climbs: Sequence[Sequence[State]]) -> tuple[Certificate, float] | None:
-    """Proof of the best state, after the best climb has gone on with higher degrees."""
+    """Best proof, the best climb going on with higher degrees."""
     best = _in_order(asked.setting, climbs)
     stages = [(asked.setting, best)]
     for degree in asked.degrees[1:] if best else ():
         higher = replace(asked.setting, degree=degree)
-        begin = next(filter(None, (higher.objective.start(higher, s.loop) for s in best[:2])), None)
+        begin = next(filter(None, (_carried(higher, state) for state in best[:_TRIES])), None)
         if begin is not None:
             best = _in_order(higher, [climb(higher, begin)])
             stages.append((higher, best))
-    return next(filter(None, (_proved(at, states, asked.subject) for at, states in reversed(stages))), None)
+    found = list(filter(None, (_proved(at, states, asked.subject) for at, states in stages)))
+    pick = max if asked.setting.objective.larger else min
+    return pick(found, key=lambda item: item[1], default=None)
+
+
+def _carried(higher: Setting, state: State) -> State | None:
+    """State of a lower degree looked at with a higher one, at its level or a lower one."""
+    objective = higher.objective
+    levels = [objective.reached(state.level * share, state.loop, higher.exponents) for share in _SHARES]
+    found = (look(higher, state.loop, level, state.lyapunov, least=FAINT) for level in dict.fromkeys(levels))
+    return next(filter(None, found), None)
 
 
 def _in_order(setting: Setting, climbs: Sequence[Sequence[State]]) -> list[State]:

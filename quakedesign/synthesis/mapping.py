@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from multiprocessing import get_context
@@ -12,13 +13,14 @@ from typing import Any, Self
 from quakedesign.certificates import Loop, certificate_text
 from quakedesign.certificates.claim import root_enclosure
 from quakedesign.controllers import Subject
-from quakedesign.errors import CertificateError
+from quakedesign.errors import CertificateError, SimulationError
 from quakedesign.synthesis.questions import necessary_limit, prove
 from quakedesign.synthesis.sweep import SURE, Sweep
 
 Place = tuple[int, int]
 _FAST = 1e-8
 _DOUBTFUL = 1e-6
+_LIVES = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,8 +137,12 @@ class Crew:
     """
 
     def __init__(self, sheet: Sheet, workers: int) -> None:
+        self._sheet, self._workers = sheet, workers
         self._own = Screener(sheet) if workers == 1 else None
-        self._pool = None if workers == 1 else ProcessPoolExecutor(workers, get_context("spawn"), _begin, (sheet,))
+        self._pool = None if workers == 1 else self._filled()
+
+    def _filled(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(self._workers, get_context("spawn"), _begin, (self._sheet,))
 
     def __enter__(self) -> Self:
         return self
@@ -146,13 +152,34 @@ class Crew:
             self._pool.shutdown(wait=True, cancel_futures=True)
 
     def answers(self, question: str, arguments: Iterable[tuple]) -> Iterator[Any]:
-        """Answers of one method of `Screener` to many arguments, in any order."""
-        if self._pool is None:
+        """Answers of one method of `Screener` to many arguments, in any order.
+
+        Raises
+        ------
+        SimulationError
+            When processes die again and again; one that was killed from outside is replaced.
+        """
+        if self._own is not None:
             yield from (getattr(self._own, question)(*one) for one in arguments)
             return
-        futures = [self._pool.submit(_answer, question, one) for one in arguments]
+        waiting = list(arguments)
+        for _ in range(_LIVES):
+            try:
+                for one, answer in self._done(question, waiting):
+                    waiting.remove(one)
+                    yield answer
+                return
+            except BrokenProcessPool:
+                self._pool = self._filled()
+        raise SimulationError(
+            f"the processes of the map died {_LIVES} times, with {len(waiting)} tasks left. Ask for fewer workers."
+        )
+
+    def _done(self, question: str, waiting: Sequence[tuple]) -> Iterator[tuple[tuple, Any]]:
+        assert self._pool is not None
+        futures = {self._pool.submit(_answer, question, one): one for one in waiting}
         for future in as_completed(futures):
-            yield future.result()
+            yield futures[future], future.result()
 
 
 _screener: list[Screener] = []

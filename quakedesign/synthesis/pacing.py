@@ -56,13 +56,13 @@ def rounded(lyapunov: Sequence[Term], bits: int, divisor: float = 1.0) -> tuple[
     return tuple(found)
 
 
-def pace_of(loop: Loop, lyapunov: tuple[Term, ...], rate: float) -> Pace:
-    """Pace with w fitted to V^{1/m} on every cell; V is positive there, or w is of no use but does no harm."""
+def pace_of(loop: Loop, lyapunov: tuple[Term, ...], rate: float, power: int) -> Pace:
+    """Pace for functions of a degree, with w fitted to V^{1/m} on every cell for a V nearby, of whatever degree m."""
     obligations = Obligations(loop, lyapunov)
     m = degree([p for _, p in obligations.function()], "V")
     n = degree([one.polynomial for _, one in obligations.decrease("")], "V̇")
     forms = {cell.name: _form(obligations.potential(cell.signs), m) for cell in obligations.sign_cells()}
-    return Pace(rate=rate, degrees=(m, n), forms=forms)
+    return Pace(rate=rate, degrees=(power, power + n - m), forms=forms)
 
 
 def least_margins(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> tuple[float, float]:

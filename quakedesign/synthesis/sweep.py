@@ -26,6 +26,7 @@ SURE = 5e-10
 """Margins above this count as found; the solver's answers are about as accurate as that."""
 ACCURACY = 1e-10
 """What the solver is asked for unless told."""
+_KEPT = 64  # scales whose numbers are kept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,6 +149,8 @@ class Sweep:
         if scale not in self._numbers:
             free = self._numbers and not any(row.equalities or row.inequalities for row in self.rows)
             known = next(iter(self._numbers.values())).matrix if free else None
+            if len(self._numbers) >= _KEPT:
+                self._numbers.pop(next(iter(self._numbers)))
             self._numbers[scale] = _Numbers(self, scale, known)
         return self._numbers[scale]
 

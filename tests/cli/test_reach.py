@@ -33,20 +33,20 @@ def test_what_is_not_proved_is_code_one(capsys):
     assert "an exact counterexample was found" in said
 
 
-MAP = ("map", "super-twisting", "--gains", "1.5", "1.1", "--over", "k1", "k2", "--points", "5", "--degree", "6")
-MAP += ("--lipschitz", "1", "--interior", "2", "--workers", "1")
+MAP = ("map", "super-twisting", "--gains", "1.5", "1.1", "--degree", "6", "--interior", "2", "--workers", "1")
+OVER, FIVE, ONE = ("--over", "k1", "k2"), ("--points", "5"), ("--lipschitz", "1")
 
 
 def test_a_map_is_a_folder_with_figure_table_and_certificates(capsys, tmp_path):
     folder = tmp_path / "m"
-    code, said, err = run(capsys, *MAP, "--range", "0.4", "3", "0.8", "4", "--out", str(folder))
+    code, said, err = run(capsys, *MAP, *OVER, *FIVE, *ONE, "--range", "0.4", "3", "0.8", "4", "--out", str(folder))
     assert code == 0
     assert "proved exactly, among them" in said
     assert {p.name for p in folder.iterdir()} == {"map.png", "map.csv", "results.json", "certificates"}
     files = [str(p) for p in sorted((folder / "certificates").iterdir())]
     assert run(capsys, "check", *files)[0] == 0
-    assert run(capsys, *MAP, "--out", str(folder))[0] == 2
-    code, said, err = run(capsys, *MAP, "--points", "3", "--out", str(folder), "--force", "--json")
+    assert run(capsys, *MAP, *OVER, *FIVE, *ONE, "--out", str(folder))[0] == 2
+    code, said, err = run(capsys, *MAP, *OVER, *ONE, "--points", "3", "--out", str(folder), "--force", "--json")
     found = json.loads(said)
     assert (code, err) == (0, "")
     assert {"points", "screened", "proved"} <= set(found)
@@ -56,10 +56,10 @@ def test_a_map_is_a_folder_with_figure_table_and_certificates(capsys, tmp_path):
 
 WRONG = {
     "gain": ("--over", "k1", "k7"),
-    "range": ("--range", "1", "2"),
-    "falling range": ("--range", "2", "1", "1", "2"),
-    "no number": ("--lipschitz", "x"),
-    "points": ("--points", "1"),
+    "range": (*OVER, "--range", "1", "2"),
+    "falling range": (*OVER, "--range", "2", "1", "1", "2"),
+    "no number": (*OVER, "--lipschitz", "x"),
+    "points": (*OVER, "--points", "1"),
 }
 
 
@@ -74,6 +74,6 @@ def test_bad_input_is_one_line_and_nothing_is_written(case, capsys, tmp_path, mo
 
 def test_gains_are_needed_where_none_are_known(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, _, err = run(capsys, "map", "dia", "--over", "kI1", "kI2")
+    code, _, err = run(capsys, "map", "super-twisting", *OVER)
     assert code == 2
     assert "base gains exist for" in err

@@ -54,6 +54,7 @@ def test_synthesised_gains_withstand_the_sampler(small):
     assert not attack.sample(attack.Claim.read(certificate_text(small.certificate)), 50_000)
 
 
+@pytest.mark.slow
 def test_every_bound_on_the_disturbance_gives_the_same_norm(small):
     lipschitz = "1e-4"
     # the λ-scaling maps the loops onto each other, so that the optimum is the same number; rounding moves the search
@@ -72,6 +73,7 @@ def test_super_twisting_comes_near_the_smallest_gains_that_are_stable_at_all():
     assert found.compared == ()
 
 
+@pytest.mark.slow
 def test_a_tighter_bound_on_beta_needs_larger_gains(small):
     wide = synthesise("cta", "norm", gain_range=(1, "1.425"), **FAST)
     assert wide.certificate.loop.uncertain["beta"] == (1, F("1.425"))

@@ -10,7 +10,7 @@ import pytest
 from quakedesign.certificates import Verdict, parse_certificate
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis import maps
-from quakedesign.synthesis.mapping import Screener
+from quakedesign.synthesis.mapping import Crew, Screener
 from quakedesign.synthesis.maps import SHARES, axis, gain_map
 
 SPECIFICATION = importlib.util.spec_from_file_location(
@@ -20,7 +20,7 @@ region = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(region)
 
 RANGES = (("0.3", "3"), ("0.8", "5"))
-ASKED = {"ranges": RANGES, "points": 9, "levels": ("1", "0.5"), "degree": 6, "interior": 6, "workers": 1}
+ASKED = {"ranges": RANGES, "points": 7, "levels": ("1", "0.5"), "degree": 6, "interior": 6, "workers": 1}
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def gains_at(drawn, place):
 
 
 def test_every_point_is_screened_with_the_level_it_reaches(drawn):
-    assert set(drawn.screened) == {(i, j) for i in range(9) for j in range(9)}
+    assert set(drawn.screened) == {(i, j) for i in range(7) for j in range(7)}
     assert set(drawn.screened.values()) == {0, 1, 2}
     for place, level in drawn.screened.items():
         k1, k2 = gains_at(drawn, place)
@@ -51,7 +51,7 @@ def test_all_edges_and_the_points_drawn_inside_are_proved(drawn):
             (i, j)
             for i, j in places
             if any(
-                (i + a, j + b) not in places and 0 <= i + a < 9 and 0 <= j + b < 9
+                (i + a, j + b) not in places and 0 <= i + a < 7 and 0 <= j + b < 7
                 for a, b in ((0, 1), (1, 0), (0, -1), (-1, 0))
             )
         }
@@ -72,13 +72,6 @@ def test_certificates_are_about_their_points(drawn):
         assert tuple(certificate.loop.gains.values()) == gains_at(drawn, place)
         assert certificate.loop.uncertain["d"] == (-bound, bound)
         assert certificate.check() is Verdict.PROVED
-
-
-def test_processes_give_the_same_map(drawn):
-    asked = ASKED | {"workers": 2, "points": 5, "interior": 1}
-    alone = gain_map("super-twisting", ("1.5", "1.1"), ("k1", "k2"), **asked | {"workers": 1})
-    together = gain_map("super-twisting", ("1.5", "1.1"), ("k1", "k2"), **asked)
-    assert (together.screened, together.proved) == (alone.screened, alone.proved)
 
 
 def test_a_point_without_a_proof_is_told_from_a_proved_one_and_its_neighbours_are_tried(drawn, monkeypatch):
@@ -116,6 +109,19 @@ def test_an_interrupted_map_leaves_no_process_waiting(monkeypatch):
 
     with pytest.raises(KeyboardInterrupt):
         gain_map("super-twisting", ("1.5", "1.1"), ("k1", "k2"), tell=stop, **ASKED)
+
+
+def test_processes_give_the_same_answers_even_if_they_are_killed():
+    sheet = maps._sheet("super-twisting", ("1.5", "1.1"), ("k1", "k2"), RANGES, 3, ("1",), (1, 1), 4)
+    alone = Screener(sheet)
+    with Crew(sheet, 2) as crew:
+        first = [found for found, _ in crew.answers("row", [(row,) for row in sheet.rows])]
+        for process in list(crew._pool._processes.values()):
+            process.kill()
+        second = list(crew.answers("proof", [((2, 2), 1)]))
+    assert sorted(first) == sorted(alone.row(row)[0] for row in sheet.rows)
+    assert second == [alone.proof((2, 2), 1)]
+    assert second[0][2] is not None
 
 
 def test_axes_are_exact_and_divided_in_equal_ratios_where_positive():

@@ -70,7 +70,7 @@ def test_the_rate_estimated_by_sampling_is_above_what_is_proved(cta):
 
 
 def test_linear_forms_are_near_the_root_of_v(cta):
-    pace = pace_of(cta.loop, cta.lyapunov, 1.0)
+    pace = pace_of(cta.loop, cta.lyapunov, 1.0, 5)
     rng = np.random.default_rng(2)
     u = rng.dirichlet((1, 1, 1), 500) * (1, 1.4, 7)
     for cell in Obligations(cta.loop, cta.lyapunov).sign_cells():
