@@ -30,7 +30,7 @@ def design(
     fault
         Preset or path of a .toml file.
     controller
-        cta, elqr or all.
+        cta, dia, elqr or all.
     box
         Uncertainty box: paper or ten-percent.
     held
@@ -73,10 +73,11 @@ def controllers(name: str) -> list[str]:
     ------
     UnknownNameError
     """
-    designable = ["cta", "elqr"]
-    if name not in (*designable, "all"):
-        raise UnknownNameError(f"controller must be one of {', '.join(designable)}, all. Received {name!r}.")
-    return designable if name == "all" else [name]
+    from quakedesign.synthesis import DESIGNABLE
+
+    if name not in (*DESIGNABLE, "all"):
+        raise UnknownNameError(f"controller must be one of {', '.join(DESIGNABLE)}, all. Received {name!r}.")
+    return list(DESIGNABLE) if name == "all" else [name]
 
 
 def compared(found: Any, names: list[str], tell: Any, *, held: bool = False) -> Any:

@@ -2,12 +2,21 @@
 
 from pathlib import Path
 
-from quakedesign.cli.design import compared, controllers, positive
+from quakedesign.cli.design import controllers, positive
 from quakedesign.cli.shared import Force, Json, app, console, print_json, progress
 
 
 @app.command
-def compare(fault: str, /, *, controller: str = "all", box: str | None = None, json: Json = False) -> int:
+def compare(
+    fault: str,
+    /,
+    *,
+    controller: str = "all",
+    box: str | None = None,
+    scheme: str = "continuous",
+    published_scheme: str = "continuous",
+    json: Json = False,
+) -> int:
     """Design, prove, simulate and compare with the published gains as `design` does, and write nothing.
 
     Exit code as `design`: 0 if every designed controller is proved and its premise along the reference holds.
@@ -17,19 +26,25 @@ def compare(fault: str, /, *, controller: str = "all", box: str | None = None, j
     fault
         Preset or path of a .toml file.
     controller
-        Law to design: cta, elqr or all.
+        Law to design: cta, dia, elqr or all.
     box
         Uncertainty box: paper or ten-percent.
+    scheme
+        Of the runs of designed gains: continuous, as in the paper, or sampled and held: explicit, implicit,
+        semi-implicit, compensated.
+    published_scheme
+        Of the runs of published gains.
     json
         Print JSON with the keys of design's results.json.
     """
     from quakedesign.fault import load_fault
+    from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import results
     from quakedesign.report.numbers import printed, printed_lines, table
 
     names, found = controllers(controller), load_fault(fault, box=box)
     with progress() as tell:
-        comparison = compared(found, names, tell)
+        comparison = designed_comparison(found, names, tell, scheme=scheme, published_scheme=published_scheme)
     if json:
         beside = {"numbers": table(comparison), "printed": printed(comparison)}
         print_json({**results(comparison, stored=False), **beside})
@@ -49,6 +64,8 @@ def figures(
     *,
     controller: str = "all",
     box: str | None = None,
+    scheme: str = "continuous",
+    published_scheme: str = "continuous",
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
@@ -62,9 +79,14 @@ def figures(
     fault
         Preset or path of a .toml file.
     controller
-        Law to design: cta, elqr or all.
+        Law to design: cta, dia, elqr or all.
     box
         Uncertainty box: paper or ten-percent.
+    scheme
+        Of the runs of designed gains: continuous, as in the paper, or sampled and held: explicit, implicit,
+        semi-implicit, compensated.
+    published_scheme
+        Of the runs of published gains.
     out
         Folder to write; ./quakedesign-FAULT unless given.
     force
@@ -78,11 +100,12 @@ def figures(
     names, found = controllers(controller), load_fault(fault, box=box)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
+    from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.numbers import printed_lines
     from quakedesign.report.paper_study import paper_study
 
     with progress() as tell:
-        comparison = compared(found, names, tell)
+        comparison = designed_comparison(found, names, tell, scheme=scheme, published_scheme=published_scheme)
         study = paper_study(comparison, progress=tell)
         results = write_folder(comparison, folder, force=force, study=study, tell=tell)
     if json:

@@ -1,6 +1,7 @@
 """Laws, one a file, found by looking into this folder; and the gains that the paper prints."""
 
 import tomllib
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from importlib import import_module
@@ -13,6 +14,7 @@ from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.errors import UnknownNameError
 
 __all__ = [
+    "BaseGains",
     "Controller",
     "Law",
     "LoopField",
@@ -31,6 +33,26 @@ __all__ = [
 Subject = str | type[Law] | LoopField
 """What a claim can be about: the name of a law of the package, a law of the user's own, or a bare closed loop."""
 BARE = "custom"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseGains:
+    """Gains of a law with λ = 1, the bound on |h'| that they are meant for, and where they come from.
+
+    Attributes
+    ----------
+    law : Controller
+    lipschitz : Fraction
+        [m/s³]
+    source : str
+    literature : bool
+        False for gains that were found with this package.
+    """
+
+    law: Controller
+    lipschitz: Fraction
+    source: str
+    literature: bool
 
 
 @cache
@@ -115,16 +137,26 @@ def published(fault_name: str) -> dict[str, Controller]:
     return found
 
 
-def family(name: str) -> tuple[Fraction, tuple[Controller, ...]]:
-    """Lipschitz bound and base gains of the sets that synthesis tries for a law, in order.
+def family(name: str) -> tuple[BaseGains, ...]:
+    """Base gains of a law that are known to be good, in the order in which a design tries them.
 
     Raises
     ------
     UnknownNameError
         When there are none for the law.
     """
-    data = tomllib.loads((files(__name__) / "families.toml").read_text(encoding="utf-8"))
-    if name not in data:
-        raise UnknownNameError(f"base gains exist for {', '.join(data)}. Received {name!r}.")
+    data = tomllib.loads((files(__name__) / "families.toml").read_text(encoding="utf-8")).values()
+    if name not in (known := {group["law"] for group in data}):
+        raise UnknownNameError(f"base gains exist for {', '.join(sorted(known))}. Received {name!r}.")
     chosen = control_law(name)
-    return Fraction(data[name]["lipschitz"]), tuple(chosen.from_values(tuple(g)) for g in data[name]["gains"])
+    return tuple(
+        BaseGains(
+            law=chosen.from_values(tuple(gains)),
+            lipschitz=Fraction(group["lipschitz"]),
+            source=group["source"],
+            literature=group["literature"],
+        )
+        for group in data
+        if group["law"] == name
+        for gains in group["gains"]
+    )

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from quakedesign.controllers import LoopField, law
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.drawing import SMALL, WIDTH
 from quakedesign.synthesis.mapping import Place
@@ -53,8 +54,9 @@ def gain_map_figure(drawn: GainMap) -> Any:
     ]
     handles += _markers(axis, drawn, first, second)
     _ticks(axis, first, second)
-    axis.set_xlabel(drawn.sheet.over[0])
-    axis.set_ylabel(drawn.sheet.over[1])
+    for label, name in zip((axis.set_xlabel, axis.set_ylabel), drawn.sheet.over, strict=True):
+        unit = gain_map_units(drawn).get(name)
+        label(f"{name} [{unit}]" if unit else name)
     axis.tick_params(which="both", labelsize=SMALL)
     axis.set_title(_title(drawn), fontsize=SMALL + 1)
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)
@@ -162,6 +164,15 @@ def _file(place: Place) -> str:
     return f"certificates/{place[0]}-{place[1]}.json"
 
 
+def gain_map_units(drawn: GainMap) -> dict[str, str]:
+    """Units of the gains; none for a bare loop, which says nothing about them."""
+    subject = drawn.sheet.subject
+    if isinstance(subject, LoopField):
+        return {}
+    model = law(subject) if isinstance(subject, str) else subject
+    return dict(model.gain_units)
+
+
 def gain_map_facts(drawn: GainMap) -> dict[str, Any]:
     """What a map says in numbers: exact quantities as texts."""
     sheet, top = drawn.sheet, len(drawn.sheet.levels)
@@ -172,6 +183,7 @@ def gain_map_facts(drawn: GainMap) -> dict[str, Any]:
         "gains": {n: str(v) for n, v in sheet.loop.gains.items() if n not in sheet.over},
         "gain_range": [str(v) for v in sheet.loop.uncertain.get("beta", ())],
         "degree": sheet.degree,
+        "units": gain_map_units(drawn),
         "points": len(drawn.screened),
         "screened": drawn.counts(1)["screened"],
         "proved": drawn.counts(1)["proved"],

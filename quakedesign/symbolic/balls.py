@@ -3,8 +3,9 @@
 import heapq
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from itertools import count
+from operator import methodcaller, mul
 from typing import Any
 
 import sympy as sp
@@ -14,6 +15,7 @@ from quakedesign.rationals import rational
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 Box = Mapping[sp.Symbol, tuple[Fraction, Fraction]]
+Operation = Callable[[list[Any]], Any]
 
 
 def ball(low: Fraction, high: Fraction) -> Any:
@@ -51,7 +53,7 @@ def _compiled(expression: sp.Expr) -> Callable[[Mapping[sp.Symbol, Any]], Any]:
     """Flatten an expression into a list of ball operations, each subexpression once."""
     places: dict[sp.Expr, int] = {}
     symbols: list[tuple[int, sp.Symbol]] = []
-    steps: list[tuple[Callable[[list[Any]], Any], list[int]]] = []
+    steps: list[tuple[Operation, list[int]]] = []
     constants: dict[int, Any] = {}
 
     def place(e: sp.Expr) -> int:
@@ -66,17 +68,16 @@ def _compiled(expression: sp.Expr) -> Callable[[Mapping[sp.Symbol, Any]], Any]:
         return places[e]
 
     last = place(expression)
-    fixed = {**constants, **dict.fromkeys(i for i, _ in symbols)}
+    start = [constants.get(i) for i in range(len(steps))]
+    known = {*constants, *(i for i, _ in symbols)}
+    work = [(i, operation, arguments) for i, (operation, arguments) in enumerate(steps) if i not in known]
 
     def evaluate(values: Mapping[sp.Symbol, Any]) -> Any:
-        results: list[Any] = [None] * len(steps)
+        results = start.copy()
         for i, symbol in symbols:
             results[i] = values[symbol]
-        for i, number in constants.items():
-            results[i] = number
-        for i, (operation, arguments) in enumerate(steps):
-            if i not in fixed:
-                results[i] = operation([results[j] for j in arguments])
+        for i, operation, arguments in work:
+            results[i] = operation([results[j] for j in arguments])
         return results[last]
 
     return evaluate
@@ -101,78 +102,94 @@ def _number(e: sp.Expr) -> Any:
     return _operation(e)([_number(a) for a in _arguments(e)])
 
 
-def _operation(e: sp.Expr) -> Callable[[list[Any]], Any]:
-    from flint import arb
-
+def _operation(e: sp.Expr) -> Operation:
+    """What a node does with the balls of its arguments; everything about its exponent is settled here."""
     if e.is_Add:
-        return lambda values: sum(values, start=arb(0))
-    if e.is_Mul:
-        return lambda values: reduce(lambda a, b: a * b, values)
+        return sum
+    if e.is_Mul or isinstance(e, sp.Max | sp.Min):
+        return partial(reduce, {sp.Max: _larger, sp.Min: _smaller}.get(type(e), mul))
     if e.is_Pow:
-        return lambda values: _power(values[0], e.exp)
-    return lambda values: _function(e, values)
+        return _power(e.exp)
+    if isinstance(e, AbsolutePower | SignedPower):
+        return _monotone(e.args[1], signed=isinstance(e, SignedPower))
+    methods = {sp.exp: "exp", sp.sin: "sin", sp.cos: "cos", sp.log: "log", sp.asinh: "asinh", sp.Abs: "__abs__"}
+    for function, method in methods.items():
+        if isinstance(e, function):
+            return partial(_of_one, methodcaller(method))
+    return _without(type(e).__name__)
 
 
-def _power(base: Any, exponent: sp.Expr) -> Any:
+def _of_one(function: Callable[[Any], Any], values: list[Any]) -> Any:
+    return function(values[0])
+
+
+def _without(what: str) -> Operation:
+    def refuse(values: list[Any]) -> Any:
+        raise NotImplementedError(f"no enclosure for {what}")
+
+    return refuse
+
+
+def _larger(a: Any, b: Any) -> Any:
+    return a.max(b)
+
+
+def _smaller(a: Any, b: Any) -> Any:
+    return a.min(b)
+
+
+def _power(exponent: sp.Expr) -> Operation:
     from flint import arb, fmpq
 
     if exponent.is_Integer:
-        positive = _integer_power(base, abs(int(exponent)))
-        return positive if exponent > 0 else 1 / positive
+        n = abs(int(exponent))
+        if exponent > 0:
+            return lambda values: _integer_power(values[0], n)
+        return lambda values: 1 / _integer_power(values[0], n)
     if exponent.is_Rational:
-        return base ** arb(fmpq(int(exponent.p), int(exponent.q)))
-    raise NotImplementedError(f"no enclosure for the exponent {exponent}")
+        power = arb(fmpq(int(exponent.p), int(exponent.q)))
+        return lambda values: values[0] ** power
+    return _without(f"the exponent {exponent}")
 
 
 def _integer_power(base: Any, n: int) -> Any:
     """Tight enclosure of base^n, n ≥ 1, from its ends; arb's own power is not finite about a zero midpoint."""
+    if n == 1:
+        return base
 
     def at(end: Any) -> Any:
-        return reduce(lambda a, b: a * b, [end] * n)
+        return reduce(mul, [end] * n)
 
     if n % 2:
         return at(base.lower()).union(at(base.upper()))
     return at(base.abs_lower()).union(at(base.abs_upper()))
 
 
-def _function(e: sp.Expr, values: list[Any]) -> Any:
-    simple = {sp.exp: "exp", sp.sin: "sin", sp.cos: "cos", sp.log: "log", sp.asinh: "asinh"}
-    for function, method in simple.items():
-        if isinstance(e, function):
-            return getattr(values[0], method)()
-    if isinstance(e, sp.Abs):
-        return abs(values[0])
-    if isinstance(e, sp.Max):
-        return reduce(lambda a, b: a.max(b), values)
-    if isinstance(e, sp.Min):
-        return reduce(lambda a, b: a.min(b), values)
-    if isinstance(e, AbsolutePower | SignedPower):
-        return _monotone(values[0], e.args[1], signed=isinstance(e, SignedPower))
-    raise NotImplementedError(f"no enclosure for {type(e).__name__}")
-
-
-def _monotone(x: Any, exponent: sp.Expr, *, signed: bool) -> Any:
+def _monotone(exponent: sp.Expr, *, signed: bool) -> Operation:
     from flint import arb, fmpq
 
     if not exponent.is_Rational:
-        raise NotImplementedError(f"no enclosure for the exponent {exponent}")
+        return _without(f"the exponent {exponent}")
     power = arb(fmpq(int(exponent.p), int(exponent.q)))
-    low, high = x.lower(), x.upper()
-    straddles = not (low > 0 or high < 0)
-    if not x.is_finite() or (straddles and exponent < 0):
-        return arb("nan")
+    negative, constant = bool(exponent < 0), bool(exponent == 0)
 
     def at(end: Any) -> Any:
         size = abs(end)
         value = arb(0) if size.is_zero() else size**power
         return -value if signed and end < 0 else value
 
-    if signed:
-        if exponent == 0:
+    def operation(values: list[Any]) -> Any:
+        x = values[0]
+        low, high = x.lower(), x.upper()
+        straddles = not (low > 0 or high < 0)
+        if not x.is_finite() or (straddles and negative):
+            return arb("nan")
+        if signed and constant:
             return arb(1) if low > 0 else (arb(-1) if high < 0 else arb(-1).union(arb(1)))
-        return at(low).union(at(high))
-    hull = at(low).union(at(high))
-    return hull.union(arb(0)) if straddles else hull
+        hull = at(low).union(at(high))
+        return hull.union(arb(0)) if straddles and not signed else hull
+
+    return operation
 
 
 def upper_bound(

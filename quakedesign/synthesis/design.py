@@ -27,7 +27,7 @@ from quakedesign.synthesis.linear.riccati import riccati_design
 from quakedesign.synthesis.lyapunov import find_certificate
 from quakedesign.synthesis.quadratic import quadratic_margin
 
-DESIGNABLE = ("cta", "elqr")
+DESIGNABLE = ("cta", "dia", "elqr")
 _HEADROOM = Fraction(11, 10)
 _SHARES = (Fraction(99, 100), Fraction(9, 10), Fraction(1, 2))
 
@@ -35,15 +35,15 @@ _SHARES = (Fraction(99, 100), Fraction(9, 10), Fraction(1, 2))
 def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none", held: bool = False) -> Design:
     """Find gains with a proof for a fault.
 
-    2-CTA: base gains from the literature are proved for the fault's range of β and scaled by λ = ρ⁶ (ρ rational, so
-    that every scaled gain is rational) until L̄ exceeds by a tenth what the reference and the disturbance need.
+    2-CTA, 2-DIA: base gains (families.toml) are proved for the fault's range of β and scaled by λ = ρ⁶ (ρ rational,
+    so that every scaled gain is rational) until L̄ exceeds by a tenth what the reference and the disturbance need.
     e-LQR: Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
 
     Parameters
     ----------
     fault : Fault
     controller : str
-        ``"cta"`` or ``"elqr"``.
+        ``"cta"``, ``"dia"`` or ``"elqr"``.
     feedforward : str
         What a sliding mode adds to ν from what is known of the plant: ``"none"``, ``"nominal"`` or ``"centred"``, see
         `quakedesign.controllers.feed_forward`. It enlarges the certified domain; the e-LQR takes none.
@@ -79,9 +79,9 @@ def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none", 
 
 def _design_sliding_mode(fault: Fault, name: str, added: FeedForward) -> Design:
     divisor = least_authority(fault)
-    lipschitz, bases = family(name)
-    for base in bases:
-        loop = sliding_mode_loop(base, lipschitz, coefficient_range(fault, divisor))
+    for base in family(name):
+        assert isinstance(base.law, SlidingMode)
+        loop = sliding_mode_loop(base.law, base.lipschitz, coefficient_range(fault, divisor))
         certificate = find_certificate(loop, control_law(name).loop_field().degree)
         if certificate is not None:
             break
@@ -95,12 +95,11 @@ def _design_sliding_mode(fault: Fault, name: str, added: FeedForward) -> Design:
             premises=(),
             details={"reason": "no base gains of the family were proved for the fault's range of β"},
         )
-    needed = required_lipschitz(fault, base, divisor, added)
-    rho = smallest_root(needed * _HEADROOM / lipschitz)
-    controller = type(base)(  # type: ignore[call-arg]
-        gains=dict(base.gains), scale=rho**6, divisor=divisor, feedforward=added
-    )
-    return _judged(fault, controller, certificate, {"rho": str(rho), "base_lipschitz": str(lipschitz)})
+    needed = required_lipschitz(fault, base.law, divisor, added)
+    rho = smallest_root(needed * _HEADROOM / base.lipschitz)
+    controller = replace(base.law, scale=rho**6, divisor=divisor, feedforward=added)
+    details = {"rho": str(rho), "base_lipschitz": str(base.lipschitz), "base_source": base.source}
+    return _judged(fault, controller, certificate, details)
 
 
 def required_lipschitz(fault: Fault, law: Controller, divisor: Fraction, added: FeedForward = NONE) -> Fraction:

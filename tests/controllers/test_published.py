@@ -62,15 +62,20 @@ def test_the_printed_gains_of_both_scales_belong_together():
             assert float(small) * factor == pytest.approx(float(large), rel=5e-3)
 
 
+@pytest.mark.parametrize("name", ["cta", "dia"])
+def test_base_gains_are_below_the_necessary_limit_and_have_a_source(name):
+    assert all(one.law.scale == 1 and one.law.lipschitz_limit > one.lipschitz and one.source for one in family(name))
+    assert any(one.literature for one in family(name))
+
+
 @pytest.mark.parametrize("name", ["own-fault", "divisor", "source", ""])
 def test_other_faults_have_none(name):
     assert published(name) == {}
 
 
 def test_base_gains_of_the_continuous_twisting():
-    lipschitz, found = family("cta")
-    assert lipschitz == 1
-    assert tuple(found[0].gains.values()) == (7, 5, F(23, 10), F(11, 10))
-    assert all(c.scale == 1 and c.lipschitz_limit > lipschitz for c in found)
+    found = family("cta")
+    assert tuple(found[0].law.gains.values()) == (7, 5, F(23, 10), F(11, 10))
+    assert all(one.lipschitz == 1 and one.literature for one in found)
     with pytest.raises(UnknownNameError, match=r"base gains exist for .*cta.*Received 'elqr'"):
         family("elqr")

@@ -64,6 +64,7 @@ def test_the_legend_names_levels_and_markers(drawn):
     assert said[:2] == ["screened: L̄ = 0.5", "screened: L̄ = 1"]
     assert set(said[2:]) == {"proved, at the edge of a level", "proved, inside (drawn at random)"}
     assert "V of degree 6" in figure.axes[0].get_title()
+    assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == ("k1 [m^(1/2)/s^(3/2)]", "k2 [m/s^3]")
 
 
 def test_rows_have_columns_of_their_own_for_screened_and_proved(made_up):
@@ -81,7 +82,7 @@ def test_facts_count_what_is_there(made_up, drawn):
     facts = report.gain_map_facts(made_up)
     assert (facts["points"], facts["screened"], facts["proved"], facts["tried"]) == (4, 3, 1, 2)
     assert facts["levels"] == [{"lipschitz": "1/2", "screened": 3, "proved": 1, "edge": 2, "edge_proved": 0}]
-    assert facts["gains"] == {}
+    assert (facts["gains"], facts["units"]["k2"]) == ({}, "m/s^3")
     json.dumps(report.gain_map_facts(drawn), allow_nan=False)
     assert "3 points screened (floating point), 1 proved exactly" in report.gain_map_lines(made_up)[1]
 
