@@ -37,7 +37,7 @@ def test_the_folder_is_complete(main_job):
 
 def test_the_keys_promised_are_there(main_job):
     _, _, results = main_job
-    assert set(results["controllers"]) == {"cta", "elqr"}
+    assert set(results["controllers"]) == {"cta", "dia", "elqr"}
     assert set(results["published"]) == {"cta", "dia", "elqr"}
     for entry in results["controllers"].values():
         assert {"gains", "verdict", "certificate", "premises", "metrics"} <= set(entry)
@@ -56,7 +56,7 @@ def test_both_checkers_accept_the_certificates(main_job):
         done = subprocess.run([*command, *files], capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, done.stdout + done.stderr
         assert done.stdout.count(": proved") == len(files)
-    mine = ("cta.json", "elqr.json", "elqr-peaks-amplitude.json", "elqr-peaks-rate.json")
+    mine = ("cta.json", "dia.json", "elqr.json", "elqr-peaks-amplitude.json", "elqr-peaks-rate.json")
     own = [str(folder / "certificates" / n) for n in mine]
     assert set(own) < set(files)
     command = [sys.executable, "-m", "quakedesign", "check", *own, "--fault", name]

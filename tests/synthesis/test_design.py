@@ -47,9 +47,14 @@ VARIANTS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_the_cta_is_proved_with_its_premise_along_the_reference(variants, variant):
-    design = qd.design(variants[variant], "cta")
+SLIDING = [("cta", v) for v in VARIANTS] + [
+    pytest.param("dia", v, marks=() if v in ("real", "strong weakening") else pytest.mark.slow) for v in VARIANTS
+]
+
+
+@pytest.mark.parametrize(("law", "variant"), SLIDING)
+def test_a_sliding_mode_is_proved_with_its_premise_along_the_reference(variants, law, variant):
+    design = qd.design(variants[variant], law)
     assert design.verdict is Verdict.PROVED
     assert design.certificate.check() is Verdict.PROVED
     premises = {p.name: p for p in design.premises}
@@ -117,7 +122,7 @@ def test_the_same_input_gives_the_same_digits(real):
 
 
 def test_an_unknown_controller_is_one_clear_message(real):
-    with pytest.raises(UnknownNameError, match=r"must be one of cta, elqr\. Received 'pid'"):
+    with pytest.raises(UnknownNameError, match=r"must be one of cta, dia, elqr\. Received 'pid'"):
         qd.design(real, "pid")
 
 
