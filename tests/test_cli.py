@@ -71,6 +71,10 @@ def test_the_designs_beat_the_published_gains_as_promised(main_job):
     for metric in ("max_slip_error", "max_slip_rate_error"):
         assert cta[metric] <= old["cta"]["metrics"][metric] / 20
     assert cta["rms_pressure"] <= 1.02 * old["cta"]["metrics"]["rms_pressure"]
+    # a tenth of the slip error and a twentieth of the slip-rate error at no more RMS pressure
+    assert new["dia"]["metrics"]["max_slip_error"] <= old["dia"]["metrics"]["max_slip_error"] / 10
+    assert new["dia"]["metrics"]["max_slip_rate_error"] <= old["dia"]["metrics"]["max_slip_rate_error"] / 20
+    assert new["dia"]["metrics"]["rms_pressure"] <= old["dia"]["metrics"]["rms_pressure"]
     # no worse in slip rate, 50 times better in slip, at the same RMS pressure (within 2 %), stable at the step
     assert elqr["max_slip_rate_error"] <= old["elqr"]["metrics"]["max_slip_rate_error"]
     assert elqr["max_slip_error"] <= old["elqr"]["metrics"]["max_slip_error"] / 50
