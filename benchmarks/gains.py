@@ -1,24 +1,30 @@
 """Questions about given gains and maps of gains against the naive loop, which builds everything anew for every point.
 
-Run with ``python benchmarks/gains.py``; about two minutes. All times are CPU seconds of one process with one thread, so
-that other work on the machine does not count. Both ways use the same law, the same degree of V and the same solver.
+Then the time of checking every shipped certificate, with the package and with the standalone `proofs/check.py`.
+Run with ``python benchmarks/gains.py``; about half a minute. All times are CPU seconds of one process with one thread,
+so that other work on the machine does not count. Both ways use the same law, the same degree of V and the same solver.
 """
 
 import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import importlib.util
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 from statistics import median
 from time import process_time
+from types import ModuleType
 from typing import Any
 
 import clarabel
 from scipy import sparse
 
 from quakedesign.certificates import Loop
+from quakedesign.certificates.command import check_files
 from quakedesign.sos.solve.joint import JointProgram, Proposal
 from quakedesign.sos.solve.moment import settings
 from quakedesign.synthesis.decision import closed_loop
@@ -31,6 +37,7 @@ from quakedesign.synthesis.sweep import ACCURACY, Sweep
 
 DEGREE = 5
 SETS = (("5", "5", "2.3", "1.1"), ("5", "15", "2.3", "1.1"), ("7", "5", "2.3", "1.1"), ("25", "15", "2.3", "1.1"))
+PROOFS = Path(__file__).parents[1] / "proofs"
 MAPPED, OVER, LEVEL = ("7", "5", "2.3", "1.1"), ("k1", "k2"), Fraction(1)
 
 
@@ -128,6 +135,31 @@ def screened(sheet: Sheet) -> tuple[Screener, dict]:
     return screener, {place: reached for row in sheet.rows for place, _, reached in screener.row(row)[0]}
 
 
+def catalogue() -> None:
+    """Time of reading and checking every shipped certificate; a first one leaves imports out."""
+    standalone = standalone_checker()
+    files = sorted((PROOFS / "certificates").glob("*.json"))
+    check_files(files[:1])
+    print("checking the catalogue (aims: package 0.2 s, 1 s for 2-DIA; proofs/check.py 2 s, 10 s for 2-DIA)")
+    for path in files:
+        own, verdicts = cpu(lambda p=path: check_files([p]))
+        other, result = cpu(lambda p=path: standalone.check(p.read_text(encoding="utf-8")))
+        assert verdicts[str(path)][0] == result.verdict
+        print(f"  {path.name:34} {result.verdict:7} package {own:.2f} s, proofs/check.py {other:.2f} s")
+
+
+def standalone_checker() -> ModuleType:
+    """The checker that is a file of its own, as a module."""
+    specification = importlib.util.spec_from_file_location("standalone_check", PROOFS / "check.py")
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    sys.modules["standalone_check"] = module
+    specification.loader.exec_module(module)
+    return module
+
+
 if __name__ == "__main__":
     question()
     mapping()
+    catalogue()

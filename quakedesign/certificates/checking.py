@@ -6,7 +6,7 @@ from itertools import product
 
 from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, loop_of, require
 from quakedesign.certificates.error_coordinates import in_error_coordinates, without_inputs
-from quakedesign.certificates.obligations import Obligation, claimed
+from quakedesign.certificates.obligations import Obligation, claimed, different
 from quakedesign.certificates.response import Response
 from quakedesign.certificates.response_obligations import demanded, require_sound
 from quakedesign.certificates.witnesses import proves
@@ -91,12 +91,8 @@ def _check_response(certificate: Certificate, response: Response) -> None:
 
 def _check_witnesses(certificate: Certificate, obligations: Iterable[Obligation]) -> None:
     """Refuse unless every different obligation has its witness, in order, and it is exact."""
-    known = set[tuple]()
     expected = list[str]()
-    for one in obligations:
-        if one.key in known:
-            continue
-        known.add(one.key)
+    for one in different(obligations):
         expected.append(one.name)
         require(one.name in certificate.witnesses, f"the witness of {one.name!r} is missing.")
         holds = proves(one, certificate.witnesses[one.name], certificate.loop.domain)
@@ -109,7 +105,8 @@ def _check_roots(loop: Loop) -> None:
     for name, (of, (low, high)) in loop.roots.items():
         number = loop.parameters[of]
         require(
-            0 <= low <= high and low**2 <= number <= high**2, f"the range of {name} does not hold the root of {of}."
+            number > 0 and 0 <= low <= high and low**2 <= number <= high**2,
+            f"the range of {name} does not hold the root of {of}.",
         )
     require(loop.domain == "cells" or not loop.lifts, "lifts belong on cells.")
 

@@ -194,7 +194,7 @@ def loop_of(
     """
     states = tuple(model.states)
     names = [s.name for s in (*model.gains, *model.constants, *model.uncertain, *model.roots, *states)]
-    lifts, rates = without_nesting(list(model.field.values()), states, names)
+    lifts, rates = without_nesting([model.field[s] for s in states], states, names)
     powers = (*states, *lifts)
     values = {**gains, **(constants or {})}
     return Loop(
@@ -244,13 +244,17 @@ def full_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:
     return found
 
 
-def error_units(loop: Loop) -> dict[str, Range]:
-    """Interval of the error that one unit of each state stands for; one where the law says nothing else."""
+def error_units(loop: Loop, model: LoopField | None = None) -> dict[str, Range]:
+    """Interval of the error that one unit of each state stands for; one where the law says nothing else.
+
+    The units are those of a model, or of the law of the package that the loop names.
+    """
     from quakedesign.controllers import laws
     from quakedesign.symbolic.balls import enclose
 
-    known = laws().get(loop.law)
-    units = known.loop_field().units if known is not None else {}
+    if model is None and loop.law in laws():
+        model = laws()[loop.law].loop_field()
+    units = model.units if model is not None else {}
     values = {**{n: (v, v) for n, v in loop.parameters.items()}, **{n: ends for n, (_, ends) in loop.roots.items()}}
     found: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))
     for state, unit in units.items():

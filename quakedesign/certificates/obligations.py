@@ -1,15 +1,14 @@
 """From a loop and a Lyapunov function to the polynomials that must be non-negative (FORMAT.md, 2 to 5)."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import product
 
-from quakedesign.certificates.claim import Loop, require, sympy_field
-from quakedesign.errors import CertificateError, KinkError
+from quakedesign.certificates.claim import Loop, require
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination
-from quakedesign.symbolic.terms import Term, cell_polynomial, from_terms, lie_derivative, real_polynomial, to_terms
+from quakedesign.symbolic.terms import Term, cell_polynomial, collected, lie_terms, real_polynomial
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,9 @@ class Obligation:
     def key(self) -> tuple:
         """What two obligations share when one witness serves both."""
         parts = ((self.polynomial,), self.equalities, self.inequalities)
-        return tuple(tuple(tuple(sorted(p.items())) for p in part) for part in parts)
+        return tuple(
+            tuple(tuple(sorted((e, c.as_integer_ratio()) for e, c in p.items())) for p in part) for part in parts
+        )
 
 
 @dataclass(frozen=True)
@@ -71,14 +72,10 @@ class Obligations:
     @cached_property
     def derivative(self) -> tuple[Term, ...]:
         """Terms of V̇; refused unless V is C¹ and V̇ affine in everything that has a range."""
-        symbols = self.loop.symbols
         kinks = [t for t in self.lyapunov for _, a, kind in t.factors if a < 1 or (kind == "a" and a == 1)]
         require(not kinks, "V is not continuously differentiable term by term.")
-        try:
-            rate = lie_derivative(from_terms(self.lyapunov, symbols), sympy_field(self.loop))
-        except KinkError as error:
-            raise CertificateError(f"V is not continuously differentiable: {error}") from None
-        terms = to_terms(rate, [symbols[s] for s in (*self.loop.states, *self.loop.lifts)])
+        rates = (rate for t in self.lyapunov for rate in lie_terms(t, self.loop.field))
+        terms = collected(rates, (*self.loop.states, *self.loop.lifts))
         ranges = self.loop.ranges
         twice = {p for t in terms for p in t.parameters if p in ranges and t.parameters.count(p) > 1}
         require(not twice, f"V̇ is not affine in {', '.join(sorted(twice))}; the ends of its range do not decide.")
@@ -242,6 +239,16 @@ def _word(signs: Mapping[str, int]) -> str:
     return "".join("+" if s > 0 else "-" for s in signs.values())
 
 
+def different(obligations: Iterable[Obligation]) -> Iterator[Obligation]:
+    """Obligations of which no witness serves two: the first of each kind."""
+    known = set[tuple]()
+    for one in obligations:
+        key = one.key
+        if key not in known:
+            known.add(key)
+            yield one
+
+
 def degree(polynomials: Sequence[Polynomial], what: str) -> int:
     """Degree of forms that must all share it.
 
@@ -307,4 +314,7 @@ def with_decay(obligations: Obligations, cell: Cell, one: Obligation, rate: Frac
 
 def less(polynomial: Polynomial, factor: Fraction, other: Polynomial) -> dict[Exponents, Fraction]:
     """Polynomial − factor · other, without zero coefficients."""
-    return combination([(Fraction(1), polynomial), (-factor, other)])
+    found = dict(polynomial)
+    for e, c in other.items():
+        found[e] = found.get(e, Fraction(0)) - factor * c
+    return {e: c for e, c in found.items() if c}

@@ -54,13 +54,18 @@ def gain_map_figure(drawn: GainMap) -> Any:
     ]
     handles += _markers(axis, drawn, first, second)
     _ticks(axis, first, second)
-    for label, name in zip((axis.set_xlabel, axis.set_ylabel), drawn.sheet.over, strict=True):
-        unit = gain_map_units(drawn).get(name)
-        label(f"{name} [{unit}]" if unit else name)
+    axis.set_xlabel(_label(drawn, 0))
+    axis.set_ylabel(_label(drawn, 1))
     axis.tick_params(which="both", labelsize=SMALL)
     axis.set_title(_title(drawn), fontsize=SMALL + 1)
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)
     return figure
+
+
+def _label(drawn: GainMap, which: int) -> str:
+    name = drawn.sheet.over[which]
+    unit = gain_map_units(drawn).get(name)
+    return f"{name} [{unit}]" if unit else name
 
 
 def _shades(count: int) -> list[Any]:

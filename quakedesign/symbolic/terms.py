@@ -1,6 +1,6 @@
 """Sums of products of signed powers as plain data, and their polynomials on sign cells."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import count
@@ -40,17 +40,18 @@ def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ..
     CertificateError
         When a part is not a product of rational number, parameters and signed powers of single states.
     """
+    parts = sp.Add.make_args(sp.expand(expression))
+    return collected((_split(part, set(states)) for part in parts), [state.name for state in states])
+
+
+def collected(terms: Iterable[Term], states: Sequence[str]) -> tuple[Term, ...]:
+    """Sum with equal products collected, in a fixed order: parameters by name, factors in the order of their states."""
     order = {state: i for i, state in enumerate(states)}
-    collected: dict[tuple[tuple[str, ...], tuple[Factor, ...]], Fraction] = {}
-    for part in sp.Add.make_args(sp.expand(expression)):
-        coefficient, parameters, powers = _split(part, order)
-        factors = tuple(
-            (state.name, exponent, kind)
-            for state, (exponent, kind) in sorted(powers.items(), key=lambda i: order[i[0]])
-        )
-        key = (tuple(sorted(parameters)), factors)
-        collected[key] = collected.get(key, Fraction(0)) + coefficient
-    return tuple(sorted(Term(c, *key) for key, c in collected.items() if c))
+    found: dict[tuple[tuple[str, ...], tuple[Factor, ...]], Fraction] = {}
+    for term in terms:
+        key = (tuple(sorted(term.parameters)), tuple(sorted(term.factors, key=lambda factor: order[factor[0]])))
+        found[key] = found[key] + term.coefficient if key in found else term.coefficient
+    return tuple(sorted(Term(c, *key) for key, c in found.items() if c))
 
 
 def without_nesting(
@@ -90,39 +91,40 @@ def without_nesting(
     return {symbol: argument for argument, symbol in lifts.items()}, found
 
 
-def _split(part: sp.Expr, states: Mapping[sp.Symbol, int]):
+def _split(part: sp.Expr, states: Container[sp.Symbol]) -> Term:
     coefficient, parameters = Fraction(1), list[str]()
-    powers: dict[sp.Symbol, tuple[Fraction, str]] = {}
+    powers = list[Factor]()
     for base, power in (factor.as_base_exp() for factor in sp.Mul.make_args(part)):
         if base.is_Rational and power.is_Integer:
             coefficient *= Fraction(int(base.p), int(base.q)) ** int(power)
         elif base.is_Symbol and base not in states and power.is_Integer and power > 0:
             parameters += [base.name] * int(power)
         else:
-            state, exponent, kind = _power(base, power, states)
-            powers[state] = _combined(powers.get(state), (exponent, kind))
-    kept = {s: p for s, p in powers.items() if p != (0, "a")}
-    return coefficient, parameters, kept
+            powers.append(_power(base, power, states))
+    return Term(coefficient, tuple(parameters), multiplied(powers))
 
 
-def _power(base: sp.Expr, power: sp.Expr, states: Mapping[sp.Symbol, int]) -> tuple[sp.Symbol, Fraction, str]:
+def _power(base: sp.Expr, power: sp.Expr, states: Container[sp.Symbol]) -> Factor:
     if base in states and power.is_Integer and power > 0:
-        return base, Fraction(int(power)), "s" if power % 2 else "a"
+        return base.name, Fraction(int(power)), "s" if power % 2 else "a"
     if isinstance(base, SignedPower | AbsolutePower) and power.is_Integer and power > 0:
         state, exponent = base.args
         if state in states and exponent.is_Rational:
             odd = isinstance(base, SignedPower) and power % 2 == 1
-            return state, Fraction(int(exponent.p), int(exponent.q)) * int(power), "s" if odd else "a"
+            return state.name, Fraction(int(exponent.p), int(exponent.q)) * int(power), "s" if odd else "a"
     raise CertificateError(
         f"a certificate needs products of signed powers of single states. Received the factor {base**power}. "
         "Nested powers need a change of coordinates first."
     )
 
 
-def _combined(first: tuple[Fraction, str] | None, second: tuple[Fraction, str]) -> tuple[Fraction, str]:
-    if first is None:
-        return second
-    return first[0] + second[0], "a" if first[1] == second[1] else "s"
+def multiplied(factors: Iterable[Factor]) -> tuple[Factor, ...]:
+    """Product of signed powers with every state once; ⌈x⌋⁰ is its sign, |x|⁰ is left out."""
+    found: dict[str, tuple[Fraction, bool]] = {}
+    for state, exponent, kind in factors:
+        power, odd = found.get(state, (Fraction(0), False))
+        found[state] = power + exponent, odd != (kind == "s")
+    return tuple((state, a, "s" if odd else "a") for state, (a, odd) in found.items() if a or odd)
 
 
 def from_terms(terms: Iterable[Term], symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
@@ -148,6 +150,20 @@ def lie_derivative(function: sp.Expr, field: Mapping[sp.Symbol, sp.Expr]) -> sp.
         When the function is not continuously differentiable.
     """
     return sum((function.diff(state) * rate for state, rate in field.items()), start=sp.Integer(0))
+
+
+def lie_terms(function: Term, field: Mapping[str, tuple[Term, ...]]) -> Iterator[Term]:
+    """Terms of the derivative of a C¹ product along a field, by (⌈x⌋^a)′ = a|x|^{a−1} and (|x|^a)′ = a⌈x⌋^{a−1}.
+
+    That the product is C¹, a ≥ 1 for signed and a > 1 for absolute powers, is the caller's question.
+    """
+    for state, a, kind in function.factors:
+        others = [f for f in function.factors if f[0] != state]
+        slope = (state, a - 1, "s" if kind == "a" else "a")
+        for speed in field[state]:
+            factors = multiplied([*others, slope, *speed.factors])
+            coefficient = function.coefficient * a * speed.coefficient
+            yield Term(coefficient, (*function.parameters, *speed.parameters), factors)
 
 
 def value(term: Term, parameters: Mapping[str, Fraction]) -> Fraction:
@@ -181,15 +197,16 @@ def cell_polynomial(
     """
     total: dict[tuple[int, ...], Fraction] = {}
     for term in terms:
-        coefficient, exponents = value(term, parameters), dict.fromkeys(weights, 0)
+        coefficient, exponents, sign = value(term, parameters), dict.fromkeys(weights, 0), 1
         for state, exponent, kind in term.factors:
-            degree = exponent * weights[state]
-            if degree.denominator != 1 or degree < 0:
+            degree, rest = divmod(exponent.numerator * weights[state], exponent.denominator)
+            if rest or degree < 0:
                 raise CertificateError(f"⌈{state}⌋^{exponent} with weight {weights[state]} is no polynomial on a cell.")
-            exponents[state] = degree.numerator
-            coefficient *= signs[state] if kind == "s" else 1
+            exponents[state] = degree
+            sign *= signs[state] if kind == "s" else 1
         key = tuple(exponents.values())
-        total[key] = total.get(key, Fraction(0)) + coefficient
+        signed = coefficient if sign > 0 else -coefficient
+        total[key] = total[key] + signed if key in total else signed
     return {e: c for e, c in total.items() if c}
 
 

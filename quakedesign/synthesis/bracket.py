@@ -11,7 +11,7 @@ TOLERANCE = Fraction(1, 10_000)
 _BELOW, _ABOVE = TOLERANCE / 2, TOLERANCE / 5  # where the ends of the bracket are wanted
 _MOST = 40
 _STRIDE = 8
-_CREEPS = 6
+_BELIEVED = 6  # questions; after them tangents are no longer believed alone
 _NEAR = 3 * TOLERANCE
 
 
@@ -100,11 +100,12 @@ def _root(x: Fraction, answer: Screened | None, slope: float) -> Fraction | None
 def _next(bracket: Bracket, x: Fraction, root: Fraction | None, floor: Fraction, limit: Fraction | None) -> Fraction:
     """Number to ask about: near the tangent's root, on the side that is still open; else halfway."""
     low, high = bracket.low, bracket.high
-    if low is None and bracket.asked > 1:
+    astray = root is None or root <= floor or bracket.asked > _BELIEVED
+    if low is None and bracket.asked > 1 and astray:
         return floor
     ceiling = None if limit is None else first_below(limit)
     middle = _middle(x, low, high, floor, ceiling)
-    if root is None or (bracket.asked > _CREEPS and bracket.asked % 3 == 0):
+    if root is None or (bracket.asked > _BELIEVED and bracket.asked % 3 == 0):
         return middle
     near = abs(root - x) < _NEAR * x
     guess = root * (1 - _BELOW) if not near or x == high else root * (1 + _ABOVE)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certificate_text, parse_certificate
-from quakedesign.certificates.obligations import Obligation, Obligations, claimed, degree, with_decay
+from quakedesign.certificates.obligations import Obligation, Obligations, claimed, degree, different, with_decay
 from quakedesign.certificates.witnesses import statement_of, width
 from quakedesign.controllers import Subject
 from quakedesign.errors import CertificateError
@@ -30,12 +30,8 @@ def finish(
 ) -> Certificate | None:
     """Find exact witnesses for every obligation of a given V; None when one is missing."""
     witnesses: dict[str, Witness] = {}
-    known = set()
     try:
-        for one in claimed(loop, lyapunov, claims):
-            if one.key in known:
-                continue
-            known.add(one.key)
+        for one in different(claimed(loop, lyapunov, claims)):
             witness = witness_of(one, loop.domain)
             if witness is None:
                 return None
@@ -111,13 +107,9 @@ def with_largest_decay(
     decrease = list(obligations.decrease("decrease"))
     n = degree([one.polynomial for _, one in decrease], "V̇")
     largest = float("inf")
-    known = set()
-    for cell, one in decrease:
-        bare = with_decay(obligations, cell, one, Fraction(0), m, n)
-        if bare.key not in known:
-            known.add(bare.key)
-            power = {(*(0,) * (width(bare) - 1), n): Fraction(1)}
-            largest = min(largest, _largest(bare, power, loop.domain, scale, _DECAY_LEVEL))
+    for bare in different(with_decay(obligations, cell, one, Fraction(0), m, n) for cell, one in decrease):
+        power = {(*(0,) * (width(bare) - 1), n): Fraction(1)}
+        largest = min(largest, _largest(bare, power, loop.domain, scale, _DECAY_LEVEL))
     kappa = below(_DECAY_SHARE * largest)
     if kappa <= 0:
         return None

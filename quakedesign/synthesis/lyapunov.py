@@ -130,7 +130,7 @@ def family_of(loop: Loop, degree: int, scale: Sequence[Fraction]) -> Family | No
     function = _rows([[Obligation(name, p) for name, p in c.function()] for c in columns])
     decrease = _rows([[one for _, one in c.decrease("")] for c in columns])
     fallen = max((sum(e) for row in decrease for one in row for e in one.polynomial), default=0)
-    if not fallen or not function:
+    if not fallen or not function or not all(any(one.polynomial for one in row) for row in decrease):
         return None
     moved = [[_moved(one, scale, 1 / size) for one, size in zip(row, sizes, strict=True)] for row in decrease]
     pace = max(abs(c) for row in moved for one in row for c in one.polynomial.values())

@@ -8,7 +8,7 @@ from itertools import product
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Cell, Obligations, power_sum
 from quakedesign.sos import Polynomial
-from quakedesign.symbolic.terms import Factor, Term, cell_polynomial
+from quakedesign.symbolic.terms import Term, cell_polynomial, lie_terms
 
 Ends = Mapping[str, tuple[tuple[str, int], ...]]
 """For every uncertain parameter its ends, each a name times ±1."""
@@ -93,7 +93,7 @@ def _rates(loop: Loop, columns: Sequence[Obligations]) -> Iterator[Row]:
     first, ends = columns[0], ends_of(loop)
     weights = {**loop.states, **first.lift_degrees}
     kept = [i for i, name in enumerate(weights) if name in loop.states or name in first.with_variable]
-    terms = [(j, t) for j, column in enumerate(columns) for t in _derivative(column.lyapunov[0], loop.field)]
+    terms = [(j, t) for j, column in enumerate(columns) for t in lie_terms(column.lyapunov[0], loop.field)]
     for cell in first.cells:
         plain = [(j, term.parameters, *_single(term, weights, cell.signs)) for j, term in terms]
         for choice in product(*ends.values()):
@@ -106,25 +106,6 @@ def _rates(loop: Loop, columns: Sequence[Obligations]) -> Iterator[Row]:
                 key = (j, tuple(exponents[i] for i in kept), tuple(sorted(name for name, _ in chosen)))
                 total[key] = total.get(key, Fraction(0)) - coefficient
             yield from _row([(*key, c) for key, c in total.items() if c], first, cell)
-
-
-def _derivative(function: Term, field: Mapping[str, tuple[Term, ...]]) -> Iterator[Term]:
-    """Terms of the derivative of a C¹ monomial along a field, by (⌈x⌋^a)' = a|x|^{a−1} and (|x|^a)' = a⌈x⌋^{a−1}."""
-    for state, a, kind in function.factors:
-        others = [f for f in function.factors if f[0] != state]
-        slope = (state, a - 1, "s" if kind == "a" else "a")
-        for speed in field[state]:
-            factors = _merged([*others, slope, *speed.factors])
-            yield Term(function.coefficient * a * speed.coefficient, speed.parameters, factors)
-
-
-def _merged(factors: list[Factor]) -> tuple[Factor, ...]:
-    """Product of signed powers with every state once; ⌈x⌋⁰ is its sign, |x|⁰ is left out."""
-    found: dict[str, tuple[Fraction, bool]] = {}
-    for state, exponent, kind in factors:
-        power, odd = found.get(state, (Fraction(0), False))
-        found[state] = power + exponent, odd != (kind == "s")
-    return tuple((state, a, "s" if odd else "a") for state, (a, odd) in found.items() if a or odd)
 
 
 def _row(parts: list[Part], obligations: Obligations, cell: Cell | None = None) -> Iterator[Row]:

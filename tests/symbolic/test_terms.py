@@ -6,7 +6,7 @@ from fractions import Fraction as F
 import mpmath
 import pytest
 import sympy as sp
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quakedesign.errors import CertificateError, KinkError
@@ -14,8 +14,11 @@ from quakedesign.symbolic import AbsolutePower, SignedPower
 from quakedesign.symbolic.terms import (
     Term,
     cell_polynomial,
+    collected,
     from_terms,
     lie_derivative,
+    lie_terms,
+    multiplied,
     real_polynomial,
     to_terms,
     value,
@@ -144,3 +147,56 @@ def test_polynomials_on_the_reals_need_the_right_parity():
     for exponent, kind in ((F(2), "s"), (F(3), "a"), (F(1, 2), "s")):
         with pytest.raises(CertificateError, match="no polynomial on the reals"):
             real_polynomial([Term(F(1), (), (("a", exponent, kind),))], ["a"], {})
+
+
+@st.composite
+def smooth(draw):
+    """C¹ products: signed powers from 1 on, absolute ones beyond."""
+    factors = []
+    for state in WEIGHTS:
+        kind = draw(st.sampled_from(("s", "a", None)))
+        more = draw(st.fractions(0, 3, max_denominator=6))
+        if kind and (kind == "s" or more):
+            factors.append((state, 1 + more, kind))
+    coefficient = draw(st.fractions(-9, 9, max_denominator=20).filter(bool))
+    return Term(coefficient, tuple(draw(st.lists(st.sampled_from("kq"), max_size=1))), tuple(factors))
+
+
+@settings(max_examples=40, deadline=None)
+@given(smooth(), st.fixed_dictionaries(dict.fromkeys(WEIGHTS, sums())))
+def test_the_derivative_of_terms_is_that_of_their_expressions(function, field):
+    found = collected(lie_terms(function, field), list(WEIGHTS))
+    rates = {SYMBOLS[state]: from_terms(terms, SYMBOLS) for state, terms in field.items()}
+    assert found == to_terms(lie_derivative(from_terms([function], SYMBOLS), rates), STATES)
+
+
+@given(smooth(), places)
+def test_the_derivative_of_terms_is_a_difference_quotient(function, at):
+    """Along the field (1, 0, 0) at 50 digits, on whose states alone the function depends."""
+    one = (Term(F(1), (), ()),)
+    found = evaluate(list(lie_terms(function, {"a": one, "b": (), "c": ()})), at)
+    with mpmath.workdps(50):
+
+        def value_at(x):
+            number = mpmath.mpf(function.coefficient.numerator) / function.coefficient.denominator
+            for name in function.parameters:
+                number *= at[name]
+            for state, exponent, kind in function.factors:
+                place = x if state == "a" else mpmath.mpf(at[state])
+                size = abs(place) ** (mpmath.mpf(exponent.numerator) / exponent.denominator)
+                number *= size * mpmath.sign(place) if kind == "s" else size
+            return number
+
+        step = mpmath.mpf(10) ** -20
+        place = mpmath.mpf(at["a"])
+        quotient = (value_at(place + step) - value_at(place - step)) / (2 * step)
+    assert found == pytest.approx(float(quotient), rel=1e-9, abs=1e-12)
+
+
+def test_factors_of_one_state_are_multiplied():
+    third = F(1, 3)
+    assert multiplied([("a", third, "s"), ("b", F(1), "a"), ("a", third, "s")]) == (
+        ("a", 2 * third, "a"),
+        ("b", F(1), "a"),
+    )
+    assert multiplied([("a", F(0), "a"), ("b", F(0), "s")]) == (("b", F(0), "s"),)

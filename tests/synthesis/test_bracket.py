@@ -42,6 +42,16 @@ def test_four_digits_in_a_few_questions(name, first):
     assert len(asked) <= (9 if name in ("concave", "convex", "straight") else 22)
 
 
+@pytest.mark.parametrize("first", ["0.9", "1.5", "3"])
+def test_from_beyond_tangents_lead_to_the_last_success_without_a_question_at_the_floor(first):
+    """Outside its root a concave function lies below its tangents, so that Newton's steps end at the root."""
+    asked = []
+    bracket = last_success(asking(*FUNCTIONS["concave"], asked), F(first))
+    assert min(asked) > F("0.8")
+    assert len(asked) <= 7
+    assert bracket.closed(None)
+
+
 def test_near_a_limit_one_question_is_enough():
     asked = []
     bracket = last_success(asking(lambda x: 1.2 - x, lambda x: -1.0, asked), first_below(F("1.2")), limit=F("1.2"))

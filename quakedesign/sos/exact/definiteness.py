@@ -2,10 +2,14 @@
 
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import islice
 from math import lcm
+from typing import TypeVar
+
+Entry = TypeVar("Entry", int, Fraction)
 
 
-def full_matrix(upper: Sequence[Fraction], size: int) -> list[list[Fraction]]:
+def full_matrix(upper: Sequence[Entry], size: int) -> list[list[Entry]]:
     """Symmetric matrix (size × size) from its upper triangle, row by row.
 
     Raises
@@ -15,30 +19,43 @@ def full_matrix(upper: Sequence[Fraction], size: int) -> list[list[Fraction]]:
     """
     if len(upper) != size * (size + 1) // 2:
         raise ValueError(f"an upper triangle of size {size} has {size * (size + 1) // 2} entries, not {len(upper)}.")
+    rows: list[list[Entry]] = []
     entries = iter(upper)
-    rows = [[Fraction(0)] * size for _ in range(size)]
     for i in range(size):
-        for j in range(i, size):
-            rows[i][j] = rows[j][i] = next(entries)
+        mirrored = [row[i] for row in rows]
+        rows.append(mirrored + list(islice(entries, size - i)))
     return rows
 
 
+def over_common_denominator(values: Sequence[Fraction]) -> tuple[list[int], int]:
+    """Integers n and d with values n/d."""
+    scale = lcm(*{value.denominator for value in values})
+    return [value.numerator * (scale // value.denominator) for value in values], scale
+
+
 def positive_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
-    """Whether a symmetric rational matrix is positive definite (Sylvester, by fraction-free elimination).
+    """Whether a symmetric rational matrix is positive definite.
 
     Parameters
     ----------
     rows : sequence of n sequences of n Fraction
         Assumed symmetric; only then is the answer meaningful.
     """
+    integers, _ = over_common_denominator([value for row in rows for value in row])
+    size = len(rows)
+    return positive_definite_integers([integers[i * size : (i + 1) * size] for i in range(size)])
+
+
+def positive_definite_integers(rows: Sequence[Sequence[int]]) -> bool:
+    """Whether a symmetric integer matrix is positive definite.
+
+    Its eigenvalues are real, so they are positive if and only if the coefficients of its characteristic polynomial
+    alternate in sign, none of them zero.
+    """
     from flint import fmpz_mat
 
-    size = len(rows)
-    scale = lcm(1, *(value.denominator for row in rows for value in row))
-    integers = fmpz_mat([[value.numerator * (scale // value.denominator) for value in row] for row in rows])
-    permutation, _, _, upper = integers.fflu()
-    unmoved = all(permutation[i, i] == 1 for i in range(size))
-    return unmoved and all(upper[i, i] > 0 for i in range(size))
+    coefficients = reversed(fmpz_mat(rows).charpoly().coeffs())
+    return all((-c if power % 2 else c) > 0 for power, c in enumerate(coefficients))
 
 
 def nonnegative_definite(rows: Sequence[Sequence[Fraction]]) -> bool:

@@ -6,7 +6,8 @@ from typing import Any
 
 from quakedesign.errors import CertificateError, PolynomialError
 from quakedesign.output import write_whole
-from quakedesign.sos.exact.proofs import Element, Functional, Point, Proof, Square, SumOfSquares
+from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares
+from quakedesign.sos.exact.squares import Element, Square
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.exact.strict import (
     NAME,

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cache, reduce
 from itertools import combinations_with_replacement
+from operator import add
 from typing import Any
 
 Exponents = tuple[int, ...]
@@ -97,8 +98,8 @@ def rescaled(polynomial: Polynomial, scale: Sequence[Fraction]) -> dict[Exponent
 
 
 def times(left: Exponents, right: Exponents) -> Exponents:
-    """Product of two monomials."""
-    return tuple(a + b for a, b in zip(left, right, strict=True))
+    """Product of two monomials in the same variables."""
+    return tuple(map(add, left, right))
 
 
 def monomials(variables: int, most: int, least: int = 0) -> Iterator[Exponents]:

@@ -3,16 +3,22 @@
 import json
 import math
 import re
+from collections.abc import Iterable
 from fractions import Fraction
-from typing import Any
+from functools import lru_cache
+from itertools import accumulate
+from typing import Any, NoReturn
 
 from quakedesign.errors import CertificateError
 
 LARGEST_FILE = 4 << 20
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
-_RATIONAL = re.compile(r"(-?)(0|[1-9][0-9]{0,399})(?:/([1-9][0-9]{0,399}))?")
+_RATIONAL = re.compile(r"(-?[1-9][0-9]{0,399}|0)(?:/([1-9][0-9]{0,399}))?")
 _EXPONENTS = re.compile(r"(0|[1-9][0-9]{0,2})(,(0|[1-9][0-9]{0,2}))*")
 _GRID_BITS = 1 << 14
+_DEPTH = 12
+_STRING = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\\?\Z)', re.DOTALL)  # to the end of the text if never closed
+_NO_BRACKETS = re.compile(r"[^\[\]{}]+")
 
 
 def parse(text: str) -> Any:
@@ -23,8 +29,8 @@ def parse(text: str) -> Any:
     CertificateError
         When it is no JSON, too deep, or has floats, long integers or duplicate keys.
     """
-    if max(_depths(text), default=0) > 12:
-        raise CertificateError("the file is nested deeper than 12 levels.")
+    if _depth(text) > _DEPTH:
+        raise CertificateError(f"the file is nested deeper than {_DEPTH} levels.")
     try:
         return json.loads(
             text, object_pairs_hook=_unique, parse_float=_no_float, parse_constant=_no_float, parse_int=_integer
@@ -33,19 +39,10 @@ def parse(text: str) -> Any:
         raise CertificateError(f"the file is not JSON: {error}.") from None
 
 
-def _depths(text: str):
-    depth, in_string, escaped = 0, False, False
-    for character in text:
-        if in_string:
-            in_string = escaped or character != '"'
-            escaped = character == "\\" and not escaped
-        elif character == '"':
-            in_string, escaped = True, False
-        elif character in "[{":
-            depth += 1
-            yield depth
-        elif character in "]}":
-            depth -= 1
+def _depth(text: str) -> int:
+    """Deepest nesting of brackets outside of strings."""
+    brackets = _NO_BRACKETS.sub("", _STRING.sub("", text))
+    return max(accumulate(1 if bracket in "[{" else -1 for bracket in brackets), default=0)
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -58,45 +55,63 @@ def _no_float(text: str):
 
 
 def _integer(text: str) -> int:
-    need(len(text) <= 3 and text != "-0", f"the integer {text[:20]} is out of range")
+    if len(text) > 3 or text == "-0":
+        _refuse(f"the integer {text[:20]} is out of range")
     return int(text)
+
+
+def _refuse(reason: str) -> NoReturn:
+    raise CertificateError(f"{reason}.")
 
 
 def need(condition: bool, reason: str) -> None:
     """Refuse unless a condition holds."""
     if not condition:
-        raise CertificateError(f"{reason}.")
+        _refuse(reason)
 
 
 def with_keys(raw: Any, keys: set[str]) -> dict[str, Any]:
     """Object with exactly the given keys."""
-    need(isinstance(raw, dict) and set(raw) == keys, f"an object must have exactly the keys {', '.join(sorted(keys))}")
+    if not isinstance(raw, dict) or set(raw) != keys:
+        _refuse(f"an object must have exactly the keys {', '.join(sorted(keys))}")
     return raw
 
 
 def listed(raw: Any, what: str, limit: int | None = None, length: int | None = None) -> list[Any]:
     """List of bounded or given length."""
-    need(isinstance(raw, list), f"{what} must be a list")
-    need(limit is None or len(raw) <= limit, f"{what} is longer than {limit}")
-    need(length is None or len(raw) == length, f"{what} must have {length} entries")
+    if not isinstance(raw, list):
+        _refuse(f"{what} must be a list")
+    if limit is not None and len(raw) > limit:
+        _refuse(f"{what} is longer than {limit}")
+    if length is not None and len(raw) != length:
+        _refuse(f"{what} must have {length} entries")
     return raw
 
 
 def objected(raw: Any, what: str, limit: int) -> dict[str, Any]:
     """Object of bounded size."""
-    need(isinstance(raw, dict) and len(raw) <= limit, f"{what} must be an object with at most {limit} entries")
+    if not isinstance(raw, dict) or len(raw) > limit:
+        _refuse(f"{what} must be an object with at most {limit} entries")
     return raw
 
 
 def read_rational(raw: Any) -> Fraction:
     """Canonical rational."""
-    need(isinstance(raw, str), "a rational must be a text")
-    match = _RATIONAL.fullmatch(raw)
-    need(match is not None and raw != "-0" and match[3] != "1", f"{raw[:40]!r} is not a canonical rational")
-    assert match is not None
-    top, bottom = int(match[2]), int(match[3] or 1)
-    need(math.gcd(top, bottom) == 1 and (top != 0 or match[3] is None), f"{raw[:40]!r} is not in lowest terms")
-    return Fraction(-top if match[1] else top, bottom)
+    if not isinstance(raw, str):
+        _refuse("a rational must be a text")
+    return _rational(raw)
+
+
+@lru_cache(maxsize=1 << 15)  # the same numbers occur again and again in one file
+def _rational(text: str) -> Fraction:
+    match = _RATIONAL.fullmatch(text)
+    if match is None:
+        _refuse(f"{text[:40]!r} is not a canonical rational")
+    top, bottom = match.groups("1")
+    value = Fraction(int(top), int(bottom))
+    if str(value) != text:
+        _refuse(f"{text[:40]!r} is not in lowest terms")
+    return value
 
 
 def read_rationals(raw: Any, what: str, limit: int) -> dict[str, Fraction]:
@@ -110,28 +125,32 @@ def read_rationals(raw: Any, what: str, limit: int) -> dict[str, Fraction]:
 def read_exponents(raw: Any, variables: int, largest: int) -> tuple[int, ...]:
     """Exponents from a list of integers."""
     entries = listed(raw, "exponents", length=variables)
-    need(all(type(e) is int and 0 <= e <= largest for e in entries), f"exponents must be integers from 0 to {largest}")
+    if {*map(type, entries)} != {int} or min(entries) < 0 or max(entries) > largest:
+        _refuse(f"exponents must be integers from 0 to {largest}")
     return tuple(entries)
 
 
-def common_grid(gram: list[Fraction]) -> None:
+def common_grid(gram: Iterable[Fraction]) -> None:
     """Refuse a Gram matrix whose common denominator would make exact arithmetic slow."""
     common = 1
-    for entry in gram:
-        common = math.lcm(common, entry.denominator)
-        need(common.bit_length() <= _GRID_BITS, f"the common denominator of a Gram matrix exceeds {_GRID_BITS} bits")
+    for denominator in {entry.denominator for entry in gram}:
+        common = math.lcm(common, denominator)
+        if common.bit_length() > _GRID_BITS:
+            _refuse(f"the common denominator of a Gram matrix exceeds {_GRID_BITS} bits")
 
 
 def read_polynomial(raw: Any, what: str, variables: int | None, limit: int) -> dict[tuple[int, ...], Fraction]:
     """Polynomial from an object of exponents to nonzero rationals; with `variables` None its keys are equally long."""
     polynomial: dict[tuple[int, ...], Fraction] = {}
     for key, number in objected(raw, what, limit).items():
-        need(_EXPONENTS.fullmatch(key) is not None, f"{what} has a wrong key")
+        if _EXPONENTS.fullmatch(key) is None:
+            _refuse(f"{what} has a wrong key")
         parts = [int(part) for part in key.split(",")]
         variables = len(parts) if variables is None else variables
         exponents = read_exponents(parts, variables, 999)
         polynomial[exponents] = read_rational(number)
-        need(polynomial[exponents] != 0, f"{what} has a zero coefficient")
+        if not polynomial[exponents]:
+            _refuse(f"{what} has a zero coefficient")
     return polynomial
 
 

@@ -177,9 +177,12 @@ def strict_proof(asked: Statement) -> SumOfSquares | None:
     solution = search._solve(search.blocks)[0]
     if solution is None or not solution.margin > 0:
         return None
-    found = rounded(search.statement, search.blocks, solution, holds=identity_holds)
-    restored = None if found is None else search.moved.restore(found)
-    return restored if isinstance(restored, SumOfSquares) and identity_holds(asked, restored) else None
+
+    def checked(proof: SumOfSquares) -> SumOfSquares | None:
+        restored = search.moved.restored(proof)
+        return restored if identity_holds(asked, restored) else None
+
+    return rounded(search.statement, search.blocks, solution, checked)
 
 
 def initial_blocks(statement: Statement) -> list[Block]:

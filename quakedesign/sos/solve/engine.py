@@ -18,7 +18,8 @@ from quakedesign.sos.exact.polynomial import (
     product,
     square_factor,
 )
-from quakedesign.sos.exact.proofs import Proof, SumOfSquares, as_element, as_polynomial, in_echelon_form
+from quakedesign.sos.exact.proofs import Proof, SumOfSquares
+from quakedesign.sos.exact.squares import as_element, as_polynomial, in_echelon_form
 from quakedesign.sos.exact.statement import Statement, statement
 
 _GROWTH = (0, 2)

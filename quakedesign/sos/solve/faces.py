@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, evaluate, monomial
-from quakedesign.sos.exact.proofs import Element, as_element
+from quakedesign.sos.exact.squares import Element, as_element
 from quakedesign.sos.solve.moment import Shape
 
 Row = tuple[Fraction, ...]

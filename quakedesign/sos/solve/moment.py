@@ -9,6 +9,7 @@ Gram entries, and between polynomials of one shape only the cost changes.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from quakedesign.sos.exact.polynomial import Exponents
@@ -270,11 +271,13 @@ def _unique(stacked: list):
     return keys, where.reshape(-1)
 
 
+@lru_cache(maxsize=256)
 def _pairs(size: int):
-    """Rows and columns of the upper triangle, column by column."""
+    """Rows and columns of the upper triangle, column by column; read-only."""
     import numpy as np
 
     columns, rows = np.tril_indices(size)
+    rows.flags.writeable = columns.flags.writeable = False
     return rows, columns
 
 

@@ -18,7 +18,7 @@ def rounded(
     statement: Statement,
     blocks: Sequence[Block],
     solution: Solution,
-    holds: Callable[[Statement, SumOfSquares], bool] = identity_holds,
+    checked: Callable[[SumOfSquares], SumOfSquares | None] | None = None,
 ) -> SumOfSquares | None:
     """Exact proof near a floating-point one, with the coarsest rounding that works; None if none does.
 
@@ -28,14 +28,16 @@ def rounded(
     blocks : sequence of Block
         As solved.
     solution : Solution
-    holds : callable
-        The exact decision.
+    checked : callable, optional
+        The exact decision: the proof that is returned for a rounded one, or None where that one does not hold. Unless
+        given, the identity is checked and the proof is returned as it is.
 
     Returns
     -------
     SumOfSquares or None
         Checked.
     """
+    decision = checked or (lambda proof: proof if identity_holds(statement, proof) else None)
     system = _System(statement, blocks)
     floats = system.flat(solution)
     largest = max((len(b.basis) for b in blocks), default=1)
@@ -48,9 +50,9 @@ def rounded(
         correction = system.correction(residual(statement, proof.squares, proof.cofactors))
         if correction is None:
             return None
-        proof = system.proof([a + correction.get(i, 0) for i, a in enumerate(values)])
-        if holds(statement, proof):
-            return proof
+        found = decision(system.proof([a + correction[i] if i in correction else a for i, a in enumerate(values)]))
+        if found is not None:
+            return found
     return None
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, monomial, rescaled
-from quakedesign.sos.exact.proofs import Element, Functional, Point, Proof, Square, SumOfSquares
+from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares
+from quakedesign.sos.exact.squares import Element, Square
 from quakedesign.sos.exact.statement import Statement
 
 
@@ -36,6 +37,10 @@ class Scaled:
             return Point(coordinates=tuple(s * x for s, x in zip(self.scale, proof.coordinates, strict=True)))
         if isinstance(proof, Functional):
             return Functional(values={e: v * monomial(self.scale, e) for e, v in proof.values.items()})
+        return self.restored(proof)
+
+    def restored(self, proof: SumOfSquares) -> SumOfSquares:
+        """Sum of squares in u from one in ũ."""
         inverse = tuple(1 / s for s in self.scale)
         squares = tuple(self._square(s, inverse) for s in proof.squares)
         cofactors = tuple(
@@ -49,9 +54,9 @@ class Scaled:
         for i in square.product:
             outer /= self.inequalities[i]
         elements = [_restored(b, inverse) for b in square.basis]
-        size = len(elements)
-        pairs = ((i, j) for i in range(size) for j in range(i, size))
-        gram = tuple(q * outer * elements[i][1] * elements[j][1] for q, (i, j) in zip(square.gram, pairs, strict=True))
+        factors = [factor for _, factor in elements]
+        pairs = (left * right for i, left in enumerate(outer * f for f in factors) for right in factors[i:])
+        gram = tuple(q * factor for q, factor in zip(square.gram, pairs, strict=True))
         return Square(product=square.product, basis=tuple(b for b, _ in elements), gram=gram)
 
 

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.sos.exact.definiteness import nonnegative_definite, positive_definite
-from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares, holds, in_echelon_form
+from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares, holds
+from quakedesign.sos.exact.squares import Square, in_echelon_form
 from quakedesign.sos.exact.statement import statement
 
 ONE = Fraction(1)
@@ -127,6 +128,9 @@ def test_malformed_proofs_are_false_not_errors():
         Square(basis=((1, 0), (1, 0)), gram=(ONE, ONE, ONE)),
         Square(basis=((1, 0),), gram=(ONE, ONE)),
         Square(basis=((1, 0, 0),), gram=(ONE,)),
+        Square(basis=((1, 0), (0, 1, 0)), gram=(ONE, -ONE, Fraction(2))),
+        Square(basis=((1, 0), (0,)), gram=(ONE, -ONE, Fraction(2))),
+        Square(basis=((1, 0), (0, 1)), gram=(1.0, -1.0, 2.0)),
         Square(product=(3,), basis=((1, 0),), gram=(ONE,)),
     ):
         assert holds(asked, SumOfSquares(squares=(square,))) is False
