@@ -4,10 +4,25 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.cli.shared import Force, Gains, Json, app, console, print_json, progress
+from quakedesign.cli.hardware import ActuatorOptions, SensorOptions
+from quakedesign.cli.shared import (
+    Force,
+    Gains,
+    Json,
+    Metres,
+    MetresPerSecond,
+    Push,
+    Seconds,
+    app,
+    console,
+    print_json,
+    progress,
+)
 
 if TYPE_CHECKING:
     from quakedesign.simulation.campaign import Campaign, Problem
+
+_DIRECT, _EXACT = ActuatorOptions(), SensorOptions()
 
 
 @app.command
@@ -18,15 +33,21 @@ def campaign(
     samples: int,
     controller: str = "cta",
     gains: Gains = ("published",),
+    scale: str | None = None,
+    feedforward: str = "none",
     scheme: str = "explicit",
-    step: float | None = None,
-    duration: float | None = None,
+    step: Seconds | None = None,
+    substeps: int = 1,
+    method: str = "dormand-prince",
+    duration: Seconds | None = None,
     plant: str = "smooth",
+    drift: MetresPerSecond = 0.0,
+    perturbation: Push | None = None,
     box: str | None = None,
-    slip_noise: float = 0.0,
-    rate_noise: float = 0.0,
-    initial_slip: float = 0.0,
-    initial_rate: float = 0.0,
+    actuator: ActuatorOptions = _DIRECT,
+    sensors: SensorOptions = _EXACT,
+    initial_slip: Metres = 0.0,
+    initial_rate: MetresPerSecond = 0.0,
     seed: int = 0,
     search: str | None = None,
     rerun: str | None = None,
@@ -39,7 +60,8 @@ def campaign(
     """Run many samples over the uncertainty box, disturbances, noise and initial states, and report how bad they get.
 
     Every batch that is done is kept in the folder: interrupted or killed, the same command goes on and gives the same
-    answer. Exit code 0 if all samples have a result (one that diverges has), 1 if a batch failed.
+    answer. Exit code 0 if all samples have a result (one that diverges has), 1 if a batch failed. Quantities have a
+    unit, as '20 MPa', or are bare numbers in SI units.
 
     Parameters
     ----------
@@ -50,25 +72,33 @@ def campaign(
     controller
         none, cta, dia or elqr.
     gains
-        published, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+        published, designed, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+    scale
+        λ of a sliding mode in place of that of the gains, decimal or p/q.
+    feedforward
+        none, nominal or centred.
     scheme
         explicit, implicit, semi-implicit or compensated (sampled control), or continuous.
     step
-        Length of one step in s; the fault's sampling time unless given.
+        Length of one step; the fault's sampling time unless given.
+    substeps
+        Steps of the integrator per sample.
+    method
+        dormand-prince or rk4.
     duration
-        Of every run in s; the operation time unless given.
+        Of every run; the operation time unless given.
     plant
         smooth or coulomb.
+    drift
+        Velocity of the far end, such as '3 cm/year'.
+    perturbation
+        Of the user's in m/s^2, added to the fault's own: an expression of slip, slip_rate and time.
     box
         Uncertainty box: paper or ten-percent.
-    slip_noise
-        Standard deviation of the measured slip in m.
-    rate_noise
-        Standard deviation of the measured slip rate in m/s.
     initial_slip
-        Largest slip at the start in m.
+        Largest slip at the start.
     initial_rate
-        Largest slip rate at the start in m/s.
+        Largest slip rate at the start.
     seed
         Of samples and noise.
     search
@@ -88,19 +118,27 @@ def campaign(
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.single import chosen_controller
+    from quakedesign.simulation import Load
+    from quakedesign.simulation import perturbation as read_perturbation
     from quakedesign.simulation.campaign import campaign_problem, run_campaign
-    from quakedesign.simulation.measurement import Measurement
-    from quakedesign.simulation.schemes import simulation_scheme
+    from quakedesign.simulation.run import sampled_scheme
 
     found = load_fault(fault, box=box)
-    noise = Measurement(slip_noise=slip_noise, rate_noise=rate_noise)
+    period = found.sampling_time if step is None else step
+    law = (
+        None
+        if controller == "none"
+        else chosen_controller(found, controller, gains, scale=scale, feedforward=feedforward)
+    )
     problem = campaign_problem(
         found,
-        None if controller == "none" else chosen_controller(found, controller, gains),
-        scheme=simulation_scheme(scheme, **({"measurement": noise} if noise.noisy else {})),
+        law,
+        scheme=sampled_scheme(scheme, substeps, actuator.build(period), sensors.build(period)),
         step=step,
+        method=method,
         duration=duration,
         plant=plant,
+        load=Load(drift=drift, perturbation=None if perturbation is None else read_perturbation(perturbation)),
         initial_slip=initial_slip,
         initial_slip_rate=initial_rate,
         seed=seed,

@@ -17,6 +17,8 @@ def design(
     controller: str = "all",
     box: str | None = None,
     held: Annotated[bool, Parameter(negative="")] = False,
+    scheme: str = "continuous",
+    published_scheme: str = "continuous",
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
@@ -35,6 +37,11 @@ def design(
         Uncertainty box: paper or ten-percent.
     held
         Gains of the e-LQR that are proved with p held over the sampling time as well.
+    scheme
+        Of the runs of designed gains: continuous, as in the paper, or sampled and held: explicit, implicit,
+        semi-implicit, compensated.
+    published_scheme
+        Of the runs of published gains.
     out
         Folder to write; ./quakedesign-FAULT unless given.
     force
@@ -51,10 +58,13 @@ def design(
     found = load_fault(fault, box=box)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
+    from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import write_folder
 
     with progress() as tell:
-        comparison = compared(found, names, tell, held=held)
+        comparison = designed_comparison(
+            found, names, tell, held=held, scheme=scheme, published_scheme=published_scheme
+        )
         results = write_folder(comparison, folder, force=force, tell=tell)
     if json:
         print_json(results)
@@ -78,18 +88,6 @@ def controllers(name: str) -> list[str]:
     if name not in (*DESIGNABLE, "all"):
         raise UnknownNameError(f"controller must be one of {', '.join(DESIGNABLE)}, all. Received {name!r}.")
     return list(DESIGNABLE) if name == "all" else [name]
-
-
-def compared(found: Any, names: list[str], tell: Any, *, held: bool = False) -> Any:
-    """Comparison of a fault's designs of the named laws (the e-LQR `held` or not) and the published gains."""
-    from quakedesign.report.comparison import compare
-    from quakedesign.synthesis import design as synthesise
-
-    designs = []
-    for i, name in enumerate(names):
-        tell(f"synthesis and proof of {name}", i / len(names))
-        designs.append(synthesise(found, name, held=held and name == "elqr"))
-    return compare(found, designs, progress=tell)
 
 
 def positive(comparison: Any) -> bool:

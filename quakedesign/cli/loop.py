@@ -1,9 +1,25 @@
 """Commands about one closed loop: simulate it, see what sampling does to it, export its controller."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from quakedesign.cli.shared import Force, Gains, Json, app, console, new_file, print_json, progress
+from quakedesign.cli.hardware import ActuatorOptions, EstimateOptions, SensorOptions
+from quakedesign.cli.shared import (
+    Force,
+    Gains,
+    Json,
+    MetresPerSecond,
+    Push,
+    Seconds,
+    app,
+    console,
+    new_file,
+    print_json,
+    progress,
+)
+
+_DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
 
 
 @app.command
@@ -15,23 +31,24 @@ def simulate(
     gains: Gains = ("published",),
     scale: str | None = None,
     feedforward: str = "none",
-    step: float | None = None,
-    duration: float | None = None,
+    step: Seconds | None = None,
+    duration: Seconds | None = None,
     scheme: str = "continuous",
     substeps: int = 1,
     method: str = "dormand-prince",
     plant: str = "smooth",
-    drift: float = 0.0,
-    perturbation: str | None = None,
-    slip_noise: float = 0.0,
-    rate_noise: float = 0.0,
-    differentiator_bound: float | None = None,
-    filter_order: int = 0,
+    drift: MetresPerSecond = 0.0,
+    perturbation: Push | None = None,
+    actuator: ActuatorOptions = _DIRECT,
+    sensors: SensorOptions = _EXACT,
+    seed: int = 0,
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
     """Run one closed loop over the whole task, or the natural earthquake without a controller.
+
+    Quantities have a unit, as '20 MPa', or are bare numbers in SI units.
 
     Parameters
     ----------
@@ -46,9 +63,9 @@ def simulate(
     feedforward
         none, nominal or centred: what a sliding mode adds to ν from what is known of the fault.
     step
-        Length of one step in s; the fault's sampling time unless given.
+        Length of one step; the fault's sampling time unless given.
     duration
-        In s; the operation time unless given. Without a controller: the fault under its own disturbance.
+        The operation time unless given. Without a controller: the fault under its own disturbance.
     scheme
         continuous (the law in every stage of the integrator), or sampled and held: explicit, implicit, semi-implicit,
         compensated.
@@ -59,17 +76,11 @@ def simulate(
     plant
         smooth (the paper's, for forward slip) or coulomb (set-valued friction: stick, slip, reversal).
     drift
-        Velocity of the far end in m/s.
+        Velocity of the far end, such as '3 cm/year'.
     perturbation
         Of the user's in m/s^2, added to the fault's own: an expression of slip, slip_rate and time.
-    slip_noise
-        Standard deviation of the measured slip in m.
-    rate_noise
-        Standard deviation of the measured slip rate in m/s.
-    differentiator_bound
-        λ_d in m/s^2: tell the law what a differentiator estimates from the slip.
-    filter_order
-        Of the differentiator.
+    seed
+        Of the noise.
     out
         NetCDF file to write.
     force
@@ -78,18 +89,16 @@ def simulate(
         Print JSON.
     """
     from quakedesign.fault import load_fault
-    from quakedesign.report.single import chosen_controller, run_single
-    from quakedesign.simulation import Load, Measurement
+    from quakedesign.report.single import choice, run_single
+    from quakedesign.simulation import Load
     from quakedesign.simulation import perturbation as read_perturbation
 
     new_file(out, "output file", force=force)
     found = load_fault(fault)
-    law = (
-        None
-        if controller == "none"
-        else chosen_controller(found, controller, gains, scale=scale, feedforward=feedforward)
-    )
+    law = None if controller == "none" else choice(found, controller, gains, scale=scale, feedforward=feedforward)
     pushed = None if perturbation is None else read_perturbation(perturbation)
+    period = found.sampling_time if step is None else step
+    chain, told = actuator.build(period), sensors.build(period, seed)
     with progress() as tell:
         trajectory, premises = run_single(
             found,
@@ -97,14 +106,13 @@ def simulate(
             tell=lambda done: tell("simulation", done),
             duration=duration,
             load=Load(drift=drift, perturbation=pushed) if drift or pushed is not None else None,
-            noise=Measurement(slip_noise=slip_noise, rate_noise=rate_noise),
-            differentiator_bound=differentiator_bound,
-            filter_order=filter_order,
             step=step,
             scheme=scheme,
             method=method,
             plant=plant,
             substeps=substeps,
+            actuator=chain,
+            noise=told,
         )
     if out is not None:
         trajectory.save(out)
@@ -119,6 +127,7 @@ def _answer(trajectory: Any, premises: Any) -> dict[str, Any]:
     metrics, energy = trajectory.metrics.to_dict(), trajectory.energy
     return {
         "metrics": metrics,
+        "units": {name: trajectory.metrics.unit(name) for name in metrics},
         "premises": [p.to_dict() for p in premises],
         "events": dict(trajectory.events),
         "energy": energy.to_dict() | {"relative_residual": energy.relative_residual} if energy else None,
@@ -145,7 +154,7 @@ def sampling(
     gains: Gains = ("designed",),
     scale: Gains = (),
     schemes: Gains = ("explicit", "implicit", "semi-implicit", "compensated"),
-    duration: float | None = None,
+    duration: Seconds | None = None,
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
@@ -168,7 +177,7 @@ def sampling(
     schemes
         To run the law with.
     duration
-        Of the runs in s; the operation time unless given.
+        Of the runs; the operation time unless given.
     out
         Folder to write; ./quakedesign-FAULT-sampling unless given.
     force
@@ -208,10 +217,9 @@ def export(
     gains: Gains = ("published",),
     scale: str | None = None,
     feedforward: str = "none",
-    step: float | None = None,
+    step: Seconds | None = None,
     scheme: str = "explicit",
-    differentiator_bound: float | None = None,
-    filter_order: int = 0,
+    sensors: EstimateOptions = _TOLD,
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
@@ -231,13 +239,9 @@ def export(
     feedforward
         none, nominal or centred.
     step
-        Sampling period in s; the fault's unless given.
+        Sampling period; the fault's unless given.
     scheme
         explicit, implicit, semi-implicit or compensated.
-    differentiator_bound
-        λ_d in m/s^2: measure the slip alone, and estimate the rest with a differentiator.
-    filter_order
-        Of the differentiator.
     out
         Folder to write; ./quakedesign-FAULT-CONTROLLER unless given.
     force
@@ -258,8 +262,7 @@ def export(
         folder,
         step=step,
         scheme=scheme,
-        differentiator_bound=differentiator_bound,
-        filter_order=filter_order,
+        **asdict(sensors),
         force=force,
     )
     if json:

@@ -1,7 +1,7 @@
 """What all commands share: the application, options, output and progress."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,12 +9,44 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter
 from rich.console import Console
 
-from quakedesign.errors import OutputError
+from quakedesign.errors import OutputError, UnitError
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Force = Annotated[bool, Parameter(negative="")]
 # Negative decimals are values anyhow; with leading hyphens allowed, options after the gains would be gains too.
 Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
+
+
+def _reader(unit: str) -> Callable[[Any, Sequence[Any]], float]:
+    """Converter of an option's text, with a unit or a bare number in the SI unit."""
+
+    def read(_type: Any, tokens: Sequence[Any]) -> float:
+        text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
+        try:
+            return float(text)
+        except ValueError:
+            return _with_unit(text, unit, name)
+
+    return read
+
+
+def _with_unit(text: str, unit: str, name: str) -> float:
+    from quakedesign.fault.units import si_value
+
+    if unit == "Hz" and "rad" in text:
+        raise UnitError(f"{name} must be a frequency in Hz. Received {text!r}. Divide it by 2π.")
+    return si_value(text, unit, name)
+
+
+Seconds = Annotated[float, Parameter(converter=_reader("s"))]
+Hertz = Annotated[float, Parameter(converter=_reader("Hz"))]
+Metres = Annotated[float, Parameter(converter=_reader("m"))]
+MetresPerSecond = Annotated[float, Parameter(converter=_reader("m/s"))]
+MetresPerSecondSquared = Annotated[float, Parameter(converter=_reader("m/s^2"))]
+Pascals = Annotated[float, Parameter(converter=_reader("Pa"))]
+PascalsPerSecond = Annotated[float, Parameter(converter=_reader("Pa/s"))]
+CubicMetresPerPascal = Annotated[float, Parameter(converter=_reader("m^3/Pa"))]
+Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 app = App(
     name="quakedesign",

@@ -4,13 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
+from itertools import takewhile
 from time import perf_counter
 from typing import Any
 
-from quakedesign.certificates import Certificate, Verdict
-from quakedesign.errors import ParameterError
+from quakedesign.certificates import Certificate, Loop, Verdict
+from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational
 from quakedesign.synthesis.decision import Number, certify, closed_loop
+from quakedesign.synthesis.dual import dual
+from quakedesign.synthesis.lyapunov import candidate_degrees, refute
 from quakedesign.synthesis.questions import Reach, against, largest_gain_range, largest_lipschitz, necessary_limit
 from quakedesign.synthesis.settling import Settling, fastest_settling
 
@@ -78,18 +81,13 @@ def certified(
         raise ParameterError(
             f"certify {name} needs a bound on |h'|. Received none. Give --lipschitz, or --maximize lipschitz."
         )
-    if maximize == "lipschitz":
-        answer = _of_reach(largest_lipschitz(name, gains, gain_range=gain_range), (low, high), lipschitz)
-    elif maximize in ("beta", "beta-factor"):
-        if low != high:
-            raise ParameterError(f"to maximise the range of beta, give one value twice. Received {low} {high}.")
-        reach = largest_gain_range(
-            name, gains, lipschitz=str(lipschitz), nominal=low, symmetric=maximize == "beta-factor"
-        )
-        answer = _of_reach(reach, (low, high), lipschitz)
-    else:
-        answer = _at(name, gains, str(lipschitz), (low, high), decay=maximize == "decay")
-    certificate, facts, lines = answer
+    if maximize in ("beta", "beta-factor") and low != high:
+        raise ParameterError(f"to maximise the range of beta, give one value twice. Received {low} {high}.")
+    try:
+        certificate, facts, lines = _answer(name, gains, lipschitz, maximize, (low, high))
+    except CertificateError as error:
+        bound = None if lipschitz is None else rational(lipschitz, "lipschitz")
+        certificate, facts, lines = None, _facts(bound, (low, high)), [f"not expressible in a certificate: {error}"]
     verdict = _verdict(certificate)
     head = f"{verdict}: {name} {' '.join(map(str, gains))}"
     if facts["lipschitz"] is not None:
@@ -98,63 +96,108 @@ def certified(
     return Certified(verdict=verdict, certificate=certificate, facts=whole, lines=(head, *lines))
 
 
+def _answer(
+    name: str, gains: tuple[Number, ...], lipschitz: Number | None, maximize: str | None, ends: "Ends"
+) -> "Answer":
+    if maximize == "lipschitz":
+        return _of_reach(name, gains, largest_lipschitz(name, gains, gain_range=ends), ends, lipschitz)
+    if maximize in ("beta", "beta-factor"):
+        reach = largest_gain_range(
+            name, gains, lipschitz=str(lipschitz), nominal=ends[0], symmetric=maximize == "beta-factor"
+        )
+        return _of_reach(name, gains, reach, ends, lipschitz)
+    return _at(name, gains, str(lipschitz), ends, decay=maximize == "decay")
+
+
+def _facts(bound: Fraction | None, ends: "Ends", **known: Any) -> dict[str, Any]:
+    """Facts of every answer; what is not given is not known."""
+    empty: dict[str, Any] = {"decay": None, "settling": None, "limit": None, "counterexample": "none", "dual": []}
+    return {"lipschitz": _text(bound), "gain_range": [str(v) for v in ends], **empty, **known}
+
+
 def _verdict(certificate: Certificate | None) -> Verdict:
     if certificate is None:
         return Verdict.UNDECIDED
     return Verdict.REFUTED if certificate.refutation is not None else Verdict.PROVED
 
 
+Ends = tuple[Fraction, Fraction]
 Answer = tuple[Certificate | None, dict[str, Any], list[str]]
 
 
-def _at(
-    name: str, gains: tuple[Number, ...], lipschitz: str, ends: tuple[Fraction, Fraction], *, decay: bool
-) -> Answer:
+def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, decay: bool) -> Answer:
     """Verdict for one bound, with the decay if that is asked for."""
-    fast = None
-    if decay:
-        start = rational(lipschitz, "lipschitz") or Fraction(1)
-        fast = fastest_settling(name, gains, lipschitz=lipschitz, gain_range=ends, start=start)
-    certificate = fast[0] if fast else certify(name, gains, lipschitz=lipschitz, gain_range=ends)[1]
     loop = closed_loop(name, gains, lipschitz=lipschitz, gain_range=ends)
-    limit = necessary_limit(loop, name)
-    kind = against(loop, name)[0] if _verdict(certificate) is not Verdict.PROVED else "none"
+    limit, bound, fast = necessary_limit(loop, name), rational(lipschitz, "lipschitz"), None
+    hopeless = limit is not None and bound >= limit
+    if decay and not hopeless:
+        fast = fastest_settling(name, gains, lipschitz=lipschitz, gain_range=ends, start=bound or Fraction(1))
+    certificate = fast[0] if fast else refute(loop, name)
+    if certificate is None and not hopeless:
+        certificate = certify(name, gains, lipschitz=lipschitz, gain_range=ends)[1]
+    proved = _verdict(certificate) is Verdict.PROVED
+    kind = "none" if proved else against(loop, name)[0]
+    excluded = [] if proved or kind == "exact" else _excluded(loop)
     told = fast[1] if fast else None
-    facts = {
-        "lipschitz": str(rational(lipschitz)),
-        "gain_range": [str(v) for v in ends],
-        "decay": str(told.decay) if told else None,
-        "settling": _settling_facts(told),
-        "limit": _text(limit),
-        "counterexample": kind,
-    }
-    lines = [_limit_line(limit)]
+    facts = _facts(
+        bound,
+        ends,
+        decay=str(told.decay) if told else None,
+        settling=_settling_facts(told),
+        limit=_text(limit),
+        counterexample=kind,
+        dual=excluded,
+    )
+    lines = [_limit_line(limit), *(["the bound is at or beyond that limit"] if hopeless else [])]
     lines += _settling_lines(told) if told else ["no decay rate was found"] if decay else []
-    return certificate, facts, lines + ([] if _verdict(certificate) is Verdict.PROVED else [_AGAINST[kind]])
+    return certificate, facts, lines + _nothing_lines(certificate, kind, excluded)
 
 
-def _of_reach(reach: Reach, ends: tuple[Fraction, Fraction], lipschitz: Number | None) -> Answer:
+def _excluded(loop: Loop) -> list[int]:
+    """Degrees of V that an exact dual excludes, from the lowest on and without gaps."""
+    return list(takewhile(lambda degree: dual(loop, degree) is not None, candidate_degrees(loop)))
+
+
+def _nothing_lines(certificate: Certificate | None, kind: str, excluded: list[int]) -> list[str]:
+    if _verdict(certificate) is Verdict.PROVED:
+        return []
+    if kind == "exact":
+        return [_AGAINST[kind]]
+    degrees = ", ".join(map(str, excluded))
+    told = f"an exact dual was found: no even V of degree {degrees}" if excluded else ""
+    return [_AGAINST[kind], f"{told} is positive and falls, whatever the proof" if told else "no exact dual was found"]
+
+
+def _of_reach(name: str, gains: tuple[Number, ...], reach: Reach, ends: Ends, lipschitz: Number | None) -> Answer:
     """How far gains reach in L̄ or in the range of β."""
+    tried = ends if reach.quantity == "lipschitz" else (ends[0], ends[0])
+    lowest = closed_loop(
+        name, gains, lipschitz=0 if reach.quantity == "lipschitz" else str(lipschitz), gain_range=tried
+    )
+    limit = necessary_limit(lowest, name)
+    kind = reach.counterexample
+    excluded = _excluded(lowest) if reach.certificate is None else []
     value, bound = reach.value, None if lipschitz is None else rational(lipschitz, "lipschitz")
     scale = reach.smallest_scale(bound) if reach.quantity == "lipschitz" and bound else None
+    least = bound / limit if bound and limit and scale is not None else None
     if reach.quantity == "lipschitz":
         bound = value
     elif value is not None:
         ends = (ends[0], value) if reach.quantity == "beta" else (ends[0] / value, ends[0] * value)
-    facts = {
-        "lipschitz": _text(bound),
-        "gain_range": [str(v) for v in ends],
-        "decay": None,
-        "settling": None,
-        "limit": _text(reach.limit),
-        "counterexample": reach.counterexample,
-        "maximized": {"quantity": reach.quantity, "value": _text(value), "beyond": _text(reach.beyond)},
-        "degrees": list(reach.degrees),
-        "degree": reach.degree,
-        "scale": _text(scale),
-        "solves": reach.solves,
-    }
-    lines = [*_reach_lines(reach), *([] if reach.quantity != "lipschitz" else [_limit_line(reach.limit)])]
+    facts = _facts(
+        bound,
+        ends,
+        limit=_text(limit),
+        counterexample=kind,
+        dual=excluded,
+        maximized={"quantity": reach.quantity, "value": _text(value), "beyond": _text(reach.beyond)},
+        degrees=list(reach.degrees),
+        degree=reach.degree,
+        scale=_text(scale),
+        scale_limit=_text(least),
+        solves=reach.solves,
+    )
+    lines = [*_reach_lines(reach), *_nothing_lines(reach.certificate, kind, excluded), _limit_line(limit)]
     if scale is not None:
         lines.append(f"the bound {lipschitz} needs gains scaled by lambda >= {_up(scale)}")
     return reach.certificate, facts, lines
@@ -164,7 +207,7 @@ def _reach_lines(reach: Reach) -> list[str]:
     names = {"lipschitz": "bound on |h'|", "beta": "upper end of beta", "beta-factor": "factor f of beta in [b/f, b f]"}
     degrees = ", ".join(map(str, reach.degrees))
     if reach.value is None:
-        return [f"nothing is proved with Lyapunov functions of degree {degrees}", _AGAINST[reach.counterexample]]
+        return [f"nothing is proved with Lyapunov functions of degree {degrees}"]
     said = f"largest {names[reach.quantity]}: {_down(reach.value)} (exactly {reach.value}), V of degree {reach.degree}"
     if reach.beyond is None and reach.sharp:
         return [said, "which is within 1e-4 of what no Lyapunov function can exceed"]
@@ -177,7 +220,7 @@ def _reach_lines(reach: Reach) -> list[str]:
 def _limit_line(limit: Fraction | None) -> str:
     if limit is None:
         return "no necessary limit of |h'| is known for this law"
-    return f"necessary limit: from |h'| = {_down(limit)} on nothing can be proved of these gains"
+    return f"necessary limit: from |h'| = {_up(limit)} on nothing can be proved of these gains"
 
 
 def _settling_facts(told: Settling | None) -> dict[str, Any] | None:

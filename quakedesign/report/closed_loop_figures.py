@@ -19,6 +19,7 @@ from quakedesign.report.drawing import (
     runs_of,
     scaled,
     style,
+    with_diverged,
 )
 
 if TYPE_CHECKING:
@@ -59,7 +60,13 @@ def states(comparison: "Comparison") -> Any:
         _time_below(axes[:, column], drawing, unit)
     note = "slip rate: band between the extremes of 40 kept samples, logarithmic beyond the largest reference rate"
     rates = [axis for axis in drawing.axes if axis not in axes[0]]
-    return finish(drawing, f"{comparison.fault.name}: states in closed loop", runs, note, legend=rates[0])
+    return finish(
+        drawing,
+        f"{comparison.fault.name}: states in closed loop",
+        runs,
+        with_diverged(comparison.entries, note),
+        legend=rates[0],
+    )
 
 
 def _slips(axis: Any, comparison: "Comparison", origin: str, sizes: tuple[float, float]) -> None:
@@ -146,7 +153,7 @@ def pressure(comparison: "Comparison", close_ups: "Mapping[str, Trajectory] | No
     note = "bands between the extremes of 10 kept samples" + (
         "; insets: Δp about its mean, every step" if close_ups else ""
     )
-    return finish(drawing, f"{comparison.fault.name}: fluid pressure", runs, note)
+    return finish(drawing, f"{comparison.fault.name}: fluid pressure", runs, with_diverged(comparison.entries, note))
 
 
 def _inset(axis: Any, run: "Trajectory", shade: str) -> None:

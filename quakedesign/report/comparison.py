@@ -3,18 +3,18 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import isqrt
 from typing import Any
 
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
-from quakedesign.certificates.premises import Domain, Variant, certified_lipschitz
+from quakedesign.certificates.premises import Variant, certified_lipschitz
 from quakedesign.controllers import SlidingMode, published
 from quakedesign.fault import Fault
-from quakedesign.report.linear import held_sentence, peaks_sentence
-from quakedesign.simulation import Trajectory, natural_earthquake, simulate
+from quakedesign.report.headlines import AS_IN_THE_PAPER, headline
+from quakedesign.simulation import Trajectory, natural_earthquake, simulate, simulation_scheme
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis import Design, assess
+from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.linear.certified_peaks import CLASSES, CertifiedPeaks
 from quakedesign.synthesis.linear.scaled_design import vertex_poles
 from quakedesign.synthesis.sampling import largest_sampling_time, on_trajectory
@@ -34,9 +34,11 @@ class Entry:
     run : Trajectory or None
         None when there is no controller to run.
     largest_step : float or None
-        Largest T_s [s] for which the run would stay inside the premise on |h'|; None when not asked or not found.
+        Largest T_s [s] for which the run would stay inside the premise on |h'|; None when not asked or not found, and
+        for schemes that hold p.
     growth_per_step : float or None
-        For a linear law: growth of the fastest mode per step of the run [-]; below 1 is stable.
+        For a linear law: growth of the fastest mode per step of the run [-]; below 1 is stable. None for schemes that
+        hold p, of which `held` speaks.
     variants : tuple of Variant
         For a designed sliding mode: what is certified of the same gains with every named feed-forward.
     held : mapping or None
@@ -127,9 +129,11 @@ def compare(
     designs: Sequence[Design] = (),
     *,
     with_published: bool = True,
+    scheme: str = AS_IN_THE_PAPER,
+    published_scheme: str | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Comparison:
-    """Run all controllers of a fault over the whole task, scheme ``continuous``, step T_s.
+    """Run all controllers of a fault over the whole task, step T_s.
 
     Parameters
     ----------
@@ -138,6 +142,9 @@ def compare(
         Designed controllers; one without a controller is reported and not run.
     with_published : bool
         Add the paper's gains, where the fault has any, with their verdicts and premises.
+    scheme, published_scheme : str
+        Of the runs of designed and of published gains, see `quakedesign.simulation.schemes`; the latter ``continuous``,
+        as in the paper, unless given. Labels tell them apart where they differ.
     progress : callable, optional
         Called with what is being done and the fraction done [-].
 
@@ -146,25 +153,54 @@ def compare(
     Comparison
     """
     tell = progress or (lambda _what, _done: None)
+    schemes = {"designed": scheme, "published": published_scheme or AS_IN_THE_PAPER}
+    for name in schemes.values():
+        simulation_scheme(name)
     tell("uncontrolled", 0.0)
     uncontrolled = natural_earthquake(fault)
     entries: list[Entry] = []
     for controller in published(fault.name).values() if with_published else ():
         tell(f"{controller.title} (published): verdict", 0.0)
-        entries.append(_entry("published", assess(fault, controller), tell))
-    entries.extend(_entry("designed", found, tell) for found in designs)
+        entries.append(_entry("published", assess(fault, controller), schemes, tell))
+    entries.extend(_entry("designed", found, schemes, tell) for found in designs)
     return Comparison(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
 
 
-def _entry(origin: str, design: Design, tell: Callable[[str, float], None]) -> Entry:
-    label = f"{design.title} ({origin})"
+def designed_comparison(
+    fault: Fault, names: Iterable[str], tell: Callable[[str, float], None], *, held: bool = False, **schemes: Any
+) -> Comparison:
+    """Comparison of a fault's designs of the named laws (the e-LQR `held` or not) and the published gains.
+
+    Parameters
+    ----------
+    fault : Fault
+    names : iterable of str
+    tell : callable
+        Progress.
+    held : bool
+    **schemes
+        ``scheme`` and ``published_scheme`` of `compare`.
+    """
+    for name in filter(None, schemes.values()):
+        simulation_scheme(name)
+    designs, wanted = [], list(names)
+    for i, name in enumerate(wanted):
+        tell(f"synthesis and proof of {name}", i / len(wanted))
+        designs.append(synthesise(fault, name, held=held and name == "elqr"))
+    return compare(fault, designs, progress=tell, **schemes)
+
+
+def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Callable[[str, float], None]) -> Entry:
+    scheme = schemes[origin]
+    differ = len(set(schemes.values())) > 1
+    label = f"{design.title} ({origin}, {scheme})" if differ else f"{design.title} ({origin})"
     if design.controller is None:
         return Entry(label=label, origin=origin, design=design, run=None)
-    kept = samples(design.fault)
-    run = simulate(design.fault, design.controller, samples=kept, progress=lambda done: tell(label, done))
+    run = simulate(design.fault, design.controller, scheme=scheme, progress=lambda done: tell(label, done))
+    continuous = scheme == AS_IN_THE_PAPER
     if not isinstance(design.controller, SlidingMode):
         poles = vertex_poles(sectors(design.fault), list(design.controller.gains.values()))
-        growth = amplification(poles, run.provenance["step"], run.provenance["method"])
+        growth = amplification(poles, run.provenance["step"], run.provenance["method"]) if continuous else None
         tell(f"{label}: held pressure and peaks", 0.0)
         wanted = CLASSES if origin == "designed" and design.verdict is Verdict.PROVED else ()
         peaks = {kind: design.certified_peaks(kind) for kind in wanted}
@@ -185,24 +221,10 @@ def _entry(origin: str, design: Design, tell: Callable[[str, float], None]) -> E
     variants: tuple[Variant, ...] = ()
     if origin == "designed":
         tell(f"{label}: largest sampling time", 0.0)
-        step = largest_sampling_time(design.fault, design.controller, bound)
+        step = largest_sampling_time(design.fault, design.controller, bound) if continuous else None
         tell(f"{label}: feed-forward", 0.0)
         variants = design.feedforward_variants()
     return Entry(label=label, origin=origin, design=judged, run=run, largest_step=step, variants=variants)
-
-
-def samples(fault: Fault, most: int = 2000) -> int:
-    """Number of instants to keep of a run, so that the steps between two are a prime number, or one.
-
-    Chatter that repeats after few steps is then met in all its phases; every second thousandth step may meet one alone.
-    """
-    steps = int(fault.reference.operation_time / fault.sampling_time + 1e-6)
-    strides = ((count, -(-steps // count)) for count in range(most, 0, -1))
-    return next((count for count, stride in strides if stride == 1 or _prime(stride)), most)
-
-
-def _prime(number: int) -> bool:
-    return number > 1 and all(number % divisor for divisor in range(2, isqrt(number) + 1))
 
 
 def _lipschitz(design: Design) -> Fraction:
@@ -210,92 +232,3 @@ def _lipschitz(design: Design) -> Fraction:
     if design.certificate is None or design.verdict is not Verdict.PROVED:
         return design.controller.lipschitz_limit
     return certified_lipschitz(design.certificate) * design.controller.scale
-
-
-def headline(entry: Entry) -> str:
-    """One sentence with the verdict and every premise that fails."""
-    design = entry.design
-    if design.controller is None:
-        return f"undecided: {design.details.get('reason', 'no gains with a proof were found')}"
-    verdict = {
-        Verdict.PROVED: "proved in continuous time",
-        Verdict.REFUTED: f"refuted: {design.details.get('reason', 'a counterexample checks in exact arithmetic')}",
-        Verdict.UNDECIDED: f"undecided: {design.details.get('reason', 'no certificate')}",
-    }[design.verdict]
-    parts = [verdict, *_broken(design.premises)]
-    if design.verdict is Verdict.PROVED and all(p.holds for p in design.premises):
-        parts.append("every premise holds")
-    if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
-        parts.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
-    if entry.growth_per_step is not None:
-        stable = "stable" if entry.growth_per_step < 1 else "UNSTABLE"
-        parts.append(f"{stable} at the step used")
-    if entry.peaks:
-        parts.append(peaks_sentence(entry.peaks))
-    if entry.held is not None:
-        parts.append(held_sentence(entry.held))
-    return "; ".join([*parts, *_happened(entry.run)])
-
-
-def domain_sentence(domain: Domain) -> str:
-    """Where the certificate speaks although the control itself moves h, and what limits it."""
-    which = (
-        "certified domain" if domain.feedforward == "none" else f"certified domain, {domain.feedforward} feed-forward"
-    )
-    if domain.level == 0:
-        return f"{which}: empty, because of {domain.limited_by or 'the control itself'} (ERRATA 16)"
-    return (
-        f"{which}: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s; it admits any one of "
-        f"|e1| <= {domain.start_slip_error:.2g} m, |e2| <= {domain.start_slip_rate_error:.2g} m/s, "
-        f"|h(0)| <= {domain.start_perturbation:.2g} m/s² at the start; limited by {domain.limited_by}"
-    )
-
-
-def feedforward_rows(variants: Iterable[Variant]) -> list[tuple[str, ...]]:
-    """One row a feed-forward under `FEEDFORWARD_COLUMNS`."""
-    found = []
-    for variant in variants:
-        ratios = {p.name: p.ratio for p in variant.premises}
-        values = [ratios.get("along_reference"), ratios.get("level_set")]
-        domain = variant.domain
-        values += [domain.slip_error, domain.slip_rate_error] if domain else [None, None]
-        found.append((variant.feedforward.name, *("–" if v is None else f"{v:.2g}" for v in values)))
-    return found
-
-
-FEEDFORWARD_COLUMNS = ("feed-forward", "along_reference", "level_set", "domain |e1| [m]", "domain |e2| [m/s]")
-"""The two premises are ratios required/certified; the gains are the same in every row."""
-
-
-def _happened(run: Trajectory | None) -> list[str]:
-    """Events of a run that leave the model."""
-    found = []
-    if run is not None and "diverged" in run.events:
-        found.append(f"the run diverges at {run.events['diverged']:.4g} s")
-    if run is not None and "opening" in run.events:
-        found.append(f"the fault opens (p >= σ') at {run.events['opening']:.4g} s")
-    if run is not None and run.metrics.reverse_slip_fraction:
-        share = run.metrics.reverse_slip_fraction
-        found.append(f"the slip rate is negative, outside the model, in {100 * share:.3g} % of the steps")
-    return found
-
-
-def _holds(premises: Iterable[Any], name: str) -> bool:
-    return all(p.holds for p in premises if p.name == name)
-
-
-_SAID = {
-    "along_reference": "the reference and the disturbance alone leave the premise on |h'| {:.3g}-fold",
-    "level_set": "a start at an unknown phase of the disturbance is not certified ({:.3g}-fold)",
-    "on_trajectory": "this run leaves the premise on |h'| {:.3g}-fold",
-    "control_coefficient": "β leaves its certified range {:.3g}-fold",
-    "friction_slope": "the friction slope exceeds the certified sector {:.3g}-fold",
-    "constant_reference": "the reference moves, the certificate is about constant ones",
-    "vanishing_disturbance": "the disturbance does not vanish at the equilibrium, so a bounded error remains",
-}
-
-
-def _broken(premises: Iterable[Any]) -> list[str]:
-    return [
-        _SAID[p.name].format(p.ratio) for p in premises if not p.holds and (p.proved or p.name == "along_reference")
-    ]

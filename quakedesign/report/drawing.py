@@ -121,8 +121,15 @@ def band(time: np.ndarray, values: np.ndarray, width: int = 40) -> tuple[np.ndar
 
 
 def runs_of(entries: Iterable["Entry"]) -> "list[tuple[Entry, Trajectory]]":
-    """Entries that have a run, with it."""
-    return [(e, e.run) for e in entries if e.run is not None]
+    """Entries that have a run which did not diverge, with it."""
+    return [(e, e.run) for e in entries if e.run is not None and "diverged" not in e.run.events]
+
+
+def with_diverged(entries: "Iterable[Entry]", note: str = "") -> str:
+    """Note that also names the runs which diverged: their last values would leave no room for all others."""
+    found = [(e.label, e.run.events["diverged"]) for e in entries if e.run and "diverged" in e.run.events]
+    told = [f"{label} diverges at {time:.3g} s and is not drawn" for label, time in found]
+    return "; ".join([*([note] if note else []), *told])
 
 
 def known(values: np.ndarray | None) -> np.ndarray:

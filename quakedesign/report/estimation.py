@@ -1,18 +1,36 @@
 """A law that is told estimates: the sensor, and whether its differentiator can follow."""
 
+import math
+from dataclasses import replace
+
 from quakedesign.certificates.premises import Premise
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.simulation import simulate
 from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.sensing import Differentiator, OutputFeedback, Transducer, joint_condition
+from quakedesign.simulation.sensing import (
+    Averaging,
+    Differentiator,
+    OutputFeedback,
+    SlipStage,
+    Transducer,
+    joint_condition,
+)
 
 WINDOW = 4000
 DEVIATIONS = 4.0  # of normal noise that count as its bound
 
 
-def sensor(step: float, noise: Measurement, bound: float | None, filter_order: int) -> Measurement | OutputFeedback:
+def sensor(
+    step: float,
+    noise: Measurement,
+    bound: float | None,
+    filter_order: int = 0,
+    *,
+    bandwidth: float = math.inf,
+    averaging: int = 1,
+) -> Measurement | OutputFeedback:
     """What a law is told: exact or noisy states, or estimates from the noisy slip.
 
     Parameters
@@ -24,37 +42,45 @@ def sensor(step: float, noise: Measurement, bound: float | None, filter_order: i
         λ_d [m/s²] of a differentiator with n_d = 1; None for none.
     filter_order : int
         n_f of it.
+    bandwidth : float
+        Of the transducer [Hz].
+    averaging : int
+        Number of the latest readings whose mean the differentiator gets.
 
     Raises
     ------
     ParameterError
-        For noise of a slip rate that is not measured, or a filter without a differentiator.
+        For noise of a slip rate that is not measured, or for what belongs to a differentiator without one.
     """
     if bound is None:
-        if filter_order:
-            raise ParameterError("a filter order belongs to a differentiator. Received no bound. Give both or neither.")
+        given = {"filter order": filter_order != 0, "bandwidth": bandwidth != math.inf, "averaging": averaging != 1}
+        for name in (name for name, there in given.items() if there):
+            raise ParameterError(f"the {name} belongs to a differentiator. Received no bound. Give both or neither.")
         return noise
     if noise.rate_noise:
         raise ParameterError(
             "with a differentiator the slip alone is measured. "
             f"Received rate noise {noise.rate_noise:g} m/s. Leave it out."
         )
-    hardware = (Transducer(deviation=noise.slip_noise, seed=noise.seed),) if noise.noisy else ()
+    transducer = Transducer(deviation=noise.slip_noise, bandwidth=bandwidth, seed=noise.seed)
+    stages: list[SlipStage] = [transducer] if transducer.start else []
+    stages += [Averaging(samples=averaging)] if averaging != 1 else []
     differentiator = Differentiator(bound=bound, step=step, order=1, filter_order=filter_order)
-    return OutputFeedback(stages=hardware, differentiator=differentiator)
+    return OutputFeedback(stages=tuple(stages), differentiator=differentiator)
 
 
 def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, *, scheme: str = "explicit") -> Premise:
     """Whether λ_d exceeds what slip and law ask of it, jointly with the sampling period (ERRATA 21).
 
     The largest |x1''| comes from a run with exact states over 4000 sampling periods, n_d must be 1. The condition is
-    sufficient for the differentiator to follow, not necessary for the loop to work.
+    sufficient for the differentiator to follow, not necessary for the loop to work. Where that run diverges, nothing
+    is certified.
     """
     differentiator = seen.differentiator
     noise = max((DEVIATIONS * s.deviation for s in seen.stages if isinstance(s, Transducer)), default=0.0)
-    reached = largest_acceleration(fault, law, scheme=scheme, step=differentiator.step)
+    reached, diverged = largest_acceleration(fault, law, scheme=scheme, step=differentiator.step)
     found = joint_condition(fault, law, differentiator, acceleration=reached, noise=noise)
-    return Premise(
+    premise = Premise(
         name="differentiator",
         required=found.required,
         certified=found.certified,
@@ -63,12 +89,22 @@ def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, 
         note=f"λ_d against |x1''| <= {reached:.3g} m/s² with exact states and what the errors of the estimates, "
         f"{found.slip_error:.2g} m and {found.rate_error:.2g} m/s, add to it through the law",
     )
+    if diverged is None:
+        return premise
+    said = (
+        f"the loop with exact states diverges at {diverged:.4g} s, so that no λ_d is enough; until then {premise.note}"
+    )
+    return replace(premise, certified=0.0, proved=False, note=said)
 
 
-def largest_acceleration(fault: Fault, law: Controller, *, scheme: str, step: float) -> float:
-    """Largest |Δx2|/T_s [m/s²] of the sampled loop with exact states over 4000 sampling periods."""
+def largest_acceleration(fault: Fault, law: Controller, *, scheme: str, step: float) -> tuple[float, float | None]:
+    """Largest |Δx2|/T_s [m/s²] of the sampled loop with exact states over 4000 sampling periods.
+
+    The second entry is the time [s] of its divergence, after which nothing counts, or None.
+    """
     import numpy as np
 
     window = min(WINDOW * step, fault.reference.operation_time)
     run = simulate(fault, law, scheme=scheme, step=step, duration=window, samples=WINDOW)
-    return float(np.max(np.abs(np.diff(run.slip_rate)) / np.diff(run.time)))
+    steps = np.abs(np.diff(run.slip_rate)) / np.diff(run.time)
+    return float(np.max(steps, initial=0.0)), run.events.get("diverged")

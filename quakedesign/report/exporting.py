@@ -21,6 +21,7 @@ def export_answer(
     scheme: str = "explicit",
     differentiator_bound: float | None = None,
     filter_order: int = 0,
+    averaging: int = 1,
     force: bool = False,
 ) -> dict[str, Any]:
     """Export a controller; return its facts, files and, with a differentiator, the premise of that.
@@ -34,6 +35,8 @@ def export_answer(
         λ_d [m/s²] of a differentiator with n_d = 1; the law then is told its estimates.
     filter_order : int
         n_f of it.
+    averaging : int
+        Number of readings whose mean it gets.
 
     Returns
     -------
@@ -45,7 +48,7 @@ def export_answer(
     ParameterError, OutputError
     """
     period = fault.sampling_time if step is None else step
-    seen = sensor(period, EXACT, differentiator_bound, filter_order)
+    seen = sensor(period, EXACT, differentiator_bound, filter_order, averaging=averaging)
     chosen = simulation_scheme(scheme, **({"measurement": seen} if seen.noisy else {}))
     found = export_controller(fault, law, folder, step=step, scheme=chosen, force=force)
     premises = []

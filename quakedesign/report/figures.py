@@ -18,6 +18,7 @@ from quakedesign.report.drawing import (
     runs_of,
     scaled,
     style,
+    with_diverged,
 )
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def errors(comparison: "Comparison") -> Any:
     rate.set_xlabel(f"time [{unit}]")
     made = [run for _, run in runs]
     title = f"{comparison.fault.name}: tracking errors"
-    return finish(drawing, title, made, "largest of 40 kept samples", legend=slip)
+    return finish(drawing, title, made, with_diverged(comparison.entries, "largest of 40 kept samples"), legend=slip)
 
 
 _SHOWN = {
@@ -109,4 +110,4 @@ def metrics(comparison: "Comparison") -> Any:
             axis.set_xlim(right=max(values, default=1) * 1.3 or 1)
     axes[0, 0].invert_yaxis()
     title = f"{comparison.fault.name}: comparison after a quarter of the task"
-    return finish(drawing, title, [run for _, run in settled])
+    return finish(drawing, title, [run for _, run in settled], with_diverged(comparison.entries))

@@ -2,8 +2,6 @@
 
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.certificates import Certificate, certificate_text
 from quakedesign.errors import OutputError
+from quakedesign.output import whole_folder
 from quakedesign.report.comparison import Comparison, Entry
 from quakedesign.report.facts import fault_dict, fault_sentences
 from quakedesign.report.numbers import csv_text, printed, table
@@ -115,18 +114,10 @@ def write_folder(
     prepare(out, force=force)
     found = study_results(study) if study else results(comparison)
     drawn = study.figures() if study else comparison.figures()
-    try:
-        partial = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.absolute().parent))
-        try:
-            _fill(partial, comparison, found, drawn, tell)
-            if study:
-                (partial / "numbers.csv").write_text(csv_text(found["numbers"]), encoding="utf-8")
-            partial.chmod(0o755)
-            _swap(partial, out)
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)
-    except OSError as error:
-        raise OutputError(f"{out} cannot be written: {error.strerror}. Choose another --out.") from None
+    with whole_folder(out) as partial:
+        _fill(partial, comparison, found, drawn, tell)
+        if study:
+            (partial / "numbers.csv").write_text(csv_text(found["numbers"]), encoding="utf-8")
     return found
 
 
@@ -168,13 +159,3 @@ def peak_certificates(entry: Entry) -> dict[str, Certificate]:
     for certificate in found.values():
         certificate.check()
     return found
-
-
-def _swap(partial: Path, out: Path) -> None:
-    if not out.exists():
-        partial.rename(out)
-        return
-    old = Path(tempfile.mkdtemp(prefix=f".{out.name}-old-", dir=out.absolute().parent))
-    out.rename(old / out.name)
-    partial.rename(out)
-    shutil.rmtree(old, ignore_errors=True)

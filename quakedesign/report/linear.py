@@ -18,6 +18,9 @@ def held_sentence(held: Mapping[str, Any]) -> str:
     if held["verdict"] == "undecided":
         return f"undecided if p is held over T_s = {step:.4g} s; {end}"
     course = "any course of the parameters" if held["varying"] == "proved" else "constant parameters"
+    if held["summed"] != "proved":
+        state = {"refuted": "UNSTABLE", "undecided": "undecided"}[held["summed"]]
+        course += f", but {state} with integrals summed from the samples"
     return f"stable if p is held over T_s = {step:.4g} s, proved for {course}; {end}"
 
 
@@ -56,6 +59,6 @@ def verdict_lines(judged: LinearVerdict) -> list[str]:
         f"  optimal for a Q that covers the uncertainty: {optimal} (the printed test: {tests['printed']['verdict']})"
     )
     lines.append(f"  {held_sentence(facts['held'])}")
-    if judged.peaks is not None:
-        lines.append(f"  {peaks_sentence({judged.peaks.disturbance_class: judged.peaks})}")
+    if judged.asked is not None:
+        lines.append(f"  {peaks_sentence({judged.asked: judged.peaks})}")
     return lines

@@ -3,7 +3,13 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.report.comparison import FEEDFORWARD_COLUMNS, domain_sentence, feedforward_rows, headline
+from quakedesign.report.headlines import (
+    FEEDFORWARD_COLUMNS,
+    domain_sentence,
+    feedforward_rows,
+    headline,
+    scheme_sentence,
+)
 from quakedesign.report.tables import COLUMNS, FOOTNOTE, rows
 
 if TYPE_CHECKING:
@@ -24,8 +30,8 @@ img{max-width:100%}code{background:#f3f3f3;padding:0 .2rem}</style></head><body>
 <h2>The fault</h2><ul>{% for line in facts %}<li>{{ line }}</li>{% endfor %}</ul>
 <h2>Comparison</h2>"""
     + _TABLE
-    + """<p>{{ footnote }}. Errors count after a quarter of the task. Scheme <code>continuous</code>: the law is
-evaluated in every Runge–Kutta stage.</p><h2>What is proved, and under which premises</h2>
+    + """<p>{{ footnote }}. Errors count after a quarter of the task. {{ schemes }}.</p>
+<h2>What is proved, and under which premises</h2>
 {% for e in entries %}<h3>{{ e.label }}</h3><p>{{ headline(e) }}.</p>
 <p>Gains: {% for n, v in e.design.gains.items() %}<code>{{ n }} = {{ number(v) }}</code> {% endfor %}</p>
 <table><thead><tr><th>premise</th><th>note</th><th>required</th><th>certified</th><th>ratio</th>
@@ -72,6 +78,7 @@ def page_html(comparison: "Comparison", facts: Iterable[str], figures: Iterable[
             known_columns=FEEDFORWARD_COLUMNS,
             known_rows=feedforward_rows,
             footnote=FOOTNOTE,
+            schemes=scheme_sentence(comparison),
             number=lambda v: f"{float(v):.6g}",
             figures=list(figures),
         )

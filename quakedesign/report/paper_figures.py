@@ -22,6 +22,7 @@ from quakedesign.report.drawing import (
     runs_of,
     scaled,
     style,
+    with_diverged,
 )
 from quakedesign.report.figures import end, figures
 from quakedesign.report.numbers import BARS, BASIS, baseline, relative
@@ -115,7 +116,7 @@ def friction_coefficient(comparison: "Comparison") -> Any:
     axis.set_xlabel(f"time [{unit}]")
     axis.set_ylabel("friction coefficient [-]")
     title = f"{comparison.fault.name}: friction coefficient in closed loop"
-    return finish(drawing, title, [run for _, run in runs], legend=axis)
+    return finish(drawing, title, [run for _, run in runs], with_diverged(comparison.entries), legend=axis)
 
 
 def errors_and_power(comparison: "Comparison") -> Any:
@@ -133,6 +134,7 @@ def errors_and_power(comparison: "Comparison") -> Any:
         drawing,
         f"{comparison.fault.name}: errors and average power, over those of the {basis.label}",
         [run for _, run in runs_of(entry for entry, _ in shown)],
+        with_diverged(comparison.entries),
     )
 
 

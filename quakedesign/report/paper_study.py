@@ -66,6 +66,11 @@ def paper_study(comparison: Comparison, *, progress: Callable[[str, float], None
             tell(f"{entry.label}: close-up", 0.0)
             step = entry.run.provenance["step"]
             close_ups[entry.label] = simulate(
-                fault, entry.design.controller, duration=max(length, step), step=step, samples=int(length / step) + 1
+                fault,
+                entry.design.controller,
+                scheme=entry.run.provenance["scheme"],
+                duration=max(length, step),
+                step=step,
+                samples=int(length / step) + 1,
             )
     return PaperStudy(comparison=comparison, induced=induced, close_ups=close_ups)

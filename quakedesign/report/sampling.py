@@ -2,18 +2,18 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.premises import Premise, certified_lipschitz
+from quakedesign.certificates.premises import Premise
 from quakedesign.controllers import Controller, SlidingMode, published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
+from quakedesign.report.on_trajectory import certified_bound, trajectory_premise
 from quakedesign.simulation import Study, Trajectory, accuracy, gain_sensitivity, noise_sensitivity, simulate
 from quakedesign.simulation.sampling_study import QUANTITIES, SCHEMES
 from quakedesign.synthesis import Design
-from quakedesign.synthesis.sampling import on_trajectory
 
 PUBLISHED_SCHEMES = ("continuous", "explicit", "compensated")
 DECADES = 3
@@ -38,8 +38,8 @@ COLUMNS = (
     "on tra- jectory",
 )
 FOOTNOTE = (
-    "On trajectory: largest |Δh/Δt| over what the certificate covers (λ·L̄), or, for gains without one, over what none "
-    "can exceed. Certificates are about continuous time: none covers the errors of a scheme, and the compensated one "
+    "On trajectory: largest |Δh/Δt| over what the certificate covers (λ·L̄); a dash stands for gains without one here. "
+    "Certificates are about continuous time: none covers the errors of a scheme, and the compensated one "
     "has an estimate in place of the law's integral state."
 )
 Tell = Callable[[str, float], None]
@@ -59,7 +59,8 @@ class Row:
     scheme : str
     run : Trajectory
     premise : Premise or None
-        |h'| on the trajectory, for a sliding mode that did not diverge.
+        |h'| on the trajectory, for a sliding mode that did not diverge; nothing is certified of gains that come without
+        a certificate.
     """
 
     label: str
@@ -140,7 +141,7 @@ def sampling_report(
     ----------
     fault : Fault
     law : Controller or Design
-        Of a design the certified bound on |h'| is known; of other gains the limit that no certificate exceeds.
+        Of a design the certified bound on |h'| is known.
     scales : sequence of str
         Further λ, exact, with which the base gains of a sliding mode are run; its certificate holds for every λ.
     schemes : sequence of str
@@ -164,14 +165,14 @@ def sampling_report(
     controller = law.controller if isinstance(law, Design) else law
     if controller is None:
         raise ParameterError(f"a law to sample needs gains. Received a design for {fault.name} without. Give gains.")
-    limit = _limit(controller, design)
+    bound = certified_bound(design)
     entries: list[tuple[str, Controller, tuple[str, ...]]]
     entries = [
         ("designed" if design else "given", variant, tuple(schemes)) for variant in _variants(controller, scales)
     ]
     entries += [("published", known, PUBLISHED_SCHEMES) for known in published(fault.name).values()]
     found = [
-        _row(fault, origin, variant, scheme, limit if origin != "published" else None, duration, tell)
+        _row(fault, origin, variant, scheme, bound if origin != "published" else None, duration, tell)
         for origin, variant, chosen in entries
         for scheme in chosen
     ]
@@ -187,21 +188,12 @@ def _variants(controller: Controller, scales: Sequence[str]) -> list[Controller]
     return [controller, *(controller.scaled(rational(scale, "scale")) for scale in scales)]
 
 
-def _limit(controller: Controller, design: Design | None) -> float | None:
-    """Bound on |h'| for λ = 1 [m/s³]: certified, or the limit that no certificate exceeds; None for a linear law."""
-    if not isinstance(controller, SlidingMode):
-        return None
-    if design is not None and design.certificate is not None and design.verdict is Verdict.PROVED:
-        return float(certified_lipschitz(design.certificate))
-    return float(controller.lipschitz_limit / controller.scale)
-
-
 def _row(
     fault: Fault,
     origin: str,
     law: Controller,
     scheme: str,
-    limit: float | None,
+    bound: Fraction | None,
     duration: float | None,
     tell: Tell,
 ) -> Row:
@@ -211,8 +203,7 @@ def _row(
     run = simulate(fault, law, scheme=scheme, duration=duration, samples=1000, progress=lambda done: tell(said, done))
     premise = None
     if isinstance(law, SlidingMode):
-        bound = float(law.lipschitz_limit) if limit is None else limit * float(law.scale)
-        premise = on_trajectory(law, bound, run)
+        premise = trajectory_premise(law, None if bound is None else float(bound * law.scale), run)
     return Row(label=label, origin=origin, controller=law, scheme=scheme, run=run, premise=premise)
 
 

@@ -1,6 +1,8 @@
 """One run of one controller, as the command line asks for it."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates.premises import Premise, least_authority
@@ -8,20 +10,43 @@ from quakedesign.controllers import Controller, SlidingMode, control_law, publis
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Fault
-from quakedesign.report.estimation import differentiator_premise, sensor
-from quakedesign.simulation import Load, Trajectory, natural_earthquake
+from quakedesign.report.estimation import differentiator_premise
+from quakedesign.report.on_trajectory import certified_bound, trajectory_premise
+from quakedesign.simulation import Actuator, Load, Trajectory, natural_earthquake
 from quakedesign.simulation import simulate as run_loop
+from quakedesign.simulation.actuators import DIRECT
 from quakedesign.simulation.measurement import EXACT, Measurement
-from quakedesign.simulation.sensing import OutputFeedback
+from quakedesign.simulation.sensing import OutputFeedback, Sensor
 from quakedesign.synthesis import design
-from quakedesign.synthesis.sampling import on_trajectory
 
 PUBLISHED, DESIGNED = ("published",), ("designed",)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """Controller, and what is certified of it without asking a solver.
+
+    Attributes
+    ----------
+    controller : Controller
+    lipschitz : Fraction or None
+        Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law.
+    """
+
+    controller: Controller
+    lipschitz: Fraction | None = None
 
 
 def chosen_controller(
     fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
 ) -> Controller:
+    """Controller of a `choice`, which see."""
+    return choice(fault, name, gains, scale=scale, feedforward=feedforward).controller
+
+
+def choice(
+    fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
+) -> Choice:
     """Controller from a law's name and ``("published",)``, ``("designed",)`` or exact gains.
 
     Parameters
@@ -38,13 +63,17 @@ def chosen_controller(
     ------
     UnknownNameError, ParameterError
     """
-    law = _with_gains(fault, name, gains)
-    if scale is None and feedforward == "none":
-        return law
+    law, base = _with_gains(fault, name, gains)
     if not isinstance(law, SlidingMode):
+        if scale is None and feedforward == "none":
+            return Choice(controller=law)
         raise ParameterError(f"a scale and a feed-forward belong to a sliding mode. Received {name}. Leave them out.")
     scaled = law if scale is None else law.scaled(_rational(scale))
-    return scaled.with_feedforward(feed_forward(feedforward, fault, scaled.divisor))
+    known = feed_forward(feedforward, fault, scaled.divisor)
+    return Choice(
+        controller=law if scaled is law and feedforward == "none" else scaled.with_feedforward(known),
+        lipschitz=None if base is None else base * scaled.scale,
+    )
 
 
 def _rational(scale: str) -> Any:
@@ -53,7 +82,8 @@ def _rational(scale: str) -> Any:
     return rational(scale, "scale")
 
 
-def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> Controller:
+def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> tuple[Controller, Fraction | None]:
+    """Law, and the bound on |h'| that is certified for λ = 1."""
     law = control_law(name)
     if gains == PUBLISHED:
         known = published(fault.name)
@@ -61,27 +91,26 @@ def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> Controller:
             raise UnknownNameError(
                 f"published gains exist for real-fault and lab-fault. Received {fault.name!r}. Give --gains."
             )
-        return known[name]
+        return known[name], None
     if gains == DESIGNED:
-        found = design(fault, name).controller
-        if found is None:
+        found = design(fault, name)
+        if found.controller is None:
             raise ParameterError(f"no gains with a proof were found for {name} on {fault.name}. Give --gains.")
-        return found
+        return found.controller, certified_bound(found)
     if issubclass(law, SlidingMode):
-        return law.from_values(gains, divisor=least_authority(fault))
-    return law.from_values(gains)
+        return law.from_values(gains, divisor=least_authority(fault)), None
+    return law.from_values(gains), None
 
 
 def run_single(
     fault: Fault,
-    law: Controller | None,
+    law: Controller | Choice | None,
     *,
     tell: Callable[[float], None],
     duration: float | None = None,
     load: Load | None = None,
-    noise: Measurement = EXACT,
-    differentiator_bound: float | None = None,
-    filter_order: int = 0,
+    noise: Measurement | Sensor = EXACT,
+    actuator: Actuator = DIRECT,
     **settings: Any,
 ) -> tuple[Trajectory, list[Premise]]:
     """Run a loop, and say which premises hold that a run decides.
@@ -89,19 +118,18 @@ def run_single(
     Parameters
     ----------
     fault : Fault
-    law : Controller or None
-        None with a duration: the fault under its own disturbance. None without: the natural earthquake.
+    law : Controller, Choice or None
+        Of a choice it is known what is certified. None with a duration: the fault under its own disturbance. None
+        without: the natural earthquake.
     tell : callable
         Progress.
     duration : float, optional
         [s]; the operation time unless given.
     load : Load, optional
-    noise : Measurement
-        Of what the law is told.
-    differentiator_bound : float, optional
-        λ_d [m/s²]: the law is told what a differentiator with n_d = 1 (ERRATA 21) estimates from the slip alone.
-    filter_order : int
-        n_f of it.
+    noise : Measurement or Sensor
+        What the law is told.
+    actuator : Actuator
+        What lies between law and fault.
     **settings
         ``step, scheme, method, plant, substeps`` of `quakedesign.simulation.simulate`.
 
@@ -109,34 +137,40 @@ def run_single(
     -------
     Trajectory
     list of Premise
-        `on_trajectory` of a sliding mode against the limit of its gains, and `differentiator`.
+        `on_trajectory` of a sliding mode, certified or not, and `differentiator`.
 
     Raises
     ------
     UnknownNameError, ParameterError
     """
+    around: dict[str, Any] = {"measurement": noise} if noise.noisy else {}
+    around |= {"actuator": actuator} if actuator.stages else {}
     if law is None and duration is None:
-        return _natural(fault, settings, load, noise, differentiator_bound), []
-    step = settings.get("step") or fault.sampling_time
-    seen = sensor(step, noise, differentiator_bound, filter_order)
-    told: dict[str, Any] = {"measurement": seen} if seen.noisy else {}
-    run = run_loop(fault, law, duration=duration, load=load, progress=tell, **settings, **told)
-    if law is None:
+        return _natural(fault, settings, around | ({"load": load} if load else {})), []
+    known = law if isinstance(law, Choice) or law is None else Choice(controller=law)
+    own = known.controller if known else None
+    run = run_loop(fault, own, duration=duration, load=load, progress=tell, **settings, **around)
+    if known is None:
         return run, []
-    found = [on_trajectory(law, float(law.lipschitz_limit), run)] if isinstance(law, SlidingMode) else []
+    return run, _premises(fault, known, run, noise, settings["scheme"])
+
+
+def _premises(fault: Fault, known: Choice, run: Trajectory, seen: Measurement | Sensor, scheme: str) -> list[Premise]:
+    """Premises that a run decides, or a differentiator needs."""
+    law, bound = known.controller, known.lipschitz
+    found: list[Premise | None] = []
+    if isinstance(law, SlidingMode):
+        found.append(trajectory_premise(law, None if bound is None else float(bound), run))
     if isinstance(seen, OutputFeedback):
-        found.append(differentiator_premise(fault, law, seen, scheme=settings["scheme"]))
-    return run, [premise for premise in found if premise is not None]
+        found.append(differentiator_premise(fault, law, seen, scheme=scheme))
+    return [premise for premise in found if premise is not None]
 
 
-def _natural(
-    fault: Fault, settings: dict[str, Any], load: Load | None, noise: Measurement, bound: float | None
-) -> Trajectory:
+def _natural(fault: Fault, settings: dict[str, Any], around: dict[str, Any]) -> Trajectory:
     """Natural earthquake, to which nothing but the plant can be told."""
     usual = {"step": None, "scheme": "continuous", "method": "dormand-prince", "substeps": 1}
     given = [name for name, value in settings.items() if name != "plant" and value != usual[name]]
-    given += ["load"] if load else []
-    given += ["measurement"] if noise.noisy or bound is not None else []
+    given += list(around)
     if given:
         raise ParameterError(
             f"the natural earthquake is run as the fault asks for. Received {', '.join(given)}. "

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 from rich.table import Table
 
-from quakedesign.report.comparison import (
+from quakedesign.report.comparison import Comparison
+from quakedesign.report.facts import fault_sentences
+from quakedesign.report.headlines import (
     FEEDFORWARD_COLUMNS,
-    Comparison,
     domain_sentence,
     feedforward_rows,
     headline,
+    scheme_sentence,
 )
-from quakedesign.report.facts import fault_sentences
 from quakedesign.report.tables import COLUMNS, FOOTNOTE, rows
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
     console.print("\n[bold]closed loop[/bold], errors after a quarter of the task")
     console.print(table, soft_wrap=False)
     console.print(FOOTNOTE, markup=False)
+    console.print(f"{scheme_sentence(comparison)}.", markup=False)
 
 
 def _print_feedforward(entry: "Entry", console: Any) -> None:
@@ -58,9 +60,11 @@ def _print_feedforward(entry: "Entry", console: Any) -> None:
 
 
 def _line(premise: "Premise") -> str:
+    unit = "" if premise.unit == "-" else f" {premise.unit}"
+    if not premise.proved and premise.certified == 0:
+        return f"premise {premise.name}: nothing is certified, required {premise.required:.4g}{unit} ({premise.note})"
     ratio = "nothing is certified" if premise.ratio is None else f"ratio {premise.ratio:.3g}"
     sign = "holds" if premise.holds else "FAILS"
-    unit = "" if premise.unit == "-" else f" {premise.unit}"
     values = f"required {premise.required:.4g}{unit}, certified {premise.certified:.4g}{unit}"
     return f"premise {premise.name} {sign}: {values}, {ratio}"
 
@@ -70,7 +74,7 @@ def print_run(run: "Trajectory", premises: "Sequence[Premise]", console: Any) ->
     console.print(f"[bold]{run.name}[/bold]")
     for name, number in run.metrics.to_dict().items():
         if number is not None:
-            console.print(f"  {name} = {number:.6g} {run.metrics.unit(name)}".rstrip(), markup=False)
+            console.print(f"  {name} = {number + 0.0:.6g} {run.metrics.unit(name)}".rstrip(), markup=False)
     for name, time in run.events.items():
         console.print(f"  {name} first at {time:.6g} s")
     for premise in premises:

@@ -20,7 +20,7 @@ from quakedesign.simulation.integrators import Integrator, integrator, integrato
 from quakedesign.simulation.interop import to_casadi, to_iosystem
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.metrics import Metrics, StickMetrics
+from quakedesign.simulation.metrics import ActuatorMetrics, Metrics, StickMetrics
 from quakedesign.simulation.perturbation import perturbation
 from quakedesign.simulation.run import simulate
 from quakedesign.simulation.sampled_trajectory import SampledTrajectory
@@ -44,6 +44,7 @@ from quakedesign.simulation.variation import Variation
 
 __all__ = [
     "Actuator",
+    "ActuatorMetrics",
     "Averaging",
     "ControllerStep",
     "Delay",

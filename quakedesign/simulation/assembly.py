@@ -52,6 +52,7 @@ def trajectory(
         settled_from=setting.settled_from,
         seconds=ended - began[0],
         sticks=loop.sticks,
+        further=recorder.scheme.described,
     )
     columns = _columns(recorder, kept, signals)
     described = recorder.scheme.described

@@ -1,6 +1,7 @@
 """The figures by which controllers are compared, computed from every step of a run."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -81,8 +82,36 @@ class StickMetrics(Metrics):
     stick_fraction: float | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActuatorMetrics(StickMetrics):
+    """Figures of one run whose pressure reaches the fault through an actuator; extremes of the whole run.
+
+    Attributes
+    ----------
+    max_well_pressure, min_well_pressure : float or None
+        Of the pressure at the well, behind delay, saturation and the like [Pa].
+    max_injected_volume, min_injected_volume : float or None
+        Of the fluid that the rock holds more than before the start, where a stage stores it [m³].
+    max_flow_rate, min_flow_rate : float or None
+        Into the well, negative for withdrawal [m³/s].
+    """
+
+    max_well_pressure: float | None = None
+    min_well_pressure: float | None = None
+    max_injected_volume: float | None = None
+    min_injected_volume: float | None = None
+    max_flow_rate: float | None = None
+    min_flow_rate: float | None = None
+
+
 _UNITS = {
     "stick_fraction": "",
+    "max_well_pressure": "Pa",
+    "min_well_pressure": "Pa",
+    "max_injected_volume": "m^3",
+    "min_injected_volume": "m^3",
+    "max_flow_rate": "m^3/s",
+    "min_flow_rate": "m^3/s",
     "max_slip_error": "m",
     "max_slip_rate_error": "m/s",
     "rms_slip_error": "m",
@@ -117,12 +146,14 @@ def metrics(
     settled_from: float,
     seconds: float,
     sticks: bool = False,
+    further: Iterable[str] = (),
 ) -> Metrics:
-    """Figures from what the loop accumulated; `step` [s] is the length of one step."""
-    kind = StickMetrics if sticks else Metrics
+    """Figures from what the loop accumulated; `step` [s] is the length of one step, `further` are signals beyond p."""
+    signals = list(further)
+    kind = ActuatorMetrics if signals else StickMetrics if sticks else Metrics
     if watched["diverged"] >= 0:
         return kind(settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
-    figures = _whole_run(watched, step) | _settled(watched) if controlled else {}
+    figures = _whole_run(watched, step) | _settled(watched) | _ranges(watched, signals) if controlled else {}
     figures["peak_slip_rate"] = watched["peak_slip_rate"]
     if sticks:
         figures |= _shares(watched)
@@ -136,6 +167,10 @@ def _whole_run(watched: dict[str, float], step: float) -> dict[str, float]:
         "max_pressure": watched["max_pressure"],
         "min_pressure": watched["min_pressure"],
     }
+
+
+def _ranges(watched: dict[str, float], signals: list[str]) -> dict[str, float]:
+    return {name: watched[name] for signal in signals for name in (f"max_{signal}", f"min_{signal}")}
 
 
 def _shares(watched: dict[str, float]) -> dict[str, float]:

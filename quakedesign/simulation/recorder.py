@@ -1,6 +1,7 @@
 """What is watched at every step, inside the compiled loop."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -71,7 +72,13 @@ class Recorder:
     @property
     def _constants(self) -> int:
         """Index of the first factor: numbers of the plant that a run carries along unchanged."""
-        return 2 + self.state_size + len(START)
+        return 2 + self.state_size + len(self.watching)
+
+    @cached_property
+    def watching(self) -> dict[str, float]:
+        """What is accumulated, by name, with its value at the start; with an actuator the extremes of its signals."""
+        extremes = (("max", -math.inf), ("min", math.inf))
+        return START | {f"{side}_{signal}": start for signal in self.scheme.described for side, start in extremes}
 
     def loop_of(self, vector: Any) -> ClosedLoop:
         """Loop whose plant has the factors that the vector carries."""
@@ -80,20 +87,23 @@ class Recorder:
     def start(self, settled_from: float) -> list[float]:
         """Vector at rest at time zero; `settled_from` is a time [s]."""
         state = [*[0.0] * (self.state_size - len(self.memory)), *self.memory.values()]
-        return [0.0, settled_from, *state, *START.values(), *self.loop.factors]
+        return [0.0, settled_from, *state, *self.watching.values(), *self.loop.factors]
 
     def watched(self, vector: Any) -> dict[str, float]:
         """Accumulated values by name."""
-        return dict(zip(START, (float(v) for v in vector[2 + self.state_size : self._constants]), strict=True))
+        values = (float(v) for v in vector[2 + self.state_size : self._constants])
+        return dict(zip(self.watching, values, strict=True))
 
     def observe(self, vector: Any) -> Any:
         """Vector (SX) after its own instant has been watched."""
         import casadi as ca
 
-        parts = [vector[2 + self.state_size + i] for i in range(len(START))]
-        before = dict(zip(START, parts, strict=True))
+        parts = [vector[2 + self.state_size + i] for i in range(len(self.watching))]
+        before = dict(zip(self.watching, parts, strict=True))
         after = self._after(before, vector)
-        return ca.vertcat(vector[: 2 + self.state_size], *(after[name] for name in START), vector[self._constants :])
+        return ca.vertcat(
+            vector[: 2 + self.state_size], *(after[name] for name in self.watching), vector[self._constants :]
+        )
 
     def energy(self, end: Any) -> EnergyBudget:
         """Energy budget of a run from its last vector."""
@@ -120,7 +130,7 @@ class Recorder:
 
     def index(self, name: str) -> int:
         """Place of a watched value in the vector."""
-        return 2 + self.state_size + list(START).index(name)
+        return 2 + self.state_size + list(self.watching).index(name)
 
     def signals(self, vector: Any) -> dict[str, Any]:
         """Every signal of the loop (SX) at the instant of the vector."""
@@ -153,6 +163,7 @@ class Recorder:
             "rest_count": before["rest_count"] + ca.logic_and(settled, self._rests(now)),
             **_pressures(before, now, settled, later),
             **_extremes(before, now, later),
+            **_ranges(before, now, self.scheme.described),
             **{name: before[name] for name in WORKS},
             **self._events(before, now, vector),
         }
@@ -162,7 +173,8 @@ class Recorder:
 
         fine = ca.logic_and(ca.fabs(now["slip"]) <= LARGEST_MOTION, ca.fabs(now["slip_rate"]) <= LARGEST_MOTION)
         bounded = [vector[index] for index in range(4, 2 + self.state_size)]
-        for value in (*bounded, now["pressure"], now["matched_perturbation"]):
+        further = (now[signal] for signal in self.scheme.described)
+        for value in (*bounded, now["pressure"], now["matched_perturbation"], *further):
             fine = ca.logic_and(fine, ca.fabs(value) <= LARGEST_STATE)
         happening = {
             "diverged": ca.logic_not(fine),
@@ -220,3 +232,13 @@ def _extremes(before: dict[str, Any], now: dict[str, Any], later: Any) -> dict[s
         "max_h_change": ca.fmax(before["max_h_change"], change),
         "previous_h": h,
     }
+
+
+def _ranges(before: dict[str, Any], now: dict[str, Any], signals: Iterable[str]) -> dict[str, Any]:
+    import casadi as ca
+
+    found = {}
+    for signal in signals:
+        found[f"max_{signal}"] = ca.fmax(before[f"max_{signal}"], now[signal])
+        found[f"min_{signal}"] = ca.fmin(before[f"min_{signal}"], now[signal])
+    return found

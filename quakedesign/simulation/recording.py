@@ -1,13 +1,12 @@
 """What every run can be handed on as: xarray, pandas, NetCDF."""
 
-import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.errors import OutputError
+from quakedesign.output import write_whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,17 +36,24 @@ class Recording(ABC):
         """Texts and numbers about the run as a whole."""
 
     def to_xarray(self) -> Any:
-        """Return an xarray Dataset over ``time``, with the attributes of the CF conventions."""
+        """Return an xarray Dataset over ``time``, with the attributes of the CF conventions.
+
+        The time [s] is that since the start of the run. It is not marked as CF's axis T, which is for dates: its unit
+        would have to name a day that a simulation does not have. Nothing is missing, so there are no fill values.
+        """
         import xarray as xr
 
         variables = {
             name: ("time", values, {"long_name": title, "units": unit or "1"})
             for name, (values, title, unit) in self.signals().items()
         }
-        time = ("time", self.time, {"long_name": "time since the start of the run", "units": "s", "axis": "T"})
-        version = self.attributes().get("version_quakedesign", "")
-        head = {"Conventions": CONVENTIONS, "title": self.name, "source": f"quakedesign {version}".strip()}
-        return xr.Dataset(variables, coords={"time": time}, attrs=head | dict(self.attributes()))
+        time = ("time", self.time, {"long_name": "time since the start of the run", "units": "s"})
+        source = f"quakedesign {self.attributes().get('version_quakedesign', '')}".strip()
+        head = {"Conventions": CONVENTIONS, "title": self.name, "source": source, "history": f"simulated by {source}"}
+        found = xr.Dataset(variables, coords={"time": time}, attrs=head | dict(self.attributes()))
+        for variable in found.variables.values():
+            variable.encoding["_FillValue"] = None
+        return found
 
     def to_pandas(self) -> Any:
         """Return a pandas DataFrame over the time [s]; the columns carry their units."""
@@ -64,16 +70,7 @@ class Recording(ABC):
         OutputError
             When the file cannot be written.
         """
-        target = Path(path)
-        temporary = None
-        try:
-            with NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}-", delete=False) as handle:
-                temporary = Path(handle.name)
-            self.to_xarray().to_netcdf(temporary, engine="h5netcdf")
-            os.replace(temporary, target)
-        except OSError as error:
-            raise OutputError(f"run cannot be written to {target}: {error.strerror or error}.") from None
-        finally:
-            if temporary:
-                temporary.unlink(missing_ok=True)
+        target, content = Path(path), BytesIO()
+        self.to_xarray().to_netcdf(content, engine="h5netcdf")
+        write_whole(target, content.getvalue())
         return target

@@ -119,20 +119,31 @@ def simulate(
         variation.require_within(fault)
     factors = variation.values if variation else ()
     loop = loop_class(plant)(fault, controller, load=load or Load(), factors=factors)
-    recorder = Recorder(loop, _scheme(scheme, substeps, actuator, measurement), setting.step)
+    recorder = Recorder(loop, sampled_scheme(scheme, substeps, actuator, measurement), setting.step)
     chosen = any_integrator(method)
     if issubclass(chosen, AdaptiveIntegrator):
         return run_adaptive(recorder, setting, chosen, rtol=rtol, progress=progress, checkpoint=checkpoint)
     return run(recorder, setting, chosen, progress=progress, compiled=compiled, checkpoint=checkpoint)
 
 
-def _scheme(
-    scheme: str | Scheme, substeps: int, actuator: Actuator | None, measurement: Measurement | Sensor | None
+def sampled_scheme(
+    scheme: str | Scheme,
+    substeps: int = 1,
+    actuator: Actuator | None = None,
+    measurement: Measurement | Sensor | None = None,
 ) -> Scheme:
-    """Scheme from what `simulate` was given."""
+    """Scheme with what lies around the controller, as `simulate` takes it.
+
+    An actuator without stages and a measurement without noise are none, which every scheme takes.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown name, for settings that the scheme does not have, or that are given beside a scheme.
+    """
     settings: dict[str, Any] = {"substeps": substeps} if substeps != 1 else {}
-    settings |= {"actuator": actuator} if actuator is not None else {}
-    settings |= {"measurement": measurement} if measurement is not None else {}
+    settings |= {"actuator": actuator} if actuator is not None and actuator.stages else {}
+    settings |= {"measurement": measurement} if measurement is not None and measurement.noisy else {}
     if isinstance(scheme, str):
         return simulation_scheme(scheme, **settings)
     if settings:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from quakedesign.simulation.trajectory import Trajectory
 
@@ -28,3 +28,9 @@ class SampledTrajectory(Trajectory):
     def signals(self) -> dict[str, Signal]:
         """Values, long name and SI unit of every signal that this run has, by name."""
         return super().signals() | dict(self.actuation)
+
+    def plot(self) -> Any:
+        """Return a matplotlib Figure of slip, slip rate, pressures, errors, and what the actuator adds."""
+        from quakedesign.simulation.plotting import figure
+
+        return figure(self, self.actuation)

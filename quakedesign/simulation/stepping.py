@@ -11,6 +11,8 @@ from quakedesign.simulation.checkpoint import Checkpoint
 if TYPE_CHECKING:
     import numpy as np
 
+GOLDEN = (5**0.5 - 1) / 2
+
 ProgressReport = Callable[[float], None]
 
 
@@ -64,10 +66,15 @@ def _bound(function: Any, vector: "np.ndarray") -> tuple[Callable[[], None], Any
 
 
 def instants(steps: int, samples: int) -> list[int]:
-    """Step numbers to keep: evenly spaced from 0, at most `samples` intervals, and always the last one."""
+    """Step numbers to keep: one of every stride of equal length, at most `samples` strides, and the first and the last.
+
+    Its place within the stride moves on by the golden section of it (Weyl 1916: such places are evenly distributed).
+    Instants at equal distances would meet chatter, a disturbance or anything else that repeats with their distance, or
+    a divisor of it, in one phase alone, and never show its size.
+    """
     stride = max(1, -(-steps // samples))
-    kept = list(range(0, steps, stride))
-    return [*kept, steps]
+    starts = enumerate(range(stride, steps, stride), start=1)
+    return [0, *(min(start + int(stride * (number * GOLDEN % 1)), steps - 1) for number, start in starts), steps]
 
 
 def march(

@@ -39,6 +39,15 @@ def test_compare_prints_the_keys_of_design_and_writes_nothing(short, capsys, tmp
     assert [p.name for p in tmp_path.iterdir()] == ["short.toml"]
 
 
+def test_designs_are_compared_in_the_scheme_asked_for(short, capsys):
+    code, out, _ = run(capsys, "compare", str(short), "--controller", "elqr", "--scheme", "compensated", "--json")
+    found = json.loads(out)["controllers"]["elqr"]
+    assert code == 0
+    assert found["run"]["scheme"] == "compensated"
+    assert "scheme compensated" in found["headline"]
+    assert found["growth_per_step"] is None
+
+
 def test_figures_writes_one_folder_and_says_what_is_in_it(short, capsys, tmp_path):
     folder = tmp_path / "drawn"
     code, out, err = run(capsys, "figures", str(short), "--controller", "elqr", "--out", str(folder))
@@ -53,7 +62,16 @@ def test_figures_writes_one_folder_and_says_what_is_in_it(short, capsys, tmp_pat
 
 
 @pytest.mark.parametrize("command", ["compare", "figures"])
-@pytest.mark.parametrize("wrong", [("nowhere",), ("lab-fault", "--controller", "pid"), ("lab-fault", "--box", "huge")])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("nowhere",),
+        ("lab-fault", "--controller", "pid"),
+        ("lab-fault", "--box", "huge"),
+        ("lab-fault", "--scheme", "magic"),
+        ("lab-fault", "--published-scheme", "magic"),
+    ],
+)
 def test_bad_input_is_one_line_and_code_two(command, wrong, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, err = run(capsys, command, *wrong)

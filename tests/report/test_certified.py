@@ -9,7 +9,10 @@ from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError
 from quakedesign.report.certified import certified, rounded
 
-KEYS = {"verdict", "lipschitz", "gain_range", "decay", "settling", "limit", "counterexample", "certificate", "seconds"}
+KEYS = {
+    "verdict", "lipschitz", "gain_range", "decay", "settling", "limit", "counterexample", "dual", "certificate",
+    "seconds",
+}  # fmt: skip
 TWISTING = ("super-twisting", ("0.7", "2"))
 
 
@@ -26,9 +29,9 @@ def test_the_largest_bound_is_told_with_what_limits_it_and_the_scale_for_a_large
     answer = certified(*TWISTING, maximize="lipschitz", lipschitz=3)
     facts = answer.facts
     value, beyond = F(facts["lipschitz"]), F(facts["maximized"]["beyond"])
-    assert {"maximized", "degrees", "degree", "scale", "solves", *KEYS} == set(facts)
+    assert {"maximized", "degrees", "degree", "scale", "scale_limit", "solves", *KEYS} == set(facts)
     assert value < beyond <= value * F(10_001, 10_000)
-    assert F(facts["scale"]) == 3 / value
+    assert F(facts["scale"]) == 3 / value > F(facts["scale_limit"]) == F(3, 2)
     assert facts["maximized"]["value"] == facts["lipschitz"]
     assert answer.certificate.loop.uncertain["d"][1] == value
     said = "\n".join(answer.lines)
@@ -61,9 +64,37 @@ def test_what_is_not_proved_is_told_with_what_speaks_against_it():
     assert (refuted.facts["verdict"], refuted.facts["counterexample"]) == ("refuted", "exact")
     undecided = certified("super-twisting", ("0.4", "1.5"), lipschitz=1)
     assert (undecided.facts["verdict"], undecided.facts["counterexample"]) == ("undecided", "simulated")
-    assert "measured, not proved" in undecided.lines[-1]
+    assert "measured, not proved" in undecided.lines[-2]
+    assert undecided.facts["dual"] == [3, 4, 6, 8, 10]
+    assert "an exact dual was found: no even V of degree 3, 4, 6, 8, 10" in undecided.lines[-1]
     never = certified("cta", ("7", "5", "2.3", "2.3"), maximize="lipschitz")
     assert (never.facts["verdict"], never.facts["lipschitz"], never.facts["limit"]) == ("refuted", None, "0")
+
+
+def test_at_the_necessary_limit_nothing_is_searched_for():
+    answer = certified("dia", ("2", "5", "1.44e-4", "0"), lipschitz="1.44e-4")
+    assert (answer.facts["verdict"], answer.facts["limit"], answer.facts["dual"]) == ("undecided", "9/62500", [])
+    assert "the bound is at or beyond that limit" in answer.lines
+    assert answer.lines[-1] == "no exact dual was found"
+
+
+def test_the_necessary_limit_is_rounded_up_as_nothing_is_proved_only_from_there_on():
+    answer = certified("super-twisting", ("1", "1/3"), lipschitz="1/10")
+    assert answer.facts["limit"] == "1/3"
+    assert "from |h'| = 0.333334 on" in answer.lines[1]
+
+
+def test_the_limit_is_told_beside_a_range_as_well():
+    answer = certified("super-twisting", ("1.2", "2"), lipschitz=3, maximize="beta")
+    assert (answer.facts["verdict"], answer.facts["limit"]) == ("refuted", "2")
+
+
+def test_gains_that_no_certificate_can_express_are_undecided_with_the_reason():
+    # k_I4 ≠ 0 needs the root of k_I1, which is irrational
+    for wish in ({"lipschitz": "0.1"}, {"maximize": "lipschitz"}):
+        answer = certified("dia", ("3", "20", "1", "0.1"), **wish)
+        assert answer.verdict is Verdict.UNDECIDED
+        assert "has a parameter with a range, kappa. Choose gains" in answer.lines[-1]
 
 
 @pytest.mark.parametrize(

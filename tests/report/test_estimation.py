@@ -26,6 +26,27 @@ def test_with_a_bound_the_slip_alone_is_measured_by_a_differentiator_of_order_on
     assert sensor(1e-3, EXACT, 10.0, 0).stages == ()
 
 
+def test_hardware_comes_before_averaging():
+    seen = sensor(1e-3, EXACT, 10.0, bandwidth=50.0, averaging=3)
+    assert [type(stage).__name__ for stage in seen.stages] == ["Transducer", "Averaging"]
+    assert (seen.stages[0].bandwidth, seen.stages[1].samples) == (50.0, 3)
+
+
+@pytest.mark.parametrize("more", [{"bandwidth": 50.0}, {"averaging": 3}])
+def test_what_belongs_to_a_differentiator_is_refused_without(more):
+    with pytest.raises(ParameterError, match=f"the {next(iter(more))} belongs to a differentiator"):
+        sensor(1e-3, EXACT, None, **more)
+
+
+def test_where_the_loop_with_exact_states_diverges_nothing_is_certified():
+    """The published e-LQR of the laboratory held over 2 ms (ERRATA 22)."""
+    law = published("lab-fault")["elqr"]
+    found = differentiator_premise(LAB, law, sensor(2e-3, EXACT, 1e6))
+    assert (found.certified, found.ratio, found.holds) == (0, None, False)
+    assert "diverges at" in found.note
+    assert 0 < found.required < float("inf")
+
+
 @pytest.mark.parametrize(
     ("noise", "bound", "order", "said"),
     [
@@ -41,12 +62,14 @@ def test_what_does_not_go_together_is_refused(noise, bound, order, said):
 
 def test_the_acceleration_is_that_of_the_chattering_loop():
     """The published 2-CTA sampled every 0.1 ms jumps by about 3 m/s², see the tests of `joint_condition`."""
-    assert largest_acceleration(LAB, LAW, scheme="explicit", step=1e-4) == pytest.approx(3.0, rel=0.2)
+    reached, diverged = largest_acceleration(LAB, LAW, scheme="explicit", step=1e-4)
+    assert reached == pytest.approx(3.0, rel=0.2)
+    assert diverged is None
 
 
 def test_the_premise_is_the_joint_condition_with_that_acceleration():
     seen = sensor(1e-4, Measurement(slip_noise=1e-7), 100.0, 0)
     found = differentiator_premise(LAB, LAW, seen)
-    reached = largest_acceleration(LAB, LAW, scheme="explicit", step=1e-4)
+    reached, _ = largest_acceleration(LAB, LAW, scheme="explicit", step=1e-4)
     wanted = joint_condition(LAB, LAW, seen.differentiator, acceleration=reached, noise=4e-7)
     assert (found.required, found.certified, found.holds) == (wanted.required, 100.0, wanted.holds)

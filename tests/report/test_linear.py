@@ -6,7 +6,10 @@ import pytest
 
 from quakedesign.report.linear import held_sentence, peaks_sentence
 
-HELD = {"step": 0.184, "verdict": "proved", "varying": "proved", "radius": 0.9, "witness": None, "largest_step": 0.27}
+HELD = {
+    "step": 0.184, "verdict": "proved", "varying": "proved", "summed": "proved", "radius": 0.9, "witness": None,
+    "largest_step": 0.27,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -14,6 +17,7 @@ HELD = {"step": 0.184, "verdict": "proved", "varying": "proved", "radius": 0.9, 
     [
         ({}, "stable if p is held over T_s = 0.184 s, proved for any course of the parameters; every T_s up to 0.27 s"),
         ({"varying": "undecided"}, "proved for constant parameters"),
+        ({"summed": "refuted"}, "any course of the parameters, but UNSTABLE with integrals summed from the samples"),
         (
             {"verdict": "refuted", "witness": [1.4, -0.5, 1.6]},
             "UNSTABLE if p is held over T_s = 0.184 s (at β = 1.4",

@@ -12,7 +12,6 @@ from quakedesign.certificates import Verdict
 from quakedesign.errors import OutputError
 from quakedesign.fault import Reference
 from quakedesign.report import Comparison, Entry
-from quakedesign.report.comparison import samples
 from quakedesign.report.drawing import band, clock, colour, made, scaled
 from quakedesign.report.folder import study_results, write_folder
 from quakedesign.report.numbers import BARS, baseline, csv_text, printed, printed_lines, relative, table
@@ -160,7 +159,7 @@ def test_without_a_linear_law_there_are_no_bars_and_without_runs_no_closed_loop(
     assert set(paper_figures(nothing)) == {"friction-law", "earthquakes", "uncontrolled"}
 
 
-def test_a_run_that_diverged_is_drawn_but_has_no_bar(study):
+def test_a_run_that_diverged_is_named_below_every_figure_in_closed_loop_and_not_drawn(study):
     last = study.comparison.entries[-1]
     empty = Metrics(settled_from=0.5, steps=10, seconds=0.0)
     broken = replace(last, label="broken", run=replace(last.run, metrics=empty, events={"diverged": 1.0}))
@@ -169,6 +168,9 @@ def test_a_run_that_diverged_is_drawn_but_has_no_bar(study):
     labels = [text.get_text() for text in drawn["errors-and-power"].axes[0].get_yticklabels()]
     assert labels == ["2-CTA (published)", "e-LQR (published)"]
     assert table(compared)[-1]["mise_slip_over_elqr"] is None
+    closed = ("states", "pressure", "errors", "metrics", "friction-coefficient", "errors-and-power")
+    assert all("broken diverges at 1 s and is not drawn" in caption(drawn[name]) for name in closed)
+    assert all("broken" not in axis.get_title() for name in closed for axis in drawn[name].axes)
 
 
 def test_the_induced_earthquake_is_larger_faster_and_ends_where_the_statics_say(study):
@@ -192,21 +194,6 @@ def test_close_ups_keep_every_step_of_the_start(study):
     count = len(close.time)
     assert count == int(16 * 2 * np.pi / study.comparison.fault.natural_frequency / 1e-3) + 1
     assert np.array_equal(close.pressure, whole.pressure[:count])
-
-
-@pytest.mark.parametrize("name", ["real-fault", "lab-fault"])
-def test_kept_instants_are_a_prime_number_of_steps_apart(name):
-    from sympy import isprime
-
-    fault = qd.load_fault(name)
-    steps = int(fault.reference.operation_time / fault.sampling_time + 1e-6)
-    kept = samples(fault)
-    assert isprime(-(-steps // kept))
-    assert 1900 < kept <= 2000
-
-
-def test_short_tasks_keep_every_step(study):
-    assert -(-2000 // samples(study.comparison.fault)) == 1
 
 
 def test_a_band_holds_every_value():

@@ -62,12 +62,16 @@ def test_the_folder_and_the_terminal_show_it(report, tmp_path):
     assert all(len(line) <= 80 for line in said.splitlines() if line.startswith(("implicit", "explicit")))
 
 
-def test_a_sliding_mode_is_run_with_other_scales_against_the_bound_times_the_scale():
+def test_gains_without_a_certificate_are_run_with_other_scales_beside_the_limit_times_the_scale():
     """No certificate of a 2-CTA exceeds λ(k3 − k4), ERRATA after row 29; with feed-forward e3 is not ξ1 + h."""
     law = BASE.with_feedforward(feed_forward("nominal", LAB, BASE.divisor))
     found = sampling_report(OWN, law, scales=("1/2",), schemes=("explicit",), duration=0.1)
     assert [float(row.controller.scale) for row in found.rows] == [1, 0.5]
-    assert [row.premise.certified for row in found.rows] == pytest.approx([1.2, 0.6])
+    assert [(row.premise.certified, row.premise.holds, row.premise.ratio) for row in found.rows] == [
+        (0, False, None)
+    ] * 2
+    assert all(f"exceeds {limit} m/s^3" in row.premise.note for row, limit in zip(found.rows, (1.2, 0.6), strict=True))
+    assert {row.cells()[-1] for row in found.rows} == {"–"}
     assert "orders" not in found.studies
 
 

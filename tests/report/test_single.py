@@ -7,8 +7,9 @@ import pytest
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import load_fault
-from quakedesign.report.single import chosen_controller, run_single
-from quakedesign.simulation import Load, Measurement
+from quakedesign.report.estimation import sensor
+from quakedesign.report.single import Choice, choice, chosen_controller, run_single
+from quakedesign.simulation import Actuator, Lag, Load, Measurement
 
 LAB = load_fault("lab-fault")
 USUAL = {"step": None, "scheme": "continuous", "method": "dormand-prince", "plant": "smooth", "substeps": 1}
@@ -16,7 +17,7 @@ BASE = ("7", "5", "2.3", "1.1")
 
 
 def told(law, **more):
-    known = {"duration", "load", "noise", "differentiator_bound", "filter_order"}
+    known = {"duration", "load", "noise", "actuator"}
     rest = {k: v for k, v in more.items() if k not in known}
     return run_single(LAB, law, tell=lambda _: None, **{k: more[k] for k in known & set(more)}, **(USUAL | rest))
 
@@ -46,7 +47,8 @@ def test_designed_gains_are_those_of_the_design(monkeypatch):
 
     law = chosen_controller(LAB, "cta", BASE)
     for found in (law, None):
-        monkeypatch.setattr(single, "design", lambda fault, name, found=found: SimpleNamespace(controller=found))
+        design = SimpleNamespace(controller=found, certificate=None)
+        monkeypatch.setattr(single, "design", lambda fault, name, design=design: design)
         if found is None:
             with pytest.raises(ParameterError, match="no gains with a proof"):
                 chosen_controller(LAB, "cta", ("designed",))
@@ -67,6 +69,7 @@ def test_without_a_law_a_duration_decides_what_is_run():
         ({"step": 1e-3}, "step"),
         ({"load": Load(drift=1.0)}, "load"),
         ({"noise": Measurement(slip_noise=1.0)}, "measurement"),
+        ({"actuator": Actuator(stages=(Lag(time_constant=1.0),))}, "actuator"),
         ({"scheme": "explicit"}, "scheme"),
     ],
 )
@@ -79,7 +82,7 @@ def test_a_differentiator_comes_with_its_premise():
     law = chosen_controller(LAB, "cta", ("published",))
     found = {}
     for bound in (1.0, 1e4):
-        run, premises = told(law, scheme="implicit", duration=0.2, differentiator_bound=bound)
+        run, premises = told(law, scheme="implicit", duration=0.2, noise=sensor(1e-3, Measurement(), bound))
         names = [p.name for p in premises]
         assert names == ["on_trajectory", "differentiator"]
         assert run.provenance["measurement"].startswith("OutputFeedback")
@@ -88,3 +91,37 @@ def test_a_differentiator_comes_with_its_premise():
     assert not found[1.0].holds
     assert found[1e4].holds == (found[1e4].required <= 1e4)
     assert found[1e4].unit == "m/s^2"
+
+
+def test_without_a_certificate_the_premise_on_the_run_says_so():
+    _, (premise,) = told(chosen_controller(LAB, "cta", BASE), duration=0.02)
+    assert (premise.name, premise.certified, premise.ratio, premise.holds) == ("on_trajectory", 0, None, False)
+    assert "no certificate is at hand, and none of these gains exceeds 1.2 m/s^3" in premise.note
+
+
+def test_a_certified_bound_goes_with_the_scale(monkeypatch):
+    """λ multiplies what is certified for λ = 1."""
+    from quakedesign.report import single
+
+    law = chosen_controller(LAB, "cta", BASE)
+    monkeypatch.setattr(single, "design", lambda fault, name: law)
+    monkeypatch.setattr(single, "certified_bound", lambda design: Fraction(9, 10))
+    monkeypatch.setattr(type(law), "controller", property(lambda self: self), raising=False)
+    found = choice(LAB, "cta", ("designed",), scale="1/3", feedforward="nominal")
+    assert (found.controller.scale, found.lipschitz) == (Fraction(1, 3), Fraction(3, 10))
+    _, (premise,) = told(Choice(controller=law, lipschitz=Fraction(10**9)), duration=0.02)
+    assert premise.holds
+    assert premise.ratio == premise.required / 1e9
+
+
+def test_the_bound_of_a_proved_design_is_that_of_its_certificate():
+    from types import SimpleNamespace
+
+    from quakedesign.certificates import Verdict
+    from quakedesign.report.on_trajectory import certified_bound
+
+    law = chosen_controller(LAB, "cta", BASE)
+    design = SimpleNamespace(controller=law, certificate=None, verdict=Verdict.PROVED)
+    assert certified_bound(design) is None
+    assert certified_bound(None) is None
+    assert certified_bound(SimpleNamespace(controller=law, certificate="any", verdict=Verdict.UNDECIDED)) is None

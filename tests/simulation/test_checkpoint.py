@@ -12,7 +12,21 @@ import pytest
 from quakedesign.controllers import published
 from quakedesign.errors import SimulationError
 from quakedesign.fault import load_fault
-from quakedesign.simulation import checkpoint, simulate
+from quakedesign.simulation import (
+    Actuator,
+    Averaging,
+    Delay,
+    Differentiator,
+    Diffusion,
+    Lag,
+    OutputFeedback,
+    Quantisation,
+    RateLimit,
+    Saturation,
+    Transducer,
+    checkpoint,
+    simulate,
+)
 
 REAL = load_fault("real-fault")
 SETTING = {"duration": 4000.0, "samples": 300, "compiled": False}
@@ -46,6 +60,41 @@ def test_a_run_interrupted_thrice_ends_with_the_same_digits(tmp_path, plant):
     assert said[0] > 0.69
     same(whole, resumed)
     assert not path.exists()
+
+
+def test_memories_of_actuator_and_sensors_go_on_too(tmp_path):
+    """Queue of a delay, pump, cells of the rock, noise generator, readings of the mean and differentiator."""
+    stages = (
+        Delay(samples=3),
+        Quantisation(quantum=10.0),
+        Saturation(lowest=0.0, highest=2e7),
+        RateLimit(rate=1e6),
+        Lag(time_constant=1.0),
+        Diffusion.of_time(2.0, storage=1e-4, cells=4),
+    )
+    sensor = OutputFeedback(
+        stages=(Transducer(deviation=1e-7, bandwidth=2.0, seed=5), Averaging(samples=3)),
+        differentiator=Differentiator(bound=1.0, step=REAL.sampling_time, filter_order=1),
+    )
+    around = {"actuator": Actuator(stages=stages), "measurement": sensor, "scheme": "compensated", "substeps": 4}
+    law, path = published("real-fault")["cta"], tmp_path / "run.checkpoint"
+    setting = SETTING | {"duration": 400.0}
+    whole = simulate(REAL, law, **setting, **around)
+    for stop in (0.013, 0.5):
+
+        def interrupt(done, stop=stop):
+            if done >= stop:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            simulate(REAL, law, progress=interrupt, checkpoint=path, **setting, **around)
+    said = []
+    resumed = simulate(REAL, law, progress=said.append, checkpoint=path, **setting, **around)
+    assert said[0] > 0.5
+    same(whole, resumed)
+    assert whole.metrics.max_flow_rate > 0
+    other = around | {"measurement": replace(sensor, stages=(Transducer(deviation=1e-7, bandwidth=2.0, seed=6),))}
+    assert not np.array_equal(simulate(REAL, law, **setting, **other).slip, whole.slip)
 
 
 def test_a_killed_run_goes_on(tmp_path, monkeypatch):

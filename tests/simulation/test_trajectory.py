@@ -1,4 +1,5 @@
 import json
+import os
 
 import numpy as np
 import pint
@@ -9,7 +10,15 @@ from quakedesign.controllers import published
 from quakedesign.errors import OutputError
 from quakedesign.fault import Disturbance, load_fault
 from quakedesign.fault.friction import friction_law
-from quakedesign.simulation import natural_earthquake, simulate, velocity_step
+from quakedesign.simulation import (
+    Actuator,
+    Diffusion,
+    Lag,
+    Saturation,
+    natural_earthquake,
+    simulate,
+    velocity_step,
+)
 from quakedesign.simulation.recording import Recording
 
 LAB = load_fault("lab-fault")
@@ -96,7 +105,7 @@ def test_a_failed_write_leaves_the_old_file(run, tmp_path, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", full)
+    monkeypatch.setattr(os, "replace", full)
     with pytest.raises(OutputError, match="No space"):
         run.save(path)
     assert path.read_bytes() == before
@@ -119,13 +128,16 @@ def test_its_text_shows_figures_not_arrays(run):
 
 
 def test_a_file_follows_the_climate_and_forecast_conventions(run, uncontrolled, tmp_path):
-    """Section 2.6 (Conventions, title, source), 3.1 and 3.2 (units, long_name), 4 (axis); no attribute is an object."""
+    """Sections 2.5.1 (no fill value of a coordinate), 2.6 (Conventions, title, source, history), 3.1 and 3.2 (units,
+    long_name), 4.4 (axis T is for dates); no attribute is an object."""
     for one in (run, uncontrolled):
         with xr.open_dataset(one.save(tmp_path / "run.nc"), engine="h5netcdf") as data:
             assert data.attrs["Conventions"].startswith("CF-1.")
             assert data.attrs["title"] == one.name
             assert data.attrs["source"].startswith("quakedesign")
-            assert data.time.attrs["axis"] == "T"
+            assert "axis" not in data.time.attrs
+            assert not any("_FillValue" in variable.encoding for variable in data.variables.values())
+            assert data.attrs["history"].startswith("simulated by quakedesign")
             assert np.all(np.diff(data.time) > 0)
             for name, variable in data.variables.items():
                 assert {"units", "long_name"} <= set(variable.attrs), name
@@ -133,6 +145,61 @@ def test_a_file_follows_the_climate_and_forecast_conventions(run, uncontrolled, 
                 assert np.all(np.isfinite(variable))
             assert all(isinstance(value, str | int | float | np.number) for value in data.attrs.values())
             assert all(name.isidentifier() for name in (*data.variables, *data.attrs))
+
+
+@pytest.fixture(scope="module")
+def actuated():
+    """Every step kept, so that extremes can be seen."""
+    rock = Diffusion.of_time(0.05, storage=1e-9, cells=4)
+    stages = Saturation(lowest=-2e4, highest=2e4), Lag(time_constant=5e-3), rock
+    law = published("lab-fault")["cta"]
+    actuator = Actuator(stages=stages)
+    return simulate(LAB, law, scheme="explicit", actuator=actuator, substeps=2, duration=2.0, samples=2000)
+
+
+def test_what_an_actuator_adds_is_in_every_export_with_its_unit(actuated, tmp_path):
+    units = {"well_pressure": "Pa", "injected_volume": "m^3", "flow_rate": "m^3/s"}
+    with xr.open_dataset(actuated.save(tmp_path / "run.nc"), engine="h5netcdf") as data:
+        for name, unit in units.items():
+            values = actuated.actuation[name][0]
+            assert data[name].attrs["units"] == unit
+            assert data[name].dims == ("time",)
+            assert np.array_equal(data[name], values)
+            assert np.array_equal(actuated.to_pandas()[f"{name} [{unit}]"], values)
+            pint.UnitRegistry().parse_units(unit)
+        assert "Saturation(lowest=-20000.0, highest=20000.0)" in data.attrs["actuator"]
+        assert json.loads(data.attrs["metrics"])["max_injected_volume"] == actuated.metrics.max_injected_volume
+    assert np.array_equal(actuated.response.inputs.ravel(), actuated.pressure)
+
+
+def test_its_extremes_are_metrics_with_units(actuated):
+    metrics = actuated.metrics
+    for name in ("well_pressure", "injected_volume", "flow_rate"):
+        values, _, unit = actuated.actuation[name]
+        assert getattr(metrics, f"max_{name}") == values.max()
+        assert getattr(metrics, f"min_{name}") == values.min()
+        assert metrics.unit(f"max_{name}") == metrics.unit(f"min_{name}") == unit
+    assert (metrics.max_well_pressure, metrics.min_well_pressure) == (2e4, -2e4)
+    assert 0 < metrics.max_injected_volume <= 1e-9 * 2e4
+
+
+def test_the_flow_rate_is_what_the_volume_grows_by(actuated):
+    """Conservation of fluid; under a held pressure behind a lag the flow is smooth between samples."""
+    volume, flow = (actuated.actuation[name][0] for name in ("injected_volume", "flow_rate"))
+    gained = np.concatenate([[0.0], np.cumsum((flow[1:] + flow[:-1]) / 2 * np.diff(actuated.time))])
+    assert np.max(np.abs(gained - volume)) < 0.02 * np.max(np.abs(volume))
+
+
+def test_the_figure_shows_the_well_and_what_flows(actuated):
+    axes = actuated.plot().axes
+    assert [axis.get_ylabel() for axis in axes[5:]] == ["injected volume [m³]", "injected flow rate [m³/s]"]
+    assert [line.get_label() for line in axes[2].lines] == ["at the well", "fault"]
+    assert actuated.plot().get_suptitle() == actuated.name
+
+
+def test_the_figure_of_a_decimated_run_says_so(run):
+    assert run.plot().get_suptitle() == f"{run.name}\n100 of 2000 steps drawn"
+    assert run.plot_stress().get_suptitle().endswith("100 of 2000 steps drawn")
 
 
 def test_every_unit_can_be_read_by_a_library_of_units(run):

@@ -59,6 +59,11 @@ class FlowStage(Stage):
     def output(self, numbers: Any, memory: list[Any], pressure: Any) -> Any:
         """Pressure [Pa] at the outlet."""
 
+    @property
+    def stores(self) -> bool:
+        """Whether `flows` knows volume and flow rate."""
+        return type(self).flows is not FlowStage.flows
+
     def flows(self, numbers: Any, memory: list[Any], pressure: Any) -> dict[str, Any]:
         """Further signals by the names of `FLOWS`; none unless the stage stores fluid."""
         return {}

@@ -67,7 +67,7 @@ class Actuator:
 
     @property
     def _stores(self) -> list[FlowStage]:
-        return [stage for stage in self.flowing if type(stage).flows is not FlowStage.flows]
+        return [stage for stage in self.flowing if stage.stores]
 
     def require_resolved(self, substep: float) -> None:
         """Refuse a substep [s] that a stage is too fast for.

@@ -34,8 +34,9 @@ class Diffusion(FlowStage):
         L [m], positive.
     diffusivity : float
         D [m²/s], positive.
-    storage : float
+    storage : float or None
         S [m³/Pa], positive: fluid that the whole layer takes up per pressure, its volume times its specific storage.
+        Without it pressures are the same, but volume and flow rate are not known.
     cells : int
         N, 1 … 200.
 
@@ -48,14 +49,27 @@ class Diffusion(FlowStage):
 
     length: float
     diffusivity: float
-    storage: float
+    storage: float | None = None
     cells: int = 16
 
     def __post_init__(self) -> None:
-        require_positive(length=self.length, diffusivity=self.diffusivity, storage=self.storage)
+        require_positive(length=self.length, diffusivity=self.diffusivity)
+        if self.storage is not None:
+            require_positive(storage=self.storage)
         whole = isinstance(self.cells, int) and not isinstance(self.cells, bool)
         if not (whole and 1 <= self.cells <= MOST_CELLS):
             raise ParameterError(f"cells must be a whole number, 1 to {MOST_CELLS}. Received {self.cells!r}.")
+
+    @classmethod
+    def of_time(cls, time: float, *, storage: float | None = None, cells: int = 16) -> "Diffusion":
+        """Layer of which only τ = L²/D [s] is known; it is given the length of 1 m, which changes nothing.
+
+        Raises
+        ------
+        ParameterError
+        """
+        require_positive(time=time)
+        return cls(length=1.0, diffusivity=1.0 / time, storage=storage, cells=cells)
 
     @property
     def time(self) -> float:
@@ -64,8 +78,14 @@ class Diffusion(FlowStage):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """N²/τ [1/s] and S/N [m³/Pa]."""
-        return self.cells**2 / self.time, self.storage / self.cells
+        """N²/τ [1/s], and S/N [m³/Pa] where it is known."""
+        share = () if self.storage is None else (self.storage / self.cells,)
+        return (self.cells**2 / self.time, *share)
+
+    @property
+    def stores(self) -> bool:
+        """See `FlowStage.stores`."""
+        return self.storage is not None
 
     @property
     def start(self) -> tuple[float, ...]:
@@ -88,7 +108,9 @@ class Diffusion(FlowStage):
         return memory[-1]
 
     def flows(self, numbers: Any, memory: list[Any], pressure: Any) -> dict[str, Any]:
-        """Injected volume [m³] and flow rate [m³/s] at the well."""
+        """Injected volume [m³] and flow rate [m³/s] at the well, where the storage is known."""
+        if not self.stores:
+            return {}
         share = numbers[1]
         return {
             "injected_volume": share * sum(memory[1:], start=memory[0]),

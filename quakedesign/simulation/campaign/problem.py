@@ -189,6 +189,7 @@ class Problem:
             settled_from=self.setting.settled_from,
             seconds=0.0,
             sticks=self._watched.loop.sticks,
+            further=self._watched.scheme.described,
         ).to_dict()
         figures = {name: value for name, value in found.items() if value is not None and name not in _NOT_COMPARED}
         return Outcome(figures=figures, events=events(watched))

@@ -1,0 +1,125 @@
+"""Options about what lies around a controller: actuator and sensors, the same for every command that runs one."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cyclopts import Group, Parameter
+
+from quakedesign.cli.shared import (
+    CubicMetresPerPascal,
+    Hertz,
+    Metres,
+    MetresPerSecond,
+    MetresPerSecondSquared,
+    Pascals,
+    PascalsPerSecond,
+    Seconds,
+)
+
+if TYPE_CHECKING:
+    from quakedesign.simulation import Actuator, Measurement, Sensor
+
+_ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
+_SENSORS = Group("Sensors (schemes that sample)")
+
+
+@Parameter(name="*", group=_ACTUATOR)
+@dataclass(frozen=True, kw_only=True)
+class ActuatorOptions:
+    """Stages between law and fault, for schemes that sample.
+
+    Parameters
+    ----------
+    delay
+        Time that the computation takes, a whole number of steps, such as '2 ms'.
+    quantum
+        Resolution of the pressure, such as '1 kPa'.
+    saturation
+        Largest pressure, such as '20 MPa', and largest withdrawal unless that is given.
+    withdrawal
+        Largest decrease of the pressure; 0 for a pump that only injects.
+    rate_limit
+        Fastest change of the pressure, such as '1 MPa/s'.
+    lag
+        Time constant of pump and pipe, such as '1 s'.
+    diffusion
+        L^2/D of the rock between well and fault, such as '60 s'.
+    storage
+        Fluid that this rock takes up per pressure, such as '1e-4 m^3/Pa'; gives injected volume and flow rate.
+    cells
+        Of the model of this rock.
+    """
+
+    delay: Seconds = 0.0
+    quantum: Pascals | None = None
+    saturation: Pascals | None = None
+    withdrawal: Pascals | None = None
+    rate_limit: PascalsPerSecond | None = None
+    lag: Seconds | None = None
+    diffusion: Seconds | None = None
+    storage: CubicMetresPerPascal | None = None
+    cells: int = 16
+
+    def build(self, step: float) -> "Actuator":
+        """Actuator for a sampling period [s]; raises `ParameterError`."""
+        from dataclasses import asdict
+
+        from quakedesign.report.hardware import actuator
+
+        return actuator(step, **asdict(self))
+
+
+@Parameter(name="*", group=_SENSORS)
+@dataclass(frozen=True, kw_only=True)
+class EstimateOptions:
+    """How a controller gets slip and slip rate from readings of the slip alone.
+
+    Parameters
+    ----------
+    averaging
+        Number of the latest readings whose mean the differentiator gets.
+    differentiator_bound
+        λ_d: tell the law what a differentiator estimates from the slip.
+    filter_order
+        Of the differentiator.
+    """
+
+    averaging: int = 1
+    differentiator_bound: MetresPerSecondSquared | None = None
+    filter_order: int = 0
+
+
+@Parameter(name="*", group=_SENSORS)
+@dataclass(frozen=True, kw_only=True)
+class SensorOptions(EstimateOptions):
+    """What a controller is told of slip and slip rate, for schemes that sample.
+
+    Parameters
+    ----------
+    slip_noise
+        Standard deviation of the measured slip, such as '1 um'.
+    rate_noise
+        Standard deviation of the measured slip rate, such as '1 um/s', where it is measured.
+    bandwidth
+        Of the transducer in front of a differentiator, such as '100 Hz'.
+    """
+
+    slip_noise: Metres = 0.0
+    rate_noise: MetresPerSecond = 0.0
+    bandwidth: Hertz | None = None
+
+    def build(self, step: float, seed: int = 0) -> "Measurement | Sensor":
+        """Measurement or sensor for a sampling period [s] and a seed of the noise; raises `ParameterError`."""
+        import math
+
+        from quakedesign.report.estimation import sensor
+        from quakedesign.simulation import Measurement
+
+        return sensor(
+            step,
+            Measurement(slip_noise=self.slip_noise, rate_noise=self.rate_noise, seed=seed),
+            self.differentiator_bound,
+            self.filter_order,
+            bandwidth=math.inf if self.bandwidth is None else self.bandwidth,
+            averaging=self.averaging,
+        )

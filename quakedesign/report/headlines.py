@@ -1,0 +1,122 @@
+"""What is said of a comparison: the verdict of every controller with what breaks it, domains, schemes."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.certificates import Verdict
+from quakedesign.certificates.premises import Domain, Variant
+from quakedesign.report.linear import held_sentence, peaks_sentence
+from quakedesign.simulation import Trajectory
+
+if TYPE_CHECKING:
+    from quakedesign.report.comparison import Comparison, Entry
+
+AS_IN_THE_PAPER = "continuous"
+"""Scheme of the paper's simulations."""
+
+
+def headline(entry: "Entry") -> str:
+    """One sentence with the verdict and every premise that fails."""
+    design = entry.design
+    if design.controller is None:
+        return f"undecided: {design.details.get('reason', 'no gains with a proof were found')}"
+    verdict = {
+        Verdict.PROVED: "proved in continuous time",
+        Verdict.REFUTED: f"refuted: {design.details.get('reason', 'a counterexample checks in exact arithmetic')}",
+        Verdict.UNDECIDED: f"undecided: {design.details.get('reason', 'no certificate')}",
+    }[design.verdict]
+    parts = [verdict, *_broken(design.premises), *_held(entry.run)]
+    if design.verdict is Verdict.PROVED and all(p.holds for p in design.premises):
+        parts.append("every premise holds")
+    if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
+        parts.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
+    if entry.growth_per_step is not None:
+        stable = "stable" if entry.growth_per_step < 1 else "UNSTABLE"
+        parts.append(f"{stable} at the step used")
+    if entry.peaks:
+        parts.append(peaks_sentence(entry.peaks))
+    if entry.held is not None:
+        own = entry.run is None or entry.run.provenance["scheme"] in (AS_IN_THE_PAPER, "explicit")
+        parts.append(held_sentence(entry.held) if own else f"with scheme explicit {held_sentence(entry.held)}")
+    return "; ".join([*parts, *_happened(entry.run)])
+
+
+def domain_sentence(domain: Domain) -> str:
+    """Where the certificate speaks although the control itself moves h, and what limits it."""
+    which = (
+        "certified domain" if domain.feedforward == "none" else f"certified domain, {domain.feedforward} feed-forward"
+    )
+    if domain.level == 0:
+        return f"{which}: empty, because of {domain.limited_by or 'the control itself'} (ERRATA 16)"
+    return (
+        f"{which}: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s; it admits any one of "
+        f"|e1| <= {domain.start_slip_error:.2g} m, |e2| <= {domain.start_slip_rate_error:.2g} m/s, "
+        f"|h(0)| <= {domain.start_perturbation:.2g} m/s² at the start; limited by {domain.limited_by}"
+    )
+
+
+def feedforward_rows(variants: Iterable[Variant]) -> list[tuple[str, ...]]:
+    """One row a feed-forward under `FEEDFORWARD_COLUMNS`."""
+    found = []
+    for variant in variants:
+        ratios = {p.name: p.ratio for p in variant.premises}
+        values = [ratios.get("along_reference"), ratios.get("level_set")]
+        domain = variant.domain
+        values += [domain.slip_error, domain.slip_rate_error] if domain else [None, None]
+        found.append((variant.feedforward.name, *("–" if v is None else f"{v:.2g}" for v in values)))
+    return found
+
+
+FEEDFORWARD_COLUMNS = ("feed-forward", "along_reference", "level_set", "domain |e1| [m]", "domain |e2| [m/s]")
+"""The two premises are ratios required/certified; the gains are the same in every row."""
+
+
+def scheme_sentence(comparison: "Comparison") -> str:
+    """How the pressure of the runs was computed."""
+    names = {o: {e.run.provenance["scheme"] for e in comparison.of(o) if e.run} for o in ("designed", "published")}
+    told = [f"{', '.join(sorted(found))} for {origin} gains" for origin, found in names.items() if found]
+    said = " and ".join(told) or "none"
+    return (
+        f"Scheme {said}; continuous evaluates the law in every Runge–Kutta stage, all others hold p over a step, which "
+        "no certificate of a sliding mode covers"
+    )
+
+
+def _held(run: Trajectory | None) -> list[str]:
+    """What the certificate in continuous time does not cover."""
+    scheme = run.provenance["scheme"] if run else AS_IN_THE_PAPER
+    return [] if scheme == AS_IN_THE_PAPER else [f"in this run p is held over every step, scheme {scheme}"]
+
+
+def _happened(run: Trajectory | None) -> list[str]:
+    """Events of a run that leave the model."""
+    found = []
+    if run is not None and "diverged" in run.events:
+        found.append(f"the run diverges at {run.events['diverged']:.4g} s")
+    if run is not None and "opening" in run.events:
+        found.append(f"the fault opens (p >= σ') at {run.events['opening']:.4g} s")
+    if run is not None and run.metrics.reverse_slip_fraction:
+        share = run.metrics.reverse_slip_fraction
+        found.append(f"the slip rate is negative, outside the model, in {100 * share:.3g} % of the steps")
+    return found
+
+
+def _holds(premises: Iterable[Any], name: str) -> bool:
+    return all(p.holds for p in premises if p.name == name)
+
+
+_SAID = {
+    "along_reference": "the reference and the disturbance alone leave the premise on |h'| {:.3g}-fold",
+    "level_set": "a start at an unknown phase of the disturbance is not certified ({:.3g}-fold)",
+    "on_trajectory": "this run leaves the premise on |h'| {:.3g}-fold",
+    "control_coefficient": "β leaves its certified range {:.3g}-fold",
+    "friction_slope": "the friction slope exceeds the certified sector {:.3g}-fold",
+    "constant_reference": "the reference moves, the certificate is about constant ones",
+    "vanishing_disturbance": "the disturbance does not vanish at the equilibrium, so a bounded error remains",
+}
+
+
+def _broken(premises: Iterable[Any]) -> list[str]:
+    return [
+        _SAID[p.name].format(p.ratio) for p in premises if not p.holds and (p.proved or p.name == "along_reference")
+    ]

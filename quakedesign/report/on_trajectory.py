@@ -1,0 +1,37 @@
+"""The premise that a run itself decides: |h'| along it against what is certified."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+from quakedesign.certificates import Verdict
+from quakedesign.certificates.premises import Premise, certified_lipschitz
+from quakedesign.controllers import SlidingMode
+from quakedesign.simulation import Trajectory
+from quakedesign.synthesis import Design
+from quakedesign.synthesis.sampling import on_trajectory
+
+
+def certified_bound(design: Design | None) -> Fraction | None:
+    """Bound on |h'| for λ = 1 [m/s³] that a design is proved with; None for a linear law, and without a proof."""
+    if design is None or design.certificate is None or not isinstance(design.controller, SlidingMode):
+        return None
+    return certified_lipschitz(design.certificate) if design.verdict is Verdict.PROVED else None
+
+
+def trajectory_premise(law: SlidingMode, lipschitz: float | None, run: Trajectory) -> Premise | None:
+    """Largest |Δh/Δt| of a run against the certified bound; None for a run that diverged.
+
+    Parameters
+    ----------
+    law : SlidingMode
+    lipschitz : float or None
+        Certified bound on |h'| [m/s³]. None where there is no certificate: then nothing is certified, the premise does
+        not hold whatever the run does, and its note names the limit that no certificate of these gains exceeds.
+    run : Trajectory
+    """
+    limit = float(law.lipschitz_limit)
+    found = on_trajectory(law, limit if lipschitz is None else lipschitz, run)
+    if found is None or lipschitz is not None:
+        return found
+    said = f"{found.note}; no certificate is at hand, and none of these gains exceeds {limit:.4g} {found.unit}"
+    return replace(found, certified=0.0, proved=False, note=said)

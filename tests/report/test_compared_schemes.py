@@ -1,0 +1,111 @@
+"""Designs and published gains compared in schemes of one's choice: every row says which, and what diverges is told."""
+
+import io
+import json
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+
+from quakedesign.certificates import Verdict
+from quakedesign.controllers import published
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Reference, load_fault
+from quakedesign.report import compare, comparison, headline
+from quakedesign.report.folder import write_folder
+from quakedesign.report.paper_study import paper_study
+from quakedesign.report.tables import rows
+from quakedesign.report.terminal import print_comparison
+from quakedesign.simulation import simulate
+from quakedesign.synthesis import Design
+
+LAB = load_fault("lab-fault")
+SHORT = replace(LAB, reference=Reference(target_slip=1e-4, operation_time=2.0), sampling_time=2e-3)
+
+
+def undecided(fault, law):
+    """A design of given gains without a proof, which is another test's."""
+    return Design(fault=fault, name=law.name, verdict=Verdict.UNDECIDED, controller=law, certificate=None, premises=())
+
+
+@pytest.fixture(scope="module")
+def compared():
+    """The published 2-CTA and e-LQR play the designed ones too; held over 2 ms the latter diverges (ERRATA 22)."""
+    laws = published("lab-fault")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(comparison, "assess", undecided)
+        patch.setattr(comparison, "published", lambda _: {name: laws[name] for name in ("cta", "elqr")})
+        designs = [undecided(SHORT, laws[name]) for name in ("cta", "elqr")]
+        yield compare(SHORT, designs, scheme="compensated", published_scheme="explicit")
+
+
+def test_every_row_says_its_scheme_and_is_the_run_of_it(compared):
+    labels = [e.label for e in compared.entries]
+    assert labels == [
+        "2-CTA (published, explicit)",
+        "e-LQR (published, explicit)",
+        "2-CTA (designed, compensated)",
+        "e-LQR (designed, compensated)",
+    ]
+    assert [row[0] for row in rows(compared)[1:]] == labels
+    assert [e.to_dict()["run"]["scheme"] for e in compared.entries] == ["explicit"] * 2 + ["compensated"] * 2
+    alone = simulate(SHORT, compared.entries[2].design.controller, scheme="compensated")
+    assert replace(alone.metrics, seconds=0) == replace(compared.entries[2].run.metrics, seconds=0)
+
+
+def test_what_is_only_known_of_the_continuous_scheme_is_not_said_of_others(compared):
+    assert all(e.growth_per_step is None and e.largest_step is None for e in compared.entries)
+    said = {e.label: headline(e) for e in compared.entries}
+    assert all("this run p is held over every step" in text for text in said.values())
+    assert "; UNSTABLE if p is held" in said["e-LQR (published, explicit)"]
+    assert "; with scheme explicit UNSTABLE if p is held" in said["e-LQR (designed, compensated)"]
+
+
+def test_the_best_scheme_makes_the_difference(compared):
+    """Same gains, same step."""
+    explicit, _, best, _ = (e.run.metrics for e in compared.entries)
+    assert best.max_slip_rate_error < explicit.max_slip_rate_error / 30
+
+
+def test_a_divergence_among_them_is_told_and_leaves_no_number_that_is_none(compared, tmp_path):
+    study = paper_study(compared)
+    write_folder(compared, tmp_path / "out", force=False, study=study)
+
+    def refuse(text):
+        raise AssertionError(text)
+
+    found = json.loads((tmp_path / "out" / "results.json").read_text(), parse_constant=refuse)
+    assert found["published"]["elqr"]["events"]["diverged"] > found["published"]["elqr"]["events"]["opening"] > 0
+    assert "the run diverges at" in found["published"]["elqr"]["headline"]
+    assert "the fault opens" in found["published"]["elqr"]["headline"]
+    assert found["numbers"][-1]["max_slip_error_over_elqr"] == 1
+    text = (tmp_path / "out" / "numbers.csv").read_text().lower()
+    assert "nan" not in text
+    assert "inf" not in text
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Scheme compensated for designed gains and explicit for published gains" in page
+    assert {run.provenance["scheme"] for run in study.close_ups.values()} == {"explicit", "compensated"}
+
+
+def test_the_terminal_says_it_within_eighty_columns(compared):
+    out = io.StringIO()
+    print_comparison(compared, Console(file=out, width=80))
+    assert max(map(len, out.getvalue().splitlines())) <= 80
+    assert "compensated for designed gains and explicit for published gains" in " ".join(out.getvalue().split())
+
+
+def test_one_scheme_for_all_stays_out_of_the_labels(compared, monkeypatch):
+    law = published("lab-fault")["cta"]
+    same = compare(SHORT, [undecided(SHORT, law)], with_published=False)
+    assert [e.label for e in same.entries] == ["2-CTA (designed)"]
+    assert "held" not in headline(same.entries[0])
+
+
+@pytest.mark.parametrize("wrong", [{"scheme": "magic"}, {"published_scheme": "magic"}])
+def test_an_unknown_scheme_is_refused_before_the_work_begins(wrong, monkeypatch):
+    monkeypatch.setattr(comparison, "natural_earthquake", None)
+    monkeypatch.setattr(comparison, "synthesise", None)
+    with pytest.raises(ParameterError, match="scheme must be one of"):
+        compare(SHORT, [], **wrong)
+    with pytest.raises(ParameterError, match="scheme must be one of"):
+        comparison.designed_comparison(SHORT, ["cta"], print, **wrong)
