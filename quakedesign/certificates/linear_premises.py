@@ -36,7 +36,8 @@ class Sectors:
     beta : (Fraction, Fraction)
         Range of μN̂/b [-].
     slip : (Fraction, Fraction)
-        Range of s [1/s²]: friction's weakening, spring, growth of the disturbance.
+        Range of s [1/s²]: friction's weakening (and strengthening, unless the law only weakens), spring, growth of the
+        disturbance.
     rate : (Fraction, Fraction)
         Range of w [1/s]: damping, friction's slope in slip rate (ERRATA 10), growth of the disturbance.
     row_bounds : (Fraction, Fraction)
@@ -67,7 +68,8 @@ def sectors(fault: Fault) -> Sectors:
     rate_chord = load * _fraction(law.rate_slope)
     slip_growth, rate_growth = (rational(g) for g in (disturbance.slip_growth, disturbance.rate_growth))
     k, eta = ranges[plant.k_hat], ranges[plant.eta_hat]
-    slip = ((Fraction(0) if positive else -slip_chord) - k[1] + slip_growth, slip_chord - k[0] + slip_growth)
+    one_sided = positive and only_weakens(fault)
+    slip = ((Fraction(0) if one_sided else -slip_chord) - k[1] + slip_growth, slip_chord - k[0] + slip_growth)
     rate = (eta[0] - rate_chord - rate_growth, eta[1] + rate_chord - rate_growth)
     nominal = {name: _fraction(v) for name, v in plant.plant_values(fault).items()}
     return Sectors(
@@ -83,13 +85,28 @@ def sectors(fault: Fault) -> Sectors:
     )
 
 
+def only_weakens(fault: Fault) -> bool:
+    """Whether the friction law is known not to grow with slip, from the sign of its derivative; False when in doubt.
+
+    All friction of the box then shares that: its chords in slip have one sign.
+    """
+    slip, rate = sp.symbols("x v", nonnegative=True)
+    slope = sp.sympify(fault.friction.exact().coefficient(slip, rate)).diff(slip)
+    return bool(slope.replace(sp.Heaviside, lambda *_: sp.Dummy(nonnegative=True)).is_nonpositive)
+
+
+def static_friction(fault: Fault) -> Fraction:
+    """μ* [-], friction at rest where the fault starts, exact or rounded."""
+    return _fraction(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)))
+
+
 def effective_stress(fault: Fault) -> tuple[Fraction, bool]:
     """Rigorous bound on |σ' − p*(r0)| [Pa] for 0 ≤ r0 ≤ target slip, and whether σ' − p* stays positive.
 
     p* balances friction, spring and the disturbance's growth at rest at r0 (ERRATA 8); friction there is anything that
     the box allows.
     """
-    ranges, start = plant_ranges(fault), _sympy(friction_range(fault)[1])
+    ranges, start = plant_ranges(fault), _sympy(static_friction(fault))
     known = {_growth: _sympy(rational(fault.disturbance.slip_growth)), _drift: 0, plant.mu_star: start}
     numerator = sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r)
     target = rational(fault.reference.target_slip)
@@ -158,7 +175,7 @@ def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]
     """p* in symbols, written so that few of them repeat, and their ranges."""
     known = {
         _growth: _sympy(rational(fault.disturbance.slip_growth)),
-        plant.mu_star: _sympy(friction_range(fault)[1]),
+        plant.mu_star: _sympy(static_friction(fault)),
     }
     expression = plant.sigma - sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r) / _mu  # μ once
     ranges = plant_ranges(fault)
@@ -170,8 +187,9 @@ def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]
 
 def _friction_at(fault: Fault, slip: Range) -> Range:
     """Friction at rest at a slip, anywhere between its bounds and its slope bound from the static value."""
-    low, high = friction_range(fault)
-    return max(low, high - _fraction(fault.friction.exact().slip_slope) * slip[1]), high
+    (low, high), start = friction_range(fault), static_friction(fault)
+    most = _fraction(fault.friction.exact().slip_slope) * slip[1]
+    return max(low, start - most), start if only_weakens(fault) else min(high, start + most)
 
 
 def _end(end) -> Fraction:

@@ -21,9 +21,11 @@ from quakedesign.fault import Fault
 from quakedesign.synthesis.designed import Design
 from quakedesign.synthesis.finishing import claims_of, finish
 from quakedesign.synthesis.linear.analysis import unstable_vertex, why_undecided
+from quakedesign.synthesis.linear.lmi import finished_exactly, robust_stability
+from quakedesign.synthesis.linear.matrices import Matrix
 from quakedesign.synthesis.linear.polytope import error_loop
 from quakedesign.synthesis.linear.redesign import sampled_design
-from quakedesign.synthesis.linear.riccati import riccati_design
+from quakedesign.synthesis.linear.riccati import RiccatiDesign, riccati_design
 from quakedesign.synthesis.lyapunov import find_certificate
 from quakedesign.synthesis.quadratic import quadratic_margin
 
@@ -144,12 +146,12 @@ def linear_loop(fault: Fault, controller: Controller) -> Loop:
 
 
 def _design_linear(fault: Fault) -> Design:
-    found = riccati_design(fault)
+    try:
+        found = riccati_design(fault)
+    except ParameterError as error:
+        return _without_gains(fault, str(error))
     loop = linear_loop(fault, found.controller)
-    margin = quadratic_margin(loop, found.lyapunov)
-    claims = claims_of(loop, found.lyapunov, (margin, Fraction(0)))
-    certificate = finish(loop, found.lyapunov, claims) if min(claims.values()) > 0 else None
-    certificate = certificate or find_certificate(loop, 2)
+    certificate = _of_riccati(loop, found) or quadratic_certificate(loop, theta=found.theta)
     details = {
         "R": found.R,
         "poles": [[float(z.real), float(z.imag)] for z in found.E],
@@ -158,22 +160,47 @@ def _design_linear(fault: Fault) -> Design:
     return _judged_linear(fault, found.controller, certificate, details)
 
 
+def _of_riccati(loop: Loop, found: RiccatiDesign) -> Certificate | None:
+    """Certificate with the V of the Riccati equation."""
+    margin = quadratic_margin(loop, found.lyapunov)
+    claims = claims_of(loop, found.lyapunov, (margin, Fraction(0)))
+    return finish(loop, found.lyapunov, claims) if min(claims.values()) > 0 else None
+
+
+def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certificate | None:
+    """Quadratic V for a linear loop: searched in two scalings, then a known one, whose rate is decided exactly.
+
+    Parameters
+    ----------
+    loop : Loop
+    theta : matrix (4 × 4) of Fraction, optional
+        V = xᵀΘx in SI that may be a proof.
+    """
+    found = find_certificate(loop, 2) or robust_stability(loop)
+    return found or (finished_exactly(loop, theta) if theta is not None else None)
+
+
 def _design_held(fault: Fault) -> Design:
     try:
         found = sampled_design(fault)
     except ParameterError as error:
-        return Design(
-            fault=fault,
-            name="elqr",
-            verdict=Verdict.UNDECIDED,
-            controller=None,
-            certificate=None,
-            premises=(),
-            details={"reason": str(error)},
-        )
-    certificate = find_certificate(linear_loop(fault, found.controller), 2)
+        return _without_gains(fault, str(error))
+    certificate = quadratic_certificate(linear_loop(fault, found.controller), theta=found.theta)
     details = {"method": found.method, "held_for": str(found.step)}
     return _judged_linear(fault, found.controller, certificate, details)
+
+
+def _without_gains(fault: Fault, reason: str) -> Design:
+    """Undecided design of an e-LQR for which no gains were found."""
+    return Design(
+        fault=fault,
+        name="elqr",
+        verdict=Verdict.UNDECIDED,
+        controller=None,
+        certificate=None,
+        premises=(),
+        details={"reason": reason},
+    )
 
 
 def _judged_linear(
@@ -197,13 +224,15 @@ def assess(fault: Fault, controller: Controller) -> Design:
     """
     fault.require_memoryless("a verdict on gains")
     if not isinstance(controller, SlidingMode):
-        return _judged_linear(fault, controller, find_certificate(linear_loop(fault, controller), 2), {})
+        return _judged_linear(fault, controller, quadratic_certificate(linear_loop(fault, controller)), {})
     limit = controller.lipschitz_limit / controller.scale
     beta = coefficient_range(fault, controller.divisor)
     for share in _SHARES if limit > 0 else ():
         try:
             certificate = find_certificate(
-                sliding_mode_loop(controller, limit * share, beta), controller.loop_field().degree
+                sliding_mode_loop(controller, limit * share, beta),
+                controller.loop_field().degree,
+                subject=type(controller),
             )
         except (CertificateError, KinkError):
             break
@@ -223,7 +252,7 @@ def _judged(
     return Design(
         fault=fault,
         name=controller.name,
-        verdict=certificate.check() if certificate is not None else Verdict.UNDECIDED,
+        verdict=certificate.check(type(controller)) if certificate is not None else Verdict.UNDECIDED,
         controller=controller,
         certificate=certificate,
         premises=tuple(premises),

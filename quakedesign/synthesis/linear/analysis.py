@@ -8,7 +8,8 @@ from quakedesign.certificates.linear_premises import sectors
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
 from quakedesign.synthesis.linear.frequency import FrequencyFacts, characteristic, frequency_facts, stable_quartic
-from quakedesign.synthesis.linear.lmi import sector_loop
+from quakedesign.synthesis.linear.inverse_optimality import inverse_optimality
+from quakedesign.synthesis.linear.lmi import finished_exactly, sector_loop
 from quakedesign.synthesis.linear.margins import (
     DecayRate,
     GainRange,
@@ -17,8 +18,8 @@ from quakedesign.synthesis.linear.margins import (
     friction_slope_margin,
     gain_range,
 )
-from quakedesign.synthesis.linear.polytope import ErrorLoop, error_loop
-from quakedesign.synthesis.linear.problem import Vertex
+from quakedesign.synthesis.linear.polytope import ErrorLoop, error_loop, polytope_of
+from quakedesign.synthesis.linear.problem import LinearProblem, Vertex
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,12 +85,24 @@ def analysis(fault: Fault, controller: Controller) -> Analysis:
     needed = sectors(fault)
     loop = error_loop(tuple(controller.gains.values()), needed)
     return Analysis(
-        decay=decay_rate(sector_loop(controller, needed)),
+        decay=decay_rate(sector_loop(controller, needed)) or _decay_of_optimal_gains(fault, controller),
         unstable_at=unstable_vertex(loop),
         slope=friction_slope_margin(fault, controller),
         span=gain_range(fault, controller),
         frequency=tuple(frequency_facts(loop, corner) for corner in loop.corners()),
     )
+
+
+def _decay_of_optimal_gains(fault: Fault, controller: Controller) -> DecayRate | None:
+    """What the Riccati equation that K solves proves, where it covers the uncertainty; None where it does not."""
+    found = inverse_optimality(LinearProblem.of(fault), tuple(controller.gains.values()))
+    if found.P is None:
+        return None
+    loop = sector_loop(controller, sectors(fault))
+    certificate = finished_exactly(loop, found.scales.form_outside(found.P))
+    if certificate is None:
+        return None
+    return DecayRate(certified=certificate.claims["rate"], limit=-polytope_of(loop).slowest(), certificate=certificate)
 
 
 def unstable_vertex(loop: ErrorLoop) -> Vertex | None:

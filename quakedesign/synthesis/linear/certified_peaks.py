@@ -21,8 +21,8 @@ from quakedesign.synthesis.linear.polytope import ErrorLoop, error_loop
 CLASSES = ("amplitude", "rate")
 PREMISES = (
     "start at rest: x = 0, integrals 0",
-    "friction: any function of slip and slip rate within the bounds and chord slopes of the box, held at its static "
-    "value for slip < 0",
+    "friction: any function of slip and slip rate within the bounds and chord slopes of the box, growing with slip "
+    "only if the fault's own law does, held at its static value for slip < 0",
     "k, eta, N anywhere in the box but constant",
     "pressure acts at once; limits of the law, if any, lie outside the certified range of p",
     "friction opposes forward motion: the printed plant is continued to negative slip rates (ERRATA 14)",

@@ -60,7 +60,9 @@ def held_facts(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction
     Returns
     -------
     dict
-        ``step``; ``verdict`` for constant parameters anywhere in the box, ``varying`` for any course of them; the
+        ``step``; ``verdict`` for constant parameters anywhere in the box, ``varying`` for any course of them, both with
+        integrals of the slip error at all times; ``summed`` for constant parameters and integrals that are sums of
+        T_s·(sample), as in an explicit sampled law; the
         spectral ``radius`` of a period (largest over the vertices, measured); ``witness`` (β, s, w) of a refutation;
         ``largest_step`` up to which every period is proved for constant parameters, None when the loop is unstable.
     """
@@ -69,6 +71,7 @@ def held_facts(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction
         "step": float(step),
         "verdict": str(held.verdict),
         "varying": str(varying_verdict(problem, gains, step).verdict),
+        "summed": str(hold_verdict(problem, gains, step, integration="euler").verdict),
         "radius": held.radius if isfinite(held.radius) else None,
         "witness": [float(v) for v in held.witness] if held.witness else None,
         "largest_step": float(longest.proved) if longest else None,

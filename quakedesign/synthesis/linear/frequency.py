@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from quakedesign.synthesis.linear.polytope import ErrorLoop
 
@@ -110,7 +109,6 @@ class FrequencyFacts:
 
 def frequency_facts(loop: ErrorLoop, corner: Sequence[Fraction]) -> FrequencyFacts:
     """Margins of L(z) = βb(k2z³ + k1z² + k3z + k4)/(z²(z² + wz − s)) and norms of the closed loop at one vertex."""
-    import control
     import numpy as np
 
     beta, slip, rate = corner
@@ -122,7 +120,7 @@ def frequency_facts(loop: ErrorLoop, corner: Sequence[Fraction]) -> FrequencyFac
     plant = [1.0, float(rate) / pace, -float(slip) / pace**2, 0.0, 0.0]
     grid = np.logspace(-7, 3, 20001)
     z = 1j * grid
-    gains = _crossings(control.tf(feedback, plant))
+    gains = _crossings(feedback, plant)
     denominator = np.polyval([1.0, *scaled], z)
     stable = stable_quartic(*characteristic(loop, beta, slip, rate))
     return FrequencyFacts(
@@ -140,12 +138,17 @@ def frequency_facts(loop: ErrorLoop, corner: Sequence[Fraction]) -> FrequencyFac
     )
 
 
-def _crossings(transfer: Any) -> dict[str, list[float]]:
-    """All factors on the gain, phases [deg] and scaled delays at which −1 is crossed."""
+def _crossings(feedback: Sequence[float], plant: Sequence[float]) -> dict[str, list[float]]:
+    """All factors on the gain, phases [deg] and scaled delays at which −1 is crossed; none without feedback."""
     import control
     import numpy as np
 
-    gain, phase, _, _, at_gain, _ = control.stability_margins(transfer, returnall=True)
+    if not any(feedback):
+        return {"gain": [], "phase": [], "delay": []}
+    above, below = list(feedback), list(plant)
+    while not above[-1] and not below[-1]:  # a gain of an integral is zero: its pole at 0 is not seen
+        above, below = above[:-1], below[:-1]
+    gain, phase, _, _, at_gain, _ = control.stability_margins(control.tf(above, below), returnall=True)
     phases = np.atleast_1d(phase)
     delays = np.deg2rad(np.mod(phases, 360)) / np.atleast_1d(at_gain)
     return {

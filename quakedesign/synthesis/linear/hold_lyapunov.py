@@ -66,7 +66,7 @@ def varying_verdict(problem: LinearProblem, gains: Sequence[Fraction], step: flo
     scales = problem.scales()
     inside, K = problem.nondimensional(scales), scales.gains_inside(gains)
     length = period / scales.time
-    proposal = _propose(inside, K, length)
+    proposal = _propose(inside, K, length) if any(K) else None
     for bits in _BITS if proposal else ():
         P, weight = _rounded(proposal, bits)
         if varying_proof(inside, K, length, P, weight):

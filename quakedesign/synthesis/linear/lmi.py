@@ -5,20 +5,23 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from quakedesign.certificates import Certificate, Loop, loop_of
+from quakedesign.certificates import Certificate, Loop, Verdict, certificate_text, loop_of, parse_certificate
 from quakedesign.certificates.linear_premises import Sectors
+from quakedesign.certificates.obligations import claimed, different
 from quakedesign.controllers.elqr import ExtendedLQR
-from quakedesign.errors import ParameterError
+from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational
 from quakedesign.sos.solve.conic import solve
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.finishing import finish
+from quakedesign.synthesis.linear.peak_certificate import quadratic_witness
 from quakedesign.synthesis.linear.polytope import Polytope, modal_scaling, polytope_of
 from quakedesign.synthesis.quadratic import quadratic_margin
 from quakedesign.synthesis.scales import below
 
 _SHARES = (0.99, 0.9, 0.5, 0.1, 0.01)
 _LEAST_MARGIN = 1e-10
+_DECADES, _GOOD = 13, 0.85
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +111,14 @@ def robust_stability(loop: Loop, *, fastest: bool = False) -> Certificate | None
         return None
     search = CommonQuadratic(polytope)
     proposal = search.fastest() if fastest else search()
-    return finished(loop, proposal) if proposal is not None else None
+    if proposal is None:
+        return None
+    found = finished(loop, proposal)
+    if fastest and (found is None or float(found.claims["rate"]) < -_GOOD * polytope.slowest()):
+        other = search()  # where the fastest V is hard to find or to round, the roundest may do better
+        rounder = finished(loop, other) if other is not None else None
+        found = max(filter(None, (found, rounder)), key=lambda c: c.claims["rate"], default=None)
+    return found
 
 
 def finished(loop: Loop, proposal: Proposal) -> Certificate | None:
@@ -120,6 +130,32 @@ def finished(loop: Loop, proposal: Proposal) -> Certificate | None:
         certificate = finish(loop, lyapunov, claims) if min(claims.values()) > 0 else None
         if certificate is not None:
             return certificate
+    return None
+
+
+def finished_exactly(loop: Loop, theta: Sequence[Sequence[Fraction]]) -> Certificate | None:
+    """Certificate for V = xᵀΘx with the largest decay rate a·10⁻ⁿ, a the slowest pole, that exact forms allow, or None.
+
+    For a V so far from round that floating point cannot tell whether it decreases: witnesses are read off.
+    """
+    lyapunov = tuple(
+        Term(theta[i][i], (), ((left, Fraction(2), "a"),))
+        if i == j
+        else Term(2 * theta[i][j], (), ((left, Fraction(1), "s"), (right, Fraction(1), "s")))
+        for i, left in enumerate(loop.states)
+        for j, right in enumerate(loop.states)
+        if i <= j and theta[i][j]
+    )
+    slowest, positive = -polytope_of(loop).slowest(), quadratic_margin(loop, lyapunov) / 2
+    for n in range(_DECADES) if slowest > 0 and positive > 0 else ():
+        claims = {"positive": positive, "rate": below(slowest / 10**n)}
+        witnesses = {one.name: quadratic_witness(one) for one in different(claimed(loop, lyapunov, claims))}
+        try:
+            found = Certificate(loop=loop, lyapunov=lyapunov, claims=claims, witnesses=witnesses)
+            if found.check() is Verdict.PROVED and parse_certificate(certificate_text(found)) == found:
+                return found
+        except CertificateError:
+            continue
     return None
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -15,6 +15,7 @@ from quakedesign.rationals import rational
 from quakedesign.synthesis.linear.care import METHOD
 from quakedesign.synthesis.linear.hold import held_plant
 from quakedesign.synthesis.linear.hold_lyapunov import VaryingVerdict, varying_verdict
+from quakedesign.synthesis.linear.matrices import Matrix
 from quakedesign.synthesis.linear.problem import LinearProblem, Vertex
 from quakedesign.synthesis.linear.riccati import riccati_design
 from quakedesign.synthesis.linear.sampled import HoldVerdict, hold_verdict, largest_radius
@@ -41,6 +42,8 @@ class SampledDesign:
         For constant parameters.
     varying : VaryingVerdict
         For parameters that vary in time.
+    theta : Matrix or None
+        xᵀΘx in SI of the Riccati equation; None for a discrete design.
     """
 
     controller: ExtendedLQR
@@ -48,6 +51,7 @@ class SampledDesign:
     step: Fraction
     constant: HoldVerdict
     varying: VaryingVerdict
+    theta: Matrix | None = None
 
 
 def sampled_design(fault: Fault, step: float | str | None = None, *, feedback: str = "error") -> SampledDesign:
@@ -75,7 +79,7 @@ def sampled_design(fault: Fault, step: float | str | None = None, *, feedback: s
         found = riccati_design(fault, bandwidth=share / float(period), feedback=feedback)
         verdict = hold_verdict(problem, _values(found.controller), period)
         if verdict.verdict is Verdict.PROVED:
-            kept.append(_finished(problem, found.controller, "continuous", verdict))
+            kept.append(replace(_finished(problem, found.controller, "continuous", verdict), theta=found.theta))
             if kept[-1].varying.verdict is Verdict.PROVED:
                 return kept[-1]
     return kept[0] if kept else discrete_design(fault, period, feedback=feedback)

@@ -1,5 +1,7 @@
 """e-LQR from the Riccati equation with a bound on the uncertainty that the plant can meet (ERRATA 6, 7, 9, 10)."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -7,12 +9,12 @@ from typing import Any
 from quakedesign.controllers import control_law
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.linear.care import solve_care
 from quakedesign.synthesis.linear.matrices import Matrix, outer, times, total
 from quakedesign.synthesis.linear.problem import LinearProblem
 from quakedesign.synthesis.linear.scaled_design import Choice, ScaledDesign, floats, sound_bound
+from quakedesign.synthesis.linear.theorem import decreases
 from quakedesign.synthesis.linear.wishes import Specifications, Weights
 
 BANDWIDTH_TIMES_STEP = 1.5
@@ -62,12 +64,7 @@ class RiccatiDesign:
     @property
     def theta(self) -> Matrix:
         """Matrix (4 × 4) of V in SI, exact."""
-        rows = [[Fraction(0)] * 4 for _ in range(4)]
-        for term in self.lyapunov:
-            places = [_STATES.index(name) for name, *_ in term.factors]
-            i, j = places[0], places[-1]
-            rows[i][j] = rows[j][i] = term.coefficient if i == j else term.coefficient / 2
-        return tuple(tuple(row) for row in rows)
+        return _matrix(self.lyapunov)
 
 
 def riccati_design(
@@ -133,11 +130,12 @@ def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesig
     found = solve_care(task.shifted(), times(1 / weight, outer(unit, unit)), Q)
     inner = [row[1] / weight for row in found.X]
     gains = task.scales.gains_outside(inner)
-    exact = tuple(_decimal(float(g)) for g in gains)
+    lyapunov = _quadratic(task.scales.form_outside(found.X))
+    exact = _rounded_gains(task.outside, gains, _matrix(lyapunov))
     loop = task.inside.loop((Fraction(1), -task.inside.stiffness, task.inside.damping), inner)
     return RiccatiDesign(
         controller=control_law("elqr").from_values(exact, feedback=feedback),  # type: ignore[arg-type]
-        lyapunov=_quadratic(task.scales.form_outside(found.X)),
+        lyapunov=lyapunov,
         K=floats([gains])[0],
         Q=floats(Q),
         R=R,
@@ -156,18 +154,40 @@ def _eigenvalues(matrix: Any) -> Any:
     return np.linalg.eigvals(floats(matrix))
 
 
-def _decimal(value: float) -> Fraction:
-    """Value to ten significant digits, exactly."""
-    return rational(f"{value:.9e}")
+def _rounded_gains(problem: LinearProblem, gains: Sequence[Fraction], theta: Matrix) -> tuple[Fraction, ...]:
+    """Gains to ten significant digits, or to as many more as V needs to decrease over the whole box."""
+    for digits in (10, 17):
+        found = tuple(_decimal(g, digits) for g in gains)
+        if decreases(problem, found, theta):
+            return found
+    return tuple(_decimal(g, 10) for g in gains)
+
+
+def _matrix(lyapunov: Sequence[Term]) -> Matrix:
+    """Matrix (4 × 4) of a quadratic form."""
+    rows = [[Fraction(0)] * 4 for _ in range(4)]
+    for term in lyapunov:
+        places = [_STATES.index(name) for name, *_ in term.factors]
+        i, j = places[0], places[-1]
+        rows[i][j] = rows[j][i] = term.coefficient if i == j else term.coefficient / 2
+    return tuple(tuple(row) for row in rows)
+
+
+def _decimal(value: Fraction, digits: int = 17) -> Fraction:
+    """Value to some significant digits, as a decimal."""
+    if not value:
+        return value
+    unit = Fraction(10) ** (math.floor(math.log10(abs(float(value)))) - digits + 1)
+    return round(value / unit) * unit
 
 
 def _quadratic(matrix: Matrix) -> tuple[Term, ...]:
     """xᵀMx as terms with exact decimals."""
     terms = []
     for i, left in enumerate(_STATES):
-        terms.append(Term(rational(f"{float(matrix[i][i]):.11e}"), (), ((left, Fraction(2), "a"),)))
+        terms.append(Term(_decimal(matrix[i][i]), (), ((left, Fraction(2), "a"),)))
         for j in range(i + 1, 4):
-            value = rational(f"{2 * float(matrix[i][j]):.11e}")
+            value = _decimal(2 * matrix[i][j])
             if value:
                 terms.append(Term(value, (), ((left, Fraction(1), "s"), (_STATES[j], Fraction(1), "s"))))
     return tuple(terms)

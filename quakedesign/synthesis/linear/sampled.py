@@ -22,6 +22,9 @@ from quakedesign.synthesis.linear.hold import (
 from quakedesign.synthesis.linear.problem import LinearProblem, Vertex
 
 Range = tuple[Fraction, Fraction]
+_DOUBLINGS, _CELLS = 24, 4000
+_BITS = (53, 400)
+_SHARES = tuple(Fraction(n, 100) for n in (100, 98, 95, 90, 80, 60, 40, 20, 5))
 CLAIM = "p held over every period, parameters constant anywhere in the box, ball arithmetic on a subdivision of it"
 
 
@@ -148,9 +151,17 @@ class _Task:
         return (Verdict.UNDECIDED if heap else Verdict.PROVED), None, used
 
     def _unstable(self, point: Sequence[Fraction]) -> bool:
-        """Whether a condition is surely violated at a point."""
-        found = self.conditions(tuple((v, v) for v in point))
-        return any(v < 0 for v in found[:5]) or (all(v > 0 for v in found[:5]) and bool(found[5] < 0))
+        """Whether a condition is surely violated at a point, with more digits where the plant grows far in a period."""
+        from flint import ctx
+
+        for bits in _BITS:
+            with ctx.workprec(bits):
+                found = self.conditions(tuple((v, v) for v in point))
+                if any(v < 0 for v in found[:5]):
+                    return True
+                if all(v > 0 for v in found[:5]) and not found[5].contains(0):
+                    return bool(found[5] < 0)
+        return False
 
     def _halves(self, cell: Cell) -> list[Cell]:
         """Halves along the range to which the last condition is most sensitive."""
@@ -194,7 +205,7 @@ class LargestStep:
     proved : Fraction
         Every period in (0, proved] is stable over the whole box [s].
     refuted : Fraction or None
-        A longer one that is not [s].
+        A longer one that is not [s]; None where none was found, up to four million times the fastest pole's time.
     cells : int
         Of the final subdivision over periods and box.
     """
@@ -217,42 +228,50 @@ def largest_step(
     Returns
     -------
     LargestStep or None
-        None when the continuous loop itself is not stable over the box.
+        None when the continuous loop itself is not stable over the box, or no range of periods was proved.
     """
 
     def judged(step: Fraction) -> Verdict:
         return hold_verdict(problem, gains, step, integration=integration).verdict
 
-    high = _first_refuted(problem, gains, judged)
-    if high is None:
-        return None
-    low, refuted = high / 2, high
-    while judged(low) is not Verdict.PROVED:
+    high, verdict = _first_refuted(problem, gains, judged)
+    refuted = high if verdict is Verdict.REFUTED else None
+    low, first = high, high
+    while verdict is not Verdict.PROVED:
         low, high = low / 2, low
-        if low < refuted / 2**12:
+        if low < first / 2**12:
             return None
+        verdict = judged(low)
     while high / low > 1 + tolerance:
         middle = (low + high) / 2
         verdict = judged(middle)
         low, high = (middle, high) if verdict is Verdict.PROVED else (low, middle)
-        refuted = min(refuted, middle) if verdict is Verdict.REFUTED else refuted
-    for _ in range(8):
-        found = hold_verdict(problem, gains, (Fraction(0), low), integration=integration, cells=20000)
+        refuted = middle if verdict is Verdict.REFUTED else refuted
+    return _all_shorter(problem, gains, integration, low, refuted)
+
+
+def _all_shorter(
+    problem: LinearProblem, gains: Sequence[Fraction], integration: str, longest: Fraction, refuted: Fraction | None
+) -> LargestStep | None:
+    """One proof for all periods up to the longest one, or up to a share of it where that takes too many cells."""
+    for share in _SHARES:
+        step = longest * share
+        found = hold_verdict(problem, gains, (Fraction(0), step), integration=integration, cells=_CELLS)
         if found.verdict is Verdict.PROVED:
-            return LargestStep(proved=low, refuted=refuted, cells=found.cells)
-        low *= Fraction(98, 100)
+            return LargestStep(proved=step, refuted=refuted, cells=found.cells)
     return None
 
 
-def _first_refuted(problem: LinearProblem, gains: Sequence[Fraction], judged: Any) -> Fraction | None:
-    """Period that is refuted, twice one that is not, from the fastest pole of the vertices on."""
+def _first_refuted(problem: LinearProblem, gains: Sequence[Fraction], judged: Any) -> tuple[Fraction, Verdict]:
+    """Period that is refuted, twice one that is not, from the fastest pole of the vertices on; or the longest tried."""
     import numpy as np
 
     loops = [np.array([[float(v) for v in row] for row in problem.loop(v, gains)]) for v in problem.vertices()]
     fastest = max(float(np.abs(np.linalg.eigvals(m)).max()) for m in loops)
     step = rational(f"{0.5 / fastest:.3e}")
-    for _ in range(24):
-        if judged(step) is Verdict.REFUTED:
-            return step
+    for _ in range(_DOUBLINGS):
+        verdict = judged(step)
+        if verdict is Verdict.REFUTED:
+            break
         step *= 2
-    return None
+    return (step, verdict) if verdict is Verdict.REFUTED else (step / 2, verdict)

@@ -52,11 +52,27 @@ class ScaledDesign:
         return floats(sound_bound(self.inside.bounds, Fraction(split)))
 
     def solve(self, R: float, split: float | None = None) -> tuple[Any, Any, Any, float]:
-        """K, S, E and the split of W for a weight R; the best split unless one is given."""
+        """K, S, E and the split of W for a weight R; the best split unless one is given.
+
+        Raises
+        ------
+        ParameterError
+            When the time scales of the plant lie too far apart.
+        """
         import control
+        import numpy as np
 
         used = self.best_split(R) if split is None else split
-        found = control.lqr(self.A, self.B, self.Q0 + R * self.bound(used), [[R]], method=METHOD)
+        try:
+            found = control.lqr(self.A, self.B, self.Q0 + R * self.bound(used), [[R]], method=METHOD)
+        except (np.linalg.LinAlgError, ValueError, control.ControlArgument) as error:
+            ranges = self.inside.sectors
+            raise ParameterError(
+                "the Riccati equation of the fault must be solvable in floating point. Received one that is not "
+                f"({error}), with damping {float(max(map(abs, ranges.rate))):.2g} and softening "
+                f"{float(max(map(abs, ranges.slip))):.2g} in units of the natural frequency. Check the units of the "
+                "damping, the shear modulus and the lengths."
+            ) from None
         return (*found, used)
 
     def best_split(self, R: float) -> float:

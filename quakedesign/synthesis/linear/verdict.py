@@ -37,6 +37,8 @@ class LinearVerdict:
         Sampling period [s] that the facts are about.
     peaks : CertifiedPeaks or None
         None when they were not asked for or not found.
+    asked : str or None
+        Class of the disturbance for which peaks were asked for.
     """
 
     fault: Fault
@@ -45,6 +47,7 @@ class LinearVerdict:
     facts: Mapping[str, Any]
     step: Fraction
     peaks: CertifiedPeaks | None
+    asked: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values: exact numbers as texts, measured ones as numbers, SI."""
@@ -125,4 +128,5 @@ def judge(
         analysis=analysis(fault, controller),
         step=period,
         peaks=bounded,
+        asked=peaks,
     )

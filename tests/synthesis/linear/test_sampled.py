@@ -1,17 +1,21 @@
 """Sampled verdicts against the eigenvalues of the sampled loop (ERRATA 22)."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 
 import control
+import mpmath
 import numpy as np
 import pytest
 
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError
+from quakedesign.fault import Disturbance
 from quakedesign.synthesis.linear import matrices as m
 from quakedesign.synthesis.linear.hold_lyapunov import largest_varying_step, varying_proof, varying_verdict
 from quakedesign.synthesis.linear.problem import LinearProblem
+from quakedesign.synthesis.linear.riccati import riccati_design
 from quakedesign.synthesis.linear.sampled import hold_verdict, largest_radius, largest_step
 
 CASES = {"lab-fault": (("1e-3", False), ("0.5e-3", True)), "real-fault": (("0.184", False), ("0.092", True))}
@@ -119,3 +123,38 @@ def test_what_is_proved_holds_for_parameters_and_instants_at_random():
             key[:4, :4], key[1, 4] = A, beta * u
             x = (expm(key * step * rng.uniform(0.4, 0.5)) @ np.append(x, 1.0))[:4]
     assert x @ P @ x < 0.99 * start
+
+
+def test_a_loop_without_a_longest_period_is_proved_as_far_as_it_was_tried():
+    # overdamped a millionfold: no tried period is refuted, which must not read as "no period is proved"
+    fault = qd.load_fault("real-fault")
+    fault = replace(fault, damping=fault.damping * 1e6)
+    problem, gains = LinearProblem.of(fault), tuple(riccati_design(fault).controller.gains.values())
+    found = largest_step(problem, gains)
+    assert found.refuted is None
+    assert found.proved > 10 * F(fault.sampling_time)
+    for step in np.geomspace(1e-3, 1, 12) * float(found.proved):
+        assert largest_radius(problem, gains, step) < 1
+
+
+def test_a_plant_that_grows_far_within_a_period_is_refuted_not_undecided():
+    fault = qd.load_fault("real-fault")
+    fault = fault.with_disturbance(Disturbance(rate_growth=1e3))
+    problem, gains = LinearProblem.of(fault), tuple(riccati_design(fault).controller.gains.values())
+    found = hold_verdict(problem, gains, "0.184")
+    assert found.verdict is Verdict.REFUTED
+    with mpmath.workdps(250):  # independent: det(zI − M) at z = 1 and its sign far out, or a pole beyond the circle
+        M = held(found.witness, problem, gains, mpmath.mpf("0.184"))
+        assert abs(mpmath.det(M)) > 1  # the product of the four poles
+
+
+def held(vertex, problem, gains, step):
+    """Matrix of a period from the exponential of plant and input, at the digits in force."""
+    beta, s, w = (mpmath.mpf(v.numerator) / v.denominator for v in vertex)
+    push = [mpmath.mpf(v.numerator) / v.denominator for v in (problem.sectors.authority * k for k in gains)]
+    chain = mpmath.zeros(5)
+    chain[0, 1], chain[1, 0], chain[1, 1], chain[1, 4], chain[2, 0], chain[3, 2] = 1, s, -w, beta, 1, 1
+    whole = mpmath.expm(chain * step, method="taylor")
+    return mpmath.matrix(4, 4) + mpmath.matrix(
+        [[whole[i, j] - whole[i, 4] * push[j] for j in range(4)] for i in range(4)]
+    )
