@@ -7,6 +7,7 @@ from functools import cache
 import sympy as sp
 
 from quakedesign.certificates.claim import Certificate, require
+from quakedesign.certificates.matched import only_weakens, static_friction
 from quakedesign.certificates.premises import (
     Premise,
     Range,
@@ -83,21 +84,6 @@ def sectors(fault: Fault) -> Sectors:
         ),
         largest_effective_stress=stress,
     )
-
-
-def only_weakens(fault: Fault) -> bool:
-    """Whether the friction law is known not to grow with slip, from the sign of its derivative; False when in doubt.
-
-    All friction of the box then shares that: its chords in slip have one sign.
-    """
-    slip, rate = sp.symbols("x v", nonnegative=True)
-    slope = sp.sympify(fault.friction.exact().coefficient(slip, rate)).diff(slip)
-    return bool(slope.replace(sp.Heaviside, lambda *_: sp.Dummy(nonnegative=True)).is_nonpositive)
-
-
-def static_friction(fault: Fault) -> Fraction:
-    """μ* [-], friction at rest where the fault starts, exact or rounded."""
-    return _fraction(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)))
 
 
 def effective_stress(fault: Fault) -> tuple[Fraction, bool]:

@@ -119,7 +119,7 @@ def _named(h: sp.Expr) -> sp.Expr:
 
 def _with_known(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Expr:
     """Insert μ*, the divisor, the reference, and the growth of the disturbance where its value stands."""
-    static = friction_range(fault)[1]
+    static = static_friction(fault)
     grown = plant.phi_1 * (plant.e1 + plant.r0) + plant.phi_2 * (plant.e2 + plant.r1)
     known = {
         plant.mu_star: sp.Rational(static.numerator, static.denominator),
@@ -145,7 +145,7 @@ def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
     return plant_ranges(fault) | {
         stage: (Fraction(0), Fraction(1)),
         plant.friction_value: friction_range(fault),
-        plant.slip_slope: (-slip_slope, Fraction(0)),
+        plant.slip_slope: (-slip_slope, Fraction(0) if only_weakens(fault) else slip_slope),
         plant.rate_slope: (-rate_slope, rate_slope),
         plant.phi: (-value, value),
         plant.phi_t: (-change, change),
@@ -154,14 +154,29 @@ def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
     }
 
 
+def only_weakens(fault: Fault) -> bool:
+    """Whether the friction law is known not to grow with slip, from the sign of its derivative; False when in doubt.
+
+    All friction of the box then shares that: its chords in slip have one sign.
+    """
+    slip, rate = sp.symbols("x v", nonnegative=True)
+    slope = sp.sympify(fault.friction.exact().coefficient(slip, rate)).diff(slip)
+    return bool(slope.replace(sp.Heaviside, lambda *_: sp.Dummy(nonnegative=True)).is_nonpositive)
+
+
+def static_friction(fault: Fault) -> Fraction:
+    """μ* [-], friction at rest where the fault starts, exact or rounded."""
+    return _fraction(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)))
+
+
 @lru_cache(maxsize=256)
 def largest_matched_rate(
     fault: Fault, divisor: Fraction, errors: Errors, *, pieces: int = 120, feedforward: FeedForward = NONE
 ) -> Fraction:
     """Rigorous bound on |h'| [unit of ν per s] over the uncertainty box, the reference and the disturbance class.
 
-    Friction may be any function that weakens with slip within its bounds and slope bounds. The disturbance may
-    be any function of the preset's amplitude and rate of change.
+    Friction may be any function within its bounds and slope bounds; one that weakens with slip, where its law does. The
+    disturbance may be any function of the preset's amplitude and rate of change.
 
     Parameters
     ----------
@@ -203,7 +218,7 @@ def shares(expression: sp.Expr, box: Mapping[sp.Symbol, Range], kinds: Mapping[s
 
 def initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
     """Bound on |h| at t = 0, x = 0: the disturbance over β, friction at its static value; no feed-forward there."""
-    static, least = friction_range(fault)[1], plant_ranges(fault)[plant.N_hat][0]
+    static, least = static_friction(fault), plant_ranges(fault)[plant.N_hat][0]
     return rational(fault.disturbance.largest_explicit) * divisor / (static * least)
 
 

@@ -8,7 +8,16 @@ import pytest
 import sympy as sp
 
 import quakedesign as qd
-from quakedesign.certificates.linear_premises import only_weakens, rest_pressure, sectors, static_friction
+from quakedesign.certificates.linear_premises import rest_pressure, sectors
+from quakedesign.certificates.matched import (
+    Errors,
+    initial_perturbation,
+    largest_matched_rate,
+    largest_sensitivities,
+    least_authority,
+    only_weakens,
+    static_friction,
+)
 from quakedesign.fault.friction import FrictionLaw, friction_law
 
 REAL = qd.load_fault("real-fault")
@@ -83,3 +92,30 @@ def test_a_design_for_a_hardening_law_is_proved_over_both_signs():
     design = qd.design(hardening(), "elqr")
     assert str(design.verdict) == "proved"
     assert design.certificate.loop.uncertain["s"][0] < -20
+
+
+def test_the_matched_perturbation_of_a_law_that_strengthens_is_covered():
+    # h = (−(μ − μ*)N̂σ' − k̂x1 − η̂x2 + φ − r'')·divisor/(μN̂), with μ* = μ(0, 0) = 0.2 typed in by hand
+    fault = hardening()
+    divisor, N, load = float(least_authority(fault)), fault.authority, fault.effective_normal_stress
+    task, w, stiff, damp = fault.reference, fault.disturbance, fault.specific_stiffness, fault.specific_damping
+    powers = np.polynomial.Polynomial([0, 0, 0, 10, -15, 6])
+
+    def h(t, phase, e1=0.0, e2=0.0):
+        s = t / task.operation_time
+        r, dr, ddr = (powers.deriv(n)(s) * task.target_slip / task.operation_time**n for n in (0, 1, 2))
+        x1, x2 = r + e1, dr + e2
+        mu = 0.2 + 0.3 * (1 - np.exp(-x1 / 0.05))
+        push = w.amplitude * np.sin(w.frequency * t + phase) + w.slip_growth * x1 + w.rate_growth * x2
+        return divisor * (-(mu - 0.2) * N * load - stiff * x1 - damp * x2 + push - ddr) / (mu * N)
+
+    t = np.linspace(1, task.operation_time - 1, 20001)
+    step = 1e-2
+    phases = np.linspace(0, 2 * np.pi, 37)
+    rates = max(np.abs(h(t + step, p) - h(t - step, p)).max() / (2 * step) for p in phases)
+    assert rates <= float(largest_matched_rate(fault, least_authority(fault), Errors(), pieces=400))
+    first, second = (float(v) for v in largest_sensitivities(fault, least_authority(fault), Errors(), pieces=400))
+    small = 1e-7
+    assert max(np.abs(h(t, p, e1=small) - h(t, p, e1=-small)).max() for p in phases) <= 2 * small * first
+    assert max(np.abs(h(t, p, e2=small) - h(t, p, e2=-small)).max() for p in phases) <= 2 * small * second
+    assert float(initial_perturbation(fault, least_authority(fault))) >= w.amplitude * divisor / (0.2 * N) * (1 - 1e-12)
