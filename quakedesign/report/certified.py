@@ -11,12 +11,14 @@ from typing import Any
 from quakedesign.certificates import Certificate, Loop, Verdict
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational
+from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.synthesis.decision import Number, certify, closed_loop
 from quakedesign.synthesis.dual import dual
 from quakedesign.synthesis.lyapunov import candidate_degrees, refute
 from quakedesign.synthesis.questions import Reach, against, largest_gain_range, largest_lipschitz, necessary_limit
 from quakedesign.synthesis.settling import Settling, fastest_settling
 
+_LARGEST_FAMILY = 24  # monomials of V
 MAXIMIZE = ("lipschitz", "beta", "beta-factor", "decay")
 _AGAINST = {
     "exact": "an exact counterexample was found, an equilibrium away from the origin",
@@ -87,7 +89,7 @@ def certified(
         certificate, facts, lines = _answer(name, gains, lipschitz, maximize, (low, high))
     except CertificateError as error:
         bound = None if lipschitz is None else rational(lipschitz, "lipschitz")
-        certificate, facts, lines = None, _facts(bound, (low, high)), [f"not expressible in a certificate: {error}"]
+        certificate, facts, lines = None, _facts(bound, (low, high)), [f"no certificate can be sought: {error}"]
     verdict = _verdict(certificate)
     head = f"{verdict}: {name} {' '.join(map(str, gains))}"
     if facts["lipschitz"] is not None:
@@ -154,8 +156,11 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
 
 
 def _excluded(loop: Loop) -> list[int]:
-    """Degrees of V that an exact dual excludes, from the lowest on and without gaps."""
-    return list(takewhile(lambda degree: dual(loop, degree) is not None, candidate_degrees(loop)))
+    """Degrees of V that an exact dual excludes, from the lowest on and without gaps, families of a few seconds only."""
+    small = (
+        m for m in candidate_degrees(loop) if len(signed_monomials(loop.states, m, loop.domain)) <= _LARGEST_FAMILY
+    )
+    return list(takewhile(lambda degree: dual(loop, degree) is not None, small))
 
 
 def _nothing_lines(certificate: Certificate | None, kind: str, excluded: list[int]) -> list[str]:

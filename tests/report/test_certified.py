@@ -71,6 +71,12 @@ def test_what_is_not_proved_is_told_with_what_speaks_against_it():
     assert (never.facts["verdict"], never.facts["lipschitz"], never.facts["limit"]) == ("refuted", None, "0")
 
 
+def test_gains_too_far_apart_for_floating_point_are_undecided():
+    answer = certified("cta", ("1e-300", "1", "1", "0"), maximize="lipschitz")
+    assert answer.verdict is Verdict.UNDECIDED
+    assert "too far apart for a search in floating point" in answer.lines[-1]
+
+
 def test_at_the_necessary_limit_nothing_is_searched_for():
     answer = certified("dia", ("2", "5", "1.44e-4", "0"), lipschitz="1.44e-4")
     assert (answer.facts["verdict"], answer.facts["limit"], answer.facts["dual"]) == ("undecided", "9/62500", [])
