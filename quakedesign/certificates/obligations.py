@@ -184,8 +184,11 @@ class Obligations:
         """Terms of a lift without those that a zero parameter removes; refused if one has a range."""
         known = self.loop.parameters
         live = tuple(t for t in terms if all(known.get(p, Fraction(1)) for p in t.parameters))
+        vague = [p for t in live for p in t.parameters if p not in values]
         require(
-            all(p in values for t in live for p in t.parameters), "the argument of a lift has a parameter with a range."
+            not vague,
+            f"the argument of a lift has a parameter with a range, {', '.join(vague[:1])}. "
+            "Choose gains that make it one rational number.",
         )
         return live
 

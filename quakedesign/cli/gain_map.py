@@ -75,7 +75,7 @@ def gain_map(
     prepare(folder, force=force)
     if range is not None and len(range) != 4:
         raise ParameterError(f"range needs four numbers, two for each gain. Received {len(range)}.")
-    base = gains or tuple(str(v) for v in family(law)[1][0].gains.values())
+    base = gains or tuple(str(v) for v in family(law)[0].law.gains.values())
     with progress() as tell:
         drawn = mapped(
             law,

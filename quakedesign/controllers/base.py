@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
+from quakedesign.controllers.soundness import require_names, require_roots, sound_field, sound_states
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
 
@@ -56,6 +57,12 @@ class LoopField:
         Symbols that stand for the positive square root of a gain.
     units : mapping of Symbol to Expr
         Error that one unit of a state stands for, where it is not one unit; in gains.
+
+    Raises
+    ------
+    ParameterError
+        For names that are equal or that a certificate file cannot hold, weights that are no integers from 1 to 12,
+        a rate that is missing, inexact or holds an unknown symbol.
     """
 
     states: dict[sp.Symbol, int]
@@ -66,6 +73,14 @@ class LoopField:
     domain: str
     roots: Mapping[sp.Symbol, sp.Symbol] = dataclasses.field(default_factory=dict)
     units: Mapping[sp.Symbol, sp.Expr] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        numbers = (*self.gains, *self.constants)
+        known = (*self.states, *numbers, *self.uncertain, *self.roots)
+        object.__setattr__(self, "states", sound_states(self.states, self.domain))
+        require_names(known)
+        require_roots(self.roots, numbers)
+        object.__setattr__(self, "field", sound_field(self.field, known, self.states))
 
     @property
     def degree(self) -> int:

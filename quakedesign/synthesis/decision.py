@@ -1,12 +1,18 @@
 """The verdict on given gains of any homogeneous law, of the package or of a user's own."""
 
+from collections.abc import Mapping
 from fractions import Fraction
+
+import sympy as sp
 
 from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
 from quakedesign.controllers import LoopField, Subject, law, model_of
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational
-from quakedesign.synthesis.lyapunov import find_certificate, refute
+from quakedesign.sos.solve.joint import Proposal
+from quakedesign.symbolic.terms import Term
+from quakedesign.synthesis.lyapunov import candidate_degrees, find_certificate, finished, refute
+from quakedesign.synthesis.sweep import Sweep
 
 Number = str | float | Fraction
 
@@ -41,16 +47,32 @@ def certify(
     Raises
     ------
     ParameterError
-        For gains or ranges that are no numbers, a range that is empty or not positive, or a law with other uncertainty.
+        For gains or ranges that are no numbers, a range that is empty or not positive, a law with other uncertainty, or
+        one that is not homogeneous in its weights.
+    CertificateError
+        For a law with parts that certificates do not know, such as a squared uncertain parameter.
     UnknownNameError
         For the name of an unknown law.
     """
-    try:
-        loop = closed_loop(subject, gains, lipschitz=lipschitz, gain_range=gain_range)
-        certificate = refute(loop, subject) or find_certificate(loop, subject=subject)
-    except CertificateError:
-        return Verdict.UNDECIDED, None
+    loop = closed_loop(subject, gains, lipschitz=lipschitz, gain_range=gain_range)
+    certificate = refute(loop, subject) or find_certificate(loop, subject=subject) or _swept(loop, subject)
     return (certificate.check(subject), certificate) if certificate else (Verdict.UNDECIDED, None)
+
+
+def _swept(loop: Loop, subject: Subject) -> Certificate | None:
+    """What the search along a line would find here; its V has a fixed mean, which serves better at the edges."""
+    for degree in candidate_degrees(loop):
+        try:
+            sweep = Sweep(loop, degree)
+            answer = sweep.solve(loop)
+        except CertificateError:  # no candidates of this degree, or numbers too far apart
+            continue
+        if answer is not None and answer.found:
+            proposal = Proposal(answer.decision, answer.margin)
+            certificate = finished(loop, sweep.family(answer.frame), proposal, answer.frame.scale, subject)
+            if certificate is not None:
+                return certificate
+    return None
 
 
 def closed_loop(
@@ -67,7 +89,65 @@ def closed_loop(
     """
     name, model = model_of(subject)
     exact = exact_gains(subject, gains)
-    return loop_of(name, model, gains=exact, uncertain=_ranges(name, model, lipschitz, gain_range))
+    if {str(symbol) for symbol in model.gains} != set(exact):
+        raise ParameterError(
+            f"the loop of {name} must have the gains of the law, {', '.join(exact)}. "
+            f"Received {', '.join(map(str, model.gains))}."
+        )
+    ranges = _ranges(name, model, lipschitz, gain_range)
+    _require_declared(model, {gain: (value, value) for gain, value in exact.items()} | ranges)
+    loop = loop_of(name, model, gains=exact, uncertain=ranges)
+    _require_homogeneous(loop)
+    return loop
+
+
+def _require_declared(model: LoopField, ranges: Mapping[str, tuple[Fraction, Fraction]]) -> None:
+    """Refuse numbers that a symbol's declaration excludes: SymPy has simplified the field by it."""
+    for symbol in (*model.gains, *model.uncertain):
+        low, high = ranges[str(symbol)]
+        inside = {low, high, min(max(low, Fraction(0)), high)}
+        for kind, declared in symbol.assumptions0.items():
+            if any(getattr(sp.Rational(v.numerator, v.denominator), f"is_{kind}") != declared for v in inside):
+                value = low if low == high else f"[{low}, {high}]"
+                raise ParameterError(
+                    f"{symbol} is declared {'' if declared else 'not '}{kind} in the loop. Received {value}. "
+                    "Declare it with real=True only."
+                )
+
+
+def _require_homogeneous(loop: Loop) -> None:
+    """Refuse a field or an argument of a nested power with terms of different degrees in the weights of the loop."""
+    weights: dict[str, Fraction] = {state: Fraction(weight) for state, weight in loop.states.items()}
+    for lift, terms in loop.lifts.items():
+        degrees = _degrees(loop, terms, weights)
+        _require_one({m: f"{t} in a nested power" for m, t in degrees.items()}, loop)
+        weights[lift] = next(iter(degrees), Fraction(1))
+    found: dict[Fraction, str] = {}
+    for state, terms in loop.field.items():
+        found |= {m - loop.states[state]: f"{t} in {state}'" for m, t in _degrees(loop, terms, weights).items()}
+    _require_one(found, loop)
+
+
+def _degrees(loop: Loop, terms: tuple[Term, ...], weights: Mapping[str, Fraction]) -> dict[Fraction, str]:
+    """Degrees of the terms that do not vanish, each with the factors of one such term."""
+    zero = {name for name, v in loop.parameters.items() if not v}
+    zero |= {name for name, ends in loop.ranges.items() if not any(ends)}
+    live = (t for t in terms if not zero & set(t.parameters))
+    return {
+        sum((a * weights[x] for x, a, _ in t.factors), Fraction(0)): "·".join(
+            (*t.parameters, *(f"{x}^{a}" for x, a, _ in t.factors)) or ("1",)
+        )
+        for t in live
+    }
+
+
+def _require_one(degrees: Mapping[Fraction, str], loop: Loop) -> None:
+    if len(degrees) > 1:
+        (m, first), (n, second), *_ = degrees.items()
+        raise ParameterError(
+            f"a certificate needs a loop of one degree in the weights {dict(loop.states)}. Received degree {m} of "
+            f"{first} and {n} of {second}. Other weights may do: quakedesign.symbolic.weights.weights_for."
+        )
 
 
 def exact_gains(subject: Subject, gains: tuple[Number, ...]) -> dict[str, Fraction]:

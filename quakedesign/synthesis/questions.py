@@ -197,7 +197,7 @@ def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
     chosen = None if isinstance(subject, LoopField) else law(subject) if isinstance(subject, str) else subject
     if chosen is not None and issubclass(chosen, SlidingMode):
         found.append(max(Fraction(0), chosen(gains=dict(loop.gains)).lipschitz_limit))
-    for bound in (Fraction(0), _FAR):
+    for bound in (Fraction(0), max(_FAR, 4 * _reachable(loop))):
         held = refute(replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), subject)
         if held is not None and held.refutation is not None:
             found.append(abs(held.refutation.parameters["d"]))

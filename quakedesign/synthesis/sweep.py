@@ -26,6 +26,7 @@ SURE = 5e-10
 """Margins above this count as found; the solver's answers are about as accurate as that."""
 ACCURACY = 1e-10
 """What the solver is asked for unless told."""
+_TOO_FAR = "the gains are too far apart for a search in floating point."
 _KEPT = 64  # scales whose numbers are kept
 
 
@@ -122,6 +123,8 @@ class Sweep:
         ------
         ValueError
             When the point has another structure.
+        CertificateError
+            When its numbers are too far apart for floating point.
         """
         if not self.covers(loop):
             raise ValueError("the point has another structure. Compile a sweep for it.")
@@ -151,7 +154,10 @@ class Sweep:
             known = next(iter(self._numbers.values())).matrix if free else None
             if len(self._numbers) >= _KEPT:
                 self._numbers.pop(next(iter(self._numbers)))
-            self._numbers[scale] = _Numbers(self, scale, known)
+            try:
+                self._numbers[scale] = _Numbers(self, scale, known)
+            except OverflowError:
+                raise CertificateError(_TOO_FAR) from None
         return self._numbers[scale]
 
     def _features(self, values: Mapping[str, float]) -> Any:
@@ -190,7 +196,10 @@ class _Numbers:
         """Largest coefficient of all −V̇_j."""
         import numpy as np
 
-        merged = np.bincount(self.matrix.slots[self.rate], (self.coefficients * features[self.products])[self.rate])
+        with np.errstate(over="ignore", invalid="ignore"):
+            merged = np.bincount(self.matrix.slots[self.rate], (self.coefficients * features[self.products])[self.rate])
+        if not np.isfinite(merged).all():
+            raise CertificateError(_TOO_FAR)
         return float(np.abs(merged).max(initial=0.0)) or 1.0
 
     def solve(self, features: Any, pace: float, accuracy: float) -> tuple[float, list[float], Any, float] | None:

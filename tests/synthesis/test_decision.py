@@ -10,7 +10,7 @@ from typing import ClassVar
 import pytest
 import sympy as sp
 
-from quakedesign.certificates import Verdict, certificate_text, load_certificate
+from quakedesign.certificates import Verdict, certificate_text, load_certificate, parse_certificate
 from quakedesign.controllers import LoopField, law, laws
 from quakedesign.controllers.chain import IntegratorChain
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
@@ -136,6 +136,62 @@ def test_a_suggested_counterexample_is_checked_against_the_users_own_field():
     assert certify("super-twisting", ("1.5", "0.9"), lipschitz="0.95")[0] is Verdict.REFUTED
     assert certify(Leaky, ("1.5", "0.9"), lipschitz="0.95")[0] is Verdict.PROVED
     assert certify(Leaky, ("1.5", "0.9"), lipschitz="1.0")[0] is Verdict.UNDECIDED
+
+
+def test_the_order_in_which_rates_are_written_does_not_matter():
+    turned = replace(DIFFERENTIATOR, field=dict(reversed(DIFFERENTIATOR.field.items())))
+    found = certify(turned, ("2", "2.12", "1.1"), lipschitz=1)[1]
+    assert found.check(DIFFERENTIATOR) is Verdict.PROVED
+
+
+x, k, root = sp.symbols("x k root", real=True)
+PLAIN = LoopField(
+    states={x: 1}, field={x: -k * SignedPower(x, 0) + d}, gains=(k,), constants=(), uncertain=(d,), domain="cells"
+)
+
+
+def test_a_function_that_stands_still_proves_nothing():
+    assert certify(PLAIN, (1,), lipschitz="0.9")[0] is Verdict.PROVED
+    assert certify(PLAIN, (1,), lipschitz=1)[0] is Verdict.UNDECIDED
+
+
+def test_neither_checker_takes_a_root_of_zero():
+    # FORMAT.md: the positive square root of a positive number
+    loop = replace(PLAIN, field={x: -2 * SignedPower(x, 0) + root * d}, roots={root: k})
+    text = certificate_text(certify(loop, (1,), lipschitz=1)[1])
+    raw = json.loads(text)
+    raw["gains"]["k"], raw["roots"]["root"] = "0", ["k", "0", "1"]
+    with pytest.raises(CertificateError, match="does not hold the root of k"):
+        parse_certificate(json.dumps(raw)).check(loop)
+    with pytest.raises(checker.Refused, match="the root of a positive number"):
+        checker.check(json.dumps(raw))
+
+
+def test_a_number_that_a_declaration_excludes_is_refused():
+    sure = sp.Symbol("k", positive=True)
+    loop = replace(PLAIN, field={x: -sp.sqrt(sure**2) * SignedPower(x, 0) + d}, gains=(sure,))
+    assert certify(loop, (2,), lipschitz=1)[0] is Verdict.PROVED
+    with pytest.raises(ParameterError, match=r"k is declared .* in the loop\. Received -2"):
+        certify(loop, (-2,), lipschitz=1)
+
+
+@pytest.mark.parametrize(
+    ("rate", "error", "message"),
+    [
+        (-k * x + d, ParameterError, "one degree in the weights .* Received degree 0 of .* and -1 of"),
+        (-k * SignedPower(x + d * SignedPower(x, 0), 0), ParameterError, "one degree .* in a nested power"),
+        (-k * SignedPower(x, 0) + d**2, CertificateError, "not affine in d"),
+        (-sp.sqrt(2) * k * SignedPower(x, 0) + d, CertificateError, "Received the factor sqrt"),
+    ],
+)
+def test_loops_beyond_the_format_are_refused_with_the_reason(rate, error, message):
+    with pytest.raises(error, match=message):
+        certify(replace(PLAIN, field={x: rate}), (1,), lipschitz="0.5")
+
+
+@pytest.mark.slow
+def test_what_the_largest_range_holds_is_proved_when_asked_for_directly():
+    assert certify("cta", ("7", "5", "2.3", "1.1"), lipschitz=1, gain_range=(1, 334))[0] is Verdict.PROVED
 
 
 @pytest.mark.parametrize(

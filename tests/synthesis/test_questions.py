@@ -102,6 +102,7 @@ def test_the_limit_comes_from_the_law_or_from_an_equilibrium():
         ("cta", ("7", "5", "1.1", "-2.3")): 0,
         ("dia", ("1", "20", "1.5", "0")): F("1.5"),
         ("super-twisting", ("1", "2")): 2,
+        ("super-twisting", ("1e-20", "1e20")): 10**20,
         ("cta3", ("1", "2", "2", "0.05", "0.02", "0.01")): F("0.02"),
     }
     for (name, gains), limit in cases.items():
