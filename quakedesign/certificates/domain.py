@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import sympy as sp
@@ -95,10 +96,10 @@ class Question:
     certificate: Certificate
     robustness: Robustness | None
 
-    @property
+    @cached_property
     def sets(self) -> LevelSets:
         """Level sets in metres and seconds."""
-        return LevelSets(self.certificate, self.controller.scale)
+        return LevelSets(self.certificate, self.controller.scale, self.controller.loop_field())
 
     @property
     def allowed(self) -> Fraction:
@@ -249,11 +250,15 @@ def _split_limit(question: Question, level: Fraction) -> str:
     slope = plant.rate_slope if error == "rate" else plant.slip_slope
     box = known_ranges(fault) | question.sets.errors(level).ranges()
     straight = expression.subs(slope, 0)
-    bent = upper_bound(expression - straight, box, pieces=_PIECES)
-    if bent > upper_bound(straight, box, pieces=_PIECES):
-        return f"the slip{'-rate' if error == 'rate' else ''} error, through friction"
-    rest = {"slip": "the slip error, through the spring", "rate": "the slip-rate error, through viscosity"}[error]
-    return rest if controller.feedforward.name == "none" else f"{rest} less its feed-forward"
+    calm = straight.subs({plant.phi_1: 0, plant.phi_2: 0})
+    bent, grown, rest = (
+        upper_bound(part, box, pieces=_PIECES) for part in (expression - straight, straight - calm, calm)
+    )
+    name = "the slip-rate error" if error == "rate" else "the slip error"
+    if max(bent, grown) > rest:
+        return f"{name}, through {'friction' if bent >= grown else 'the growth of the disturbance'}"
+    through = f"{name}, through {'viscosity' if error == 'rate' else 'the spring'}"
+    return through if controller.feedforward.name == "none" else f"{through} less its feed-forward"
 
 
 def _root(level: Fraction, power: Fraction) -> Fraction:

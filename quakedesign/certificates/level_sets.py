@@ -8,6 +8,7 @@ import sympy as sp
 
 from quakedesign.certificates.claim import Certificate, error_units, full_field
 from quakedesign.certificates.matched import Errors
+from quakedesign.controllers import LoopField
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.terms import from_terms
 
@@ -24,10 +25,13 @@ class LevelSets:
         For the base gains (λ = 1), with bounds of all states.
     scale : Fraction
         λ; the scaled loop has the errors λe of the base loop at the same time.
+    model : LoopField, optional
+        Loop of the law, for the units of its states; that of the law of the package by the certificate's name.
     """
 
     certificate: Certificate
     scale: Fraction
+    model: LoopField | None = None
 
     @property
     def degree(self) -> Fraction:
@@ -43,7 +47,7 @@ class LevelSets:
         """Upper bound of V where |e1| ≤ slip [m], |e2| ≤ rate [m/s] and |e3| ≤ matched [unit of ν]."""
         loop = self.certificate.loop
         first, second, *rest = (loop.symbols[s] for s in loop.states)
-        units = {loop.symbols[s]: low for s, (low, _) in error_units(loop).items()}
+        units = {loop.symbols[s]: low for s, (low, _) in error_units(loop, self.model).items()}
         sizes = {first: slip, second: rate, **dict.fromkeys(rest[:-1], Fraction(0)), rest[-1]: matched}
         sizes = {symbol: size / units[symbol] for symbol, size in sizes.items()}
         box = {symbol: (-v / self.scale, v / self.scale) for symbol, v in sizes.items()}
@@ -63,7 +67,7 @@ class LevelSets:
         box |= {loop.symbols[n]: (v, v) for n, v in loop.parameters.items()}
         box |= {loop.symbols[n]: ends for n, (_, ends) in loop.roots.items()}
         first, second, *_ = loop.states
-        units = error_units(loop)
+        units = error_units(loop, self.model)
         acceleration = _top(abs(enclose(full_field(loop)[loop.symbols[second]], box))) * units[second][1]
         return Errors(
             slip=self.scale * sizes[first] * units[first][1],
@@ -79,7 +83,7 @@ class LevelSets:
             rest = {loop.symbols[s]: 0 for s in loop.states if s != state}
             peak = max(_top(enclose(function.subs(rest | {loop.symbols[state]: sign}), {})) for sign in (1, -1))
             size = enclose((_BASE / _OTHER) ** self._power(weight), {_BASE: (level,) * 2, _OTHER: (peak,) * 2})
-            found.append(self.scale * _bottom(size) * error_units(loop)[state][0] if level else level)
+            found.append(self.scale * _bottom(size) * error_units(loop, self.model)[state][0] if level else level)
         return tuple(found)
 
     def _power(self, weight: int) -> sp.Rational:

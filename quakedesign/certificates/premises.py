@@ -115,7 +115,7 @@ def _variants(
         "the certificate is about other gains than the controller's.",
     )
     bounded = all(f"bound_{state}" in certificate.claims for state in certificate.loop.states)
-    known = robustness(certificate) if bounded else None
+    known = robustness(certificate, controller.loop_field()) if bounded else None
     return tuple(_variant(Question(fault, law, certificate, known), bounded=bounded) for law in laws)
 
 

@@ -14,6 +14,7 @@ import sympy as sp
 from quakedesign.certificates.claim import Certificate, error_units, require
 from quakedesign.certificates.forms import Form, largest_ratio
 from quakedesign.certificates.obligations import Obligations, degree
+from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError, KinkError
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.terms import Term, cell_polynomial, from_terms, lie_derivative, to_terms
@@ -66,7 +67,8 @@ class Decay:
 class _Cells:
     """Forms of a certificate on the sign cells, in coordinates that make {V ≤ 1} about the unit box."""
 
-    def __init__(self, certificate: Certificate) -> None:
+    def __init__(self, certificate: Certificate, model: LoopField | None = None) -> None:
+        self.model = model
         self.loop, self.lyapunov = certificate.loop, certificate.lyapunov
         self.obligations = Obligations(certificate.loop, certificate.lyapunov)
         self.weights = list(self.loop.states.values())
@@ -107,7 +109,7 @@ class _Cells:
         """β·∂V/∂e2·|e_i| on a cell, the error e_i at most a unit times the state."""
         weight = self.weights[index]
         bare = cell_polynomial(slope, self.loop.states, signs, {})
-        beta *= error_units(self.loop)[list(self.loop.states)[index]][1]
+        beta *= error_units(self.loop, self.model)[list(self.loop.states)[index]][1]
         raised = {tuple(k + weight * (j == index) for j, k in enumerate(e)): beta * c for e, c in bare.items()}
         return self.form(raised, self.m - self.weights[_PUSHED] + weight)
 
@@ -117,10 +119,16 @@ def _size(gamma: Fraction | None, m: int) -> Fraction:
     return Fraction(float(gamma) ** (-1 / m)).limit_denominator(1000) if gamma else Fraction(1)
 
 
-def robustness(certificate: Certificate) -> Robustness | None:
+def robustness(certificate: Certificate, model: LoopField | None = None) -> Robustness | None:
     """Bounds on what V' withstands, for all uncertain values of the certificate.
 
     On polynomial cells V' itself is compared; elsewhere −κV^{(m+d)/m} with the κ that the certificate claims.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    model : LoopField, optional
+        Loop of the law, see `LevelSets`.
 
     Returns
     -------
@@ -128,7 +136,7 @@ def robustness(certificate: Certificate) -> Robustness | None:
         None where no bound was found, as where V is not polynomial on its cells.
     """
     try:
-        cells = _Cells(certificate)
+        cells = _Cells(certificate, model)
         slope = cells.slope()
     except (CertificateError, KinkError):
         return None
