@@ -1,11 +1,13 @@
 """The command that finds gains with a proof."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Json, app, console, new_file, print_json
+from quakedesign.cli.shared import Force, Json, Seconds, app, console, new_file, print_json
+from quakedesign.errors import OutputError, ParameterError, UnknownNameError
 
 if TYPE_CHECKING:
     from quakedesign.synthesis.gains import Synthesis
@@ -14,16 +16,20 @@ if TYPE_CHECKING:
 @app.command
 def synthesise(
     law: str,
+    fault: str | None = None,
     /,
     *,
     objective: str = "norm",
-    lipschitz: Annotated[str, Parameter(allow_leading_hyphen=True)] = "1",
-    gain_range: tuple[str, str] = ("1", "1"),
+    lipschitz: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    gain_range: tuple[str, str] | None = None,
     bound: float | None = None,
     degree: tuple[int, ...] = (),
-    starts: int = 4,
-    seed: int = 0,
-    workers: int = 2,
+    starts: int | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    step: Seconds | None = None,
+    scheme: str | None = None,
+    metric: str | None = None,
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
@@ -36,25 +42,35 @@ def synthesise(
     ----------
     law
         cta, dia, super-twisting or cta3.
+    fault
+        For sampled: preset or path of a .toml file.
     objective
-        norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: fastest certified decay. beta: widest
-        certified range of the control coefficient.
+        norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: fastest certified decay, as one over
+        the settling time from where no error exceeds the bound on |h'|. beta: widest certified range of the control
+        coefficient. sampled: smallest error of a sampled run on a fault, measured, of gains that are proved.
     lipschitz
-        Bound on |h'|, in the unit of ν per second.
+        Bound on |h'|, in the unit of ν per second; 1 unless given, for sampled a tenth above what the fault needs.
     gain_range
-        b_m and b_M, the range of the control coefficient β; for beta its middle counts, and it is covered at least.
+        b_m and b_M, the range of the control coefficient β; 1 1 unless given, for sampled that of the fault. For beta
+        its middle counts, and it is covered at least.
     bound
-        Largest norm of the gains for decay and beta; the smallest of the sets from the literature unless given.
+        For decay and beta: largest norm of the gains; the smallest of the sets from the literature unless given.
     degree
         Degree of V; repeat for more. The two lowest unless given; higher ones find better gains and take longer.
     starts
-        Number of starts.
+        Number of starts, 4 unless given; sampled has its own.
     seed
-        Of the random starts.
+        Of the random starts, 0 unless given.
     workers
-        Number of processes; no digit depends on it.
+        Number of processes, 2 unless given; no digit depends on it.
+    step
+        For sampled: sampling time T_s, in s or with a unit; the fault's unless given.
+    scheme
+        For sampled: explicit (the default), implicit, semi-implicit or compensated.
+    metric
+        For sampled: max_slip_rate_error (the default) or another metric that is better when smaller.
     out
-        File for the certificate.
+        File for the certificate, which is written whole or not at all.
     force
         Replace an existing file.
     json
@@ -62,38 +78,83 @@ def synthesise(
     """
     from time import perf_counter
 
-    from quakedesign.synthesis.gains import synthesise as search
+    from quakedesign.synthesis.objectives import OBJECTIVES
 
-    new_file(out, "certificate file", force=force)
+    if objective not in (*OBJECTIVES, "sampled"):
+        raise UnknownNameError(f"objective must be one of {', '.join(OBJECTIVES)}, sampled. Received {objective!r}.")
+    _new_certificate(out, force=force)
     began = perf_counter()
-    found = search(
-        law,
-        objective,
-        lipschitz=lipschitz,
-        gain_range=gain_range,
-        bound=bound,
-        degrees=degree or None,
-        starts=starts,
-        seed=seed,
-        workers=workers,
-    )
+    of_search = {"starts": starts, "seed": seed, "workers": workers}
+    of_trial = {"step": step, "scheme": scheme, "metric": metric}
+    if objective == "sampled":
+        _refuse(objective, {"--bound": bound, **{f"--{name}": given for name, given in of_search.items()}})
+        found, more = _sampled(law, fault, lipschitz, gain_range, degree, _given(of_trial))
+    else:
+        _refuse(objective, {"FAULT": fault, **{f"--{name}": given for name, given in of_trial.items()}})
+        from quakedesign.synthesis.gains import synthesise as search
+
+        ranges = {"lipschitz": lipschitz or "1", "gain_range": gain_range or ("1", "1")}
+        options = {"workers": 2, **_given(of_search), "degrees": degree or None, "bound": bound, **ranges}
+        found, more = search(law, objective, **options), {}
     if found is not None and out is not None:
         found.certificate.save(out)
-    answer = _facts(found, lipschitz) | {
+    answer = _facts(found) | more | {
         "certificate": str(out) if found is not None and out is not None else None,
         "seconds": perf_counter() - began,
-    }
+    }  # fmt: skip
     if json:
         print_json(answer)
     else:
-        _print(law, objective, found)
+        _print(law, found, more)
     return 0 if found is not None else 1
 
 
-def _facts(found: "Synthesis | None", lipschitz: str) -> dict[str, Any]:
-    """Answer as JSON: gains and ranges as texts, measured values as numbers."""
-    from quakedesign.rationals import rational
+def _new_certificate(out: Path | None, *, force: bool) -> None:
+    """Refuse a place that cannot be written, before the work begins.
 
+    Raises
+    ------
+    OutputError
+    """
+    new_file(out, "certificate file", force=force)
+    if out is not None and (out.is_dir() or not out.absolute().parent.is_dir()):
+        raise OutputError(f"certificate file must be a file in a folder that exists. Received {out}. Make the folder.")
+
+
+def _given(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def _refuse(objective: str, options: Mapping[str, Any]) -> None:
+    """Refuse options that belong to other objectives.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if given := list(_given(options)):
+        raise ParameterError(f"{', '.join(given)} cannot be used with the objective {objective}. Leave it out.")
+
+
+def _sampled(
+    law: str, fault: str | None, lipschitz: str | None, gain_range: tuple[str, str] | None, degree: tuple[int, ...],
+    options: Mapping[str, Any],
+) -> tuple["Synthesis | None", dict[str, Any]]:  # fmt: skip
+    """Gains whose sampled run errs least, and how they were tried."""
+    from quakedesign.fault import load_fault
+    from quakedesign.synthesis.sampled_gains import sampling, synthesise_sampled
+
+    if fault is None:
+        raise ParameterError(
+            f"the objective sampled needs a fault. Received none. Give a preset or a file after {law}."
+        )
+    trial = sampling(load_fault(fault), law, lipschitz=lipschitz, gain_range=gain_range, **options)
+    tried = {"scale": str(trial.scale), "step": trial.step, "duration": trial.duration, "scheme": trial.scheme}
+    return synthesise_sampled(trial, degrees=degree or None), {"fault": fault, **tried}
+
+
+def _facts(found: "Synthesis | None") -> dict[str, Any]:
+    """Answer as JSON: gains and ranges as texts, measured values as numbers."""
     if found is None:
         return {"verdict": "undecided", "gains": None, "value": None, "compared": []}
     ranges = found.certificate.loop.uncertain
@@ -101,7 +162,7 @@ def _facts(found: "Synthesis | None", lipschitz: str) -> dict[str, Any]:
         "verdict": "proved",
         "objective": found.objective,
         "gains": {name: str(k) for name, k in found.gains.items()},
-        "lipschitz": str(rational(lipschitz)),
+        "lipschitz": str(ranges["d"][1]),
         "gain_range": [str(v) for v in ranges["beta"]] if "beta" in ranges else None,
         "value": found.value,
         "unit": found.unit,
@@ -113,18 +174,25 @@ def _facts(found: "Synthesis | None", lipschitz: str) -> dict[str, Any]:
     }
 
 
-def _print(law: str, objective: str, found: "Synthesis | None") -> None:
+def _print(law: str, found: "Synthesis | None", more: Mapping[str, Any]) -> None:
     from rich.table import Table
+    from rich.text import Text
 
     out = console()
     if found is None:
         out.print(f"undecided: no gains of {law} were proved", markup=False)
         return
     gains = ", ".join(f"{name} = {k}" for name, k in found.gains.items())
-    out.print(f"proved: {law} with {gains}", markup=False)
+    ranges = found.certificate.loop.uncertain
+    beta = f", β in [{ranges['beta'][0]}, {ranges['beta'][1]}]" if "beta" in ranges else ""
+    out.print(f"proved: {law} with {gains} for |h'| <= {ranges['d'][1]}{beta}", markup=False)
+    if more:
+        of_run = "{scheme} run on {fault} with scale {scale}, T_s = {step:.4g} s, over {duration:.4g} s"
+        out.print(f"measured, not proved: {found.objective} of one {of_run.format(**more)}", markup=False)
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for column in ("gains", objective if found.unit == "-" else f"{objective} [{found.unit}]", "norm", "better by"):
-        table.add_column(column)
+    unit = "" if found.unit == "-" else f" [{found.unit}]"
+    for column in ("gains", f"{found.objective}{unit}", "norm", "better by"):
+        table.add_column(Text(column))
     rows: list[tuple[str, float | None, float, float | None]] = [("these", found.value, found.norm, None)]
     rows += [(" ".join(f"{float(k):.4g}" for k in c.gains.values()), c.value, c.norm, c.ratio) for c in found.compared]
     for name, value, norm, ratio in rows:

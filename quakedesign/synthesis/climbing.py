@@ -42,16 +42,19 @@ class Setting:
     objective : Objective
     exponents : mapping of str to Fraction
         Of gains and states, see `stretch_exponents`.
-    units : mapping of str to Expr
-        See `LoopField.units`.
     degree : int
         Of V.
+    units : mapping of str to Expr
+        See `LoopField.units`.
+    least : float
+        Margin that counts; a search over gains steers clear of the edge of what a solver can tell.
     """
 
     objective: "Objective"
     exponents: Mapping[str, Fraction]
     degree: int
     units: Mapping[str, sp.Expr] = field(default_factory=dict)
+    least: float = MARGIN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,9 +185,9 @@ def _changes(setting: Setting, loop: Loop, trust: float) -> dict[str, dict[str, 
 def _around(
     setting: Setting, loop: Loop, level: float, lyapunov: tuple[Term, ...], changed: Sequence[Loop] = ()
 ) -> Neighbourhood | None:
-    rate = setting.objective.rate(level)
+    speed = setting.objective.speed(level)
     try:
-        pace = pace_of(loop, lyapunov, rate, setting.degree) if rate else None
+        pace = pace_of(loop, lyapunov, speed, setting.degree) if speed else None
         return neighbourhood(loop, setting.degree, balance(loop), pace=pace, lyapunov=lyapunov, changed=changed)
     except (CertificateError, ValueError):
         return None
@@ -219,7 +222,7 @@ def look(
     level: float,
     lyapunov: tuple[Term, ...] = (),
     beyond: float | None = None,
-    least: float = MARGIN,
+    least: float | None = None,
 ) -> State | None:
     """State at fixed gains and level with the largest margin; None without one, or where it is no better than `beyond`.
 
@@ -231,8 +234,8 @@ def look(
     lyapunov : tuple of Term
         V of a state nearby; only a rate needs it.
     beyond : float, optional
-    least : float
-        Margin that counts.
+    least : float, optional
+        Margin that counts; that of the setting unless given.
 
     Returns
     -------
@@ -247,7 +250,7 @@ def look(
         return None
     limits = _limits(setting, loop, level, around, {})
     found = around.program.largest(around.demands, around.fixed, limits)
-    if found is None or not found.margin > least:
+    if found is None or not found.margin > (setting.least if least is None else least):
         return None
     function = around.function(found.decision)
     return State(loop=loop, level=level, lyapunov=function, margin=found.margin)

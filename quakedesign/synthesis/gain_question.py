@@ -14,6 +14,7 @@ from quakedesign.synthesis.objectives import objective_for
 from quakedesign.synthesis.stretching import scaled_norm, stretch_exponents
 
 _SPREAD, _WIDTH = 0.4, 3.0
+_HIGHEST = 12  # beyond, one programme takes minutes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +65,9 @@ def question(
     if bound is None and known:
         bound = min(scaled_norm(one, exponents) for one in known)
     chosen = tuple(degrees) if degrees is not None else candidate_degrees(loop)[:2]
+    lowest = candidate_degrees(loop)[0]
+    if not chosen or not all(lowest <= m <= _HIGHEST for m in chosen):
+        raise ParameterError(f"the degree of V must be from {lowest} to {_HIGHEST}. Received {list(chosen)}.")
     setting = Setting(
         objective=objective_for(objective, loop, bound),
         exponents=exponents,
@@ -76,10 +80,12 @@ def question(
 def _literature(name: str, loop: Loop, exponents: Mapping[str, Fraction]) -> list[dict[str, Fraction]]:
     """Gains that are known for a law, scaled to the loop's L̄ and to the least β."""
     try:
-        bound, sets = family(name)
+        sets = [one for one in family(name) if one.literature]
     except UnknownNameError:
         return []
-    return [_scaled(loop, {n: float(k) for n, k in one.gains.items()}, float(bound), exponents) for one in sets]
+    return [
+        _scaled(loop, {n: float(k) for n, k in one.law.gains.items()}, float(one.lipschitz), exponents) for one in sets
+    ]
 
 
 def _scaled(

@@ -3,10 +3,11 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from quakedesign.certificates import Loop
 from quakedesign.controllers import Subject
 from quakedesign.synthesis.decision import Number
 from quakedesign.synthesis.gain_question import question
-from quakedesign.synthesis.gains import Compared, Synthesis, beside, synthesise
+from quakedesign.synthesis.gains import Synthesis, beside, synthesise
 from quakedesign.synthesis.objectives import OBJECTIVES
 from quakedesign.synthesis.stretching import scaled_norm
 
@@ -42,7 +43,8 @@ def improvements(
     -------
     list of dict
         ``objective``, ``unit``, ``published`` and ``synthesised`` (gains as floats), ``published_value``, ``value``
-        (both proved, or None) and ``ratio``, how many times better.
+        (both proved, or None), ``ratio``, how many times better (never below one), ``published_norm``, ``norm``, and
+        the ``certificate`` of the gains found. None where nothing was proved.
     """
     chosen = None if degrees is None else tuple(degrees)
     options: dict[str, Any] = {"lipschitz": lipschitz, "gain_range": gain_range, "degrees": chosen}
@@ -53,20 +55,23 @@ def improvements(
         found = None if asked.setting.objective.bounded else synthesise(subject, name, **options, **more)
         for loop in asked.known if against is None else [asked.known[i] for i in against]:
             bound = scaled_norm(loop, asked.setting.exponents) * _SAME
+            equal = question(subject, name, **options, bound=bound)
             mine = found or synthesise(subject, name, **options, **more, bound=bound)
-            rows.append(
-                _row(name, asked.setting.objective.unit, mine, beside(asked, loop, mine.value if mine else 0.0))
-            )
+            rows.append(_row(name, loop, beside(equal, mine, (loop,))))
     return rows
 
 
-def _row(name: str, unit: str, mine: Synthesis | None, theirs: Compared) -> dict[str, Any]:
+def _row(name: str, published: Loop, mine: Synthesis | None) -> dict[str, Any]:
+    theirs = mine.compared[0] if mine else None
     return {
         "objective": name,
-        "unit": unit,
-        "published": tuple(map(float, theirs.gains.values())),
+        "unit": mine.unit if mine else None,
+        "published": tuple(map(float, published.gains.values())),
         "synthesised": tuple(map(float, mine.gains.values())) if mine else None,
-        "published_value": theirs.value,
+        "published_value": theirs.value if theirs else None,
         "value": mine.value if mine else None,
-        "ratio": theirs.ratio if mine else None,
+        "ratio": theirs.ratio if theirs else None,
+        "published_norm": theirs.norm if theirs else None,
+        "norm": mine.norm if mine else None,
+        "certificate": mine.certificate if mine else None,
     }

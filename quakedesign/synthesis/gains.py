@@ -19,7 +19,7 @@ from quakedesign.synthesis.stretching import scaled_norm
 
 _STRETCHES = (1.0, 1.5, 4.0)
 _DRAWS = 12
-_TRIES = 6
+_TRIES, _FEW = 6, 2
 _INSIDE = 0.98
 _SHARES = (1.0, 0.9, 0.7)
 
@@ -38,12 +38,15 @@ class Compared:
         ‖k_i/L̄^{p_i}‖₂.
     ratio : float or None
         By which factor the gains found are better.
+    certificate : Certificate or None
+        Of the value, V being the best that was found for these gains.
     """
 
     gains: Mapping[str, Fraction]
     value: float | None
     norm: float
     ratio: float | None
+    certificate: Certificate | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,19 +135,44 @@ def synthesise(
         raise ParameterError(f"starts and workers must be at least 1. Received {starts} and {workers}.")
     first = list(islice(begin_with(asked, seed), starts * _DRAWS))
     found = _best(asked, _climbed(asked.setting, first, starts, workers))
-    if found is None:
-        return None
-    certificate, value = found
+    mine = _synthesis(asked, *found) if found else None
+    return beside(asked, mine, asked.known) if compare else mine
+
+
+def _synthesis(asked: Question, certificate: Certificate, value: float) -> Synthesis:
     return Synthesis(
         law=asked.loop.law,
-        objective=objective,
+        objective=asked.setting.objective.name,
         unit=asked.setting.objective.unit,
         gains=dict(certificate.loop.gains),
         certificate=certificate,
         value=value,
         norm=scaled_norm(certificate.loop, asked.setting.exponents),
-        compared=tuple(beside(asked, one, value) for one in asked.known) if compare else (),
     )
+
+
+def beside(asked: Question, mine: Synthesis | None, others: Sequence[Loop]) -> Synthesis | None:
+    """Gains found beside given ones, which take their place where they are better within the same bound on the norm.
+
+    Parameters
+    ----------
+    asked : Question
+    mine : Synthesis or None
+    others : sequence of Loop
+        With the gains.
+    """
+    objective = asked.setting.objective
+    compared = [given(asked, one) for one in others]
+    for one in compared:
+        if one.certificate is None or one.value is None or one.norm > (objective.bound or one.norm) * (1 + 1e-9):
+            continue
+        if mine is None or objective.better(one.value, mine.value):
+            mine = _synthesis(asked, one.certificate, one.value)
+    if mine is None:
+        return None
+    best = mine.value
+    ratios = [one.value and (best / one.value if objective.larger else one.value / best) for one in compared]
+    return replace(mine, compared=tuple(replace(c, ratio=r) for c, r in zip(compared, ratios, strict=True)))
 
 
 def _climbed(setting: Setting, first: Sequence[Loop], wanted: int, workers: int) -> list[list[State]]:
@@ -223,9 +251,11 @@ def _in_order(setting: Setting, climbs: Sequence[Sequence[State]]) -> list[State
     return sorted(states, key=lambda s: s.level, reverse=setting.objective.larger)
 
 
-def _proved(setting: Setting, states: Sequence[State], subject: Subject) -> tuple[Certificate, float] | None:
+def _proved(
+    setting: Setting, states: Sequence[State], subject: Subject, tries: int = _TRIES
+) -> tuple[Certificate, float] | None:
     """Proof of one of the best states, each try twice as far down the order."""
-    for k in range(_TRIES):
+    for k in range(tries):
         if (1 << k) - 1 >= len(states):
             break
         certificate = setting.objective.proved(setting, states[(1 << k) - 1], subject)
@@ -234,26 +264,28 @@ def _proved(setting: Setting, states: Sequence[State], subject: Subject) -> tupl
     return None
 
 
-def beside(asked: Question, loop: Loop, value: float) -> Compared:
-    """The same question about given gains, whatever their norm, with V of every degree, against a value.
+def given(asked: Question, loop: Loop) -> Compared:
+    """The same question about given gains, whatever their norm, with V of every degree; its ratio is left open.
 
     Parameters
     ----------
     asked : Question
     loop : Loop
         With the gains.
-    value : float
     """
     objective = replace(asked.setting.objective, bound=None)
-    reached = []
-    for degree in asked.degrees:
-        at = replace(asked.setting, objective=objective, degree=degree)
+    setting = replace(asked.setting, objective=objective, least=FAINT)
+    shorter = objective.given(loop, asked.degrees, asked.subject)
+    found = [(shorter, objective.figure(shorter, setting))] if shorter else []
+    for degree in asked.degrees if objective.paced or not shorter else ():
+        at = replace(setting, degree=degree)
         begin = objective.start(at, loop)
         states = _in_order(at, [climb(at, begin, free=False)]) if begin else []
-        found = _proved(at, states, asked.subject)
-        reached += [found[1]] if found else []
-        if reached and not objective.bounded:  # then V does not matter
+        states = [s for s in states if all(objective.better(s.level, value) for _, value in found)]
+        reached = _proved(at, states, asked.subject, _FEW if found else _TRIES)
+        found += [reached] if reached else []
+        if found and not objective.bounded:  # then V does not matter
             break
-    best = (max(reached) if objective.larger else min(reached)) if reached else None
-    ratio = None if best is None else (value / best if objective.larger else best / value)
-    return Compared(gains=dict(loop.gains), value=best, norm=scaled_norm(loop, asked.setting.exponents), ratio=ratio)
+    certificate, value = (max if objective.larger else min)(found, key=lambda item: item[1], default=(None, None))
+    norm = scaled_norm(loop, asked.setting.exponents)
+    return Compared(gains=dict(loop.gains), value=value, norm=norm, ratio=None, certificate=certificate)

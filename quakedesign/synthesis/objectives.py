@@ -1,21 +1,23 @@
 """What gains can be best in: an order of levels, what a level asks of a loop, the proof and the figure at the end."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from typing import ClassVar
 
 from quakedesign.certificates import Certificate, Loop
-from quakedesign.certificates.obligations import Obligations, degree
+from quakedesign.certificates.obligations import Obligations
 from quakedesign.controllers import Subject
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.synthesis.climbing import FAINT, Setting, State, look
 from quakedesign.synthesis.finishing import GIVE_AWAY, bounds_of, finish, with_largest_decay
 from quakedesign.synthesis.lyapunov import find_certificate
-from quakedesign.synthesis.pacing import box, fastest, least_margins, on_box, rounded
+from quakedesign.synthesis.pacing import box, degrees_of, fastest, least_margins, on_box, rounded
+from quakedesign.synthesis.questions import largest_gain_range
 from quakedesign.synthesis.scales import balance, below
+from quakedesign.synthesis.settling import fastest_settling
 from quakedesign.synthesis.stretching import scaled_norm
 
 _ROOM = 1e-3
@@ -54,8 +56,8 @@ class Objective(ABC):
         """Loop with the ranges that a level asks for."""
         return loop
 
-    def rate(self, level: float) -> float | None:
-        """κ that a level asks for."""
+    def speed(self, level: float) -> float | None:
+        """1/T that a level asks for, see `pace_of`."""
         return None
 
     def norm_bound(self, level: float) -> float | None:
@@ -80,6 +82,10 @@ class Objective(ABC):
     def proved(self, setting: Setting, state: State, subject: Subject) -> Certificate | None:
         """Exact certificate at the gains of a state, or None."""
         return find_certificate(state.loop, setting.degree, subject=subject)
+
+    def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
+        """Proof of given gains by another way than a climb, to be beaten by that if V is paced; None without one."""
+        return None
 
     @abstractmethod
     def figure(self, certificate: Certificate, setting: Setting) -> float:
@@ -115,17 +121,18 @@ class SmallestNorm(Objective):
 
 @dataclass(frozen=True, kw_only=True)
 class LargestDecay(Objective):
-    """Largest κ in V̇ ≤ −κV^{n/m} for a V that is at most one where |e_i| ≤ L̄.
+    """Largest κ in V̇ ≤ −κV^{n/m}, told as one over the settling time T = m/((m−n)κ)·C^{(m−n)/m} that it certifies.
 
-    Then m/((m−n)κ) bounds the time to settle from every such start, for n < m. No λ changes this number.
+    T holds for all starts |e_i| ≤ L̄, where V ≤ C. κ alone would compare neither two V, which may be multiplied by any
+    number, nor two degrees m; T does. No λ changes it.
     """
 
     name: ClassVar[str] = "decay"
     unit: ClassVar[str] = "1/s"
-    meaning: ClassVar[str] = "decay rate of a V that is at most one where every error is at most the bound on |h'|"
+    meaning: ClassVar[str] = "one over the certified settling time from where every error is at most the bound on |h'|"
     paced: ClassVar[bool] = True
 
-    def rate(self, level: float) -> float | None:
+    def speed(self, level: float) -> float | None:
         """The level itself."""
         return level
 
@@ -136,10 +143,11 @@ class LargestDecay(Objective):
             return None
         largest = on_box(first.lyapunov, loop.states, box(loop, setting.units))
         function = rounded(first.lyapunov, _BITS[-1], largest)
-        rate = fastest(loop, function)
+        m, n = degrees_of(Obligations(loop, function))
+        speed = fastest(loop, function) * (m - n) / m
         for _ in range(_HALVINGS):
-            rate /= 2
-            found = look(setting, loop, rate, function)
+            speed /= 2
+            found = look(setting, loop, speed, function)
             if found is not None:
                 return found
         return None
@@ -159,14 +167,20 @@ class LargestDecay(Objective):
                 return found
         return None
 
+    def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
+        """Certificate with the V of the largest margins, which is the better one where the forms w fit badly."""
+        bound, beta = loop.uncertain["d"][1], loop.uncertain.get("beta", (Fraction(1), Fraction(1)))
+        gains = tuple(loop.gains.values())
+        found = fastest_settling(subject, gains, lipschitz=bound, gain_range=beta, start=bound, degrees=degrees)
+        return found[0] if found else None
+
     def figure(self, certificate: Certificate, setting: Setting) -> float:
-        """κ·C^{−(m−n)/m} with V ≤ C where |e_i| ≤ L̄, rounded down."""
+        """1/T = κ·(m−n)/m·C^{−(m−n)/m} with V ≤ C where |e_i| ≤ L̄, rounded down."""
         loop = certificate.loop
-        obligations = Obligations(loop, certificate.lyapunov)
-        m = degree([p for _, p in obligations.function()], "V")
-        n = degree([one.polynomial for _, one in obligations.decrease("")], "V̇")
+        m, n = degrees_of(Obligations(loop, certificate.lyapunov))
+        share = (m - n) / m
         largest = on_box(certificate.lyapunov, loop.states, box(loop, setting.units))
-        return float(certificate.claims["decay"]) * largest ** (-(m - n) / m) * (1 - 1e-12)
+        return float(certificate.claims["decay"]) * share * largest**-share * (1 - 1e-12)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,6 +203,14 @@ class LargestRange(Objective):
     def start(self, setting: Setting, loop: Loop) -> State | None:
         """State with the range asked for, or a hundredth to either side."""
         return look(setting, loop, self.first, least=FAINT)
+
+    def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
+        """Certificate of the largest range to four digits, in one number along which the programme is affine."""
+        gains, bound = tuple(loop.gains.values()), loop.uncertain["d"][1]
+        reach = largest_gain_range(
+            subject, gains, lipschitz=bound, nominal=self.middle, symmetric=True, degrees=tuple(degrees)
+        )
+        return reach.certificate if reach.value is not None else None
 
     def figure(self, certificate: Certificate, setting: Setting) -> float:
         """ρ."""

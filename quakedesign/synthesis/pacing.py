@@ -56,13 +56,21 @@ def rounded(lyapunov: Sequence[Term], bits: int, divisor: float = 1.0) -> tuple[
     return tuple(found)
 
 
-def pace_of(loop: Loop, lyapunov: tuple[Term, ...], rate: float, power: int) -> Pace:
-    """Pace for functions of a degree, with w fitted to V^{1/m} on every cell for a V nearby, of whatever degree m."""
-    obligations = Obligations(loop, lyapunov)
+def degrees_of(obligations: Obligations) -> tuple[int, int]:
+    """m and n, of V and V̇."""
     m = degree([p for _, p in obligations.function()], "V")
-    n = degree([one.polynomial for _, one in obligations.decrease("")], "V̇")
+    return m, degree([one.polynomial for _, one in obligations.decrease("")], "V̇")
+
+
+def pace_of(loop: Loop, lyapunov: tuple[Term, ...], speed: float, power: int) -> Pace:
+    """Pace at which a V ≤ 1 of a degree settles within T = 1/speed, κ = speed·m/(m−n); for loops that settle, n < m.
+
+    w is fitted to V^{1/m} on every cell for a V nearby, of whatever degree.
+    """
+    obligations = Obligations(loop, lyapunov)
+    m, n = degrees_of(obligations)
     forms = {cell.name: _form(obligations.potential(cell.signs), m) for cell in obligations.sign_cells()}
-    return Pace(rate=rate, degrees=(power, power + n - m), forms=forms)
+    return Pace(rate=speed * power / (m - n), degrees=(power, power + n - m), forms=forms)
 
 
 def least_margins(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> tuple[float, float]:

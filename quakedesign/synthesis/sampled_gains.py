@@ -5,12 +5,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from quakedesign.certificates import Loop
 from quakedesign.certificates.premises import coefficient_range, least_authority
 from quakedesign.controllers import SlidingMode, control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.simulation import Metrics, simulate
+from quakedesign.rationals import rational
+from quakedesign.simulation import Metrics, simulate, simulation_scheme
 from quakedesign.synthesis.climbing import look, short, with_gains
+from quakedesign.synthesis.decision import Number
 from quakedesign.synthesis.design import required_lipschitz, smallest_root
 from quakedesign.synthesis.gain_question import Question, question
 from quakedesign.synthesis.gains import Compared, Synthesis, synthesise
@@ -21,6 +24,7 @@ _HEADROOM = Fraction(11, 10)
 _WINDOW = 4000
 _SIMPLEX = 0.15
 _WORST = 50.0
+_NO_AIM = ("min_pressure", "settled_from", "steps", "seconds")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,9 +35,10 @@ class Sampling:
     ----------
     fault : Fault
     law : type of SlidingMode
+    gain_range : tuple of two
+        b_m and b_M that the gains must be proved for.
     scale, divisor : Fraction
-        λ and μ0N̂0 [m²/kg] of the controller; λ makes |h'| ≤ 1 of the base gains enough for the fault, with a tenth to
-        spare.
+        λ and μ0N̂0 [m²/kg] of the controller; λ makes |h'| ≤ 1 of the base gains enough for the bound asked for.
     metric, scheme : str
     step, duration : float
         [s].
@@ -41,6 +46,7 @@ class Sampling:
 
     fault: Fault
     law: type[SlidingMode]
+    gain_range: tuple[Fraction, Fraction]
     scale: Fraction
     divisor: Fraction
     metric: str
@@ -70,6 +76,8 @@ def sampling(
     fault: Fault,
     law: str = "cta",
     *,
+    lipschitz: Number | None = None,
+    gain_range: tuple[Number, Number] | None = None,
     metric: str = "max_slip_rate_error",
     scheme: str = "explicit",
     step: float | None = None,
@@ -82,8 +90,12 @@ def sampling(
     fault : Fault
     law : str
         A sliding mode.
+    lipschitz : number or text, optional
+        L̄ [m/s³]; a tenth above what the fault's reference and disturbance need unless given.
+    gain_range : tuple of two, optional
+        b_m and b_M; those of the fault's box unless given.
     metric : str
-        One of `Metrics`, smaller being better.
+        One of `Metrics` that are better when smaller.
     scheme : str
         One of `quakedesign.simulation.schemes`.
     step : float, optional
@@ -94,21 +106,29 @@ def sampling(
     Raises
     ------
     ParameterError
-        For a law that is no sliding mode, or an unknown metric.
+        For a law that is no sliding mode, an unknown metric or scheme, or numbers that are not positive.
     """
     chosen = control_law(law)
     if not issubclass(chosen, SlidingMode):
         raise ParameterError(f"sampled errors are searched for sliding modes. Received {law!r}.")
-    if metric not in Metrics.__dataclass_fields__:
-        raise ParameterError(f"metric must be one of {', '.join(Metrics.__dataclass_fields__)}. Received {metric!r}.")
+    if metric not in (small := [name for name in Metrics.__dataclass_fields__ if name not in _NO_AIM]):
+        raise ParameterError(f"metric must be one of {', '.join(small)}. Received {metric!r}.")
+    simulation_scheme(scheme)
+    for name, given in (("step", step), ("duration", duration)):
+        if given is not None and not 0 < given < math.inf:
+            raise ParameterError(f"{name} must be positive. Received {given} s.")
     divisor = least_authority(fault)
     law_of_ones = chosen.from_values((1,) * len(chosen.gain_units), divisor=divisor)
-    rho = smallest_root(required_lipschitz(fault, law_of_ones, divisor) * _HEADROOM)
+    needed = required_lipschitz(fault, law_of_ones, divisor) * _HEADROOM if lipschitz is None else rational(lipschitz)
+    if not needed > 0:
+        raise ParameterError(f"lipschitz must be positive. Received {lipschitz}.")
+    low, high = coefficient_range(fault, divisor) if gain_range is None else map(rational, gain_range)
     wanted = step or fault.sampling_time
     return Sampling(
         fault=fault,
         law=chosen,
-        scale=rho**6,
+        gain_range=(low, high),
+        scale=smallest_root(needed) ** 6,
         divisor=divisor,
         metric=metric,
         scheme=scheme,
@@ -118,12 +138,13 @@ def sampling(
 
 
 def synthesise_sampled(
-    trial: Sampling, *, degrees: Iterable[int] | None = None, rounds: int = 60, compare: bool = True
+    trial: Sampling, *, degrees: Iterable[int] | None = None, rounds: int = 80, compare: bool = True
 ) -> Synthesis | None:
-    """Find base gains with a proof for |h'| ≤ 1 and the fault's range of β whose sampled run errs least.
+    """Find base gains with a proof for |h'| ≤ 1 and a range of β whose sampled run errs least.
 
-    From the gains of the smallest norm, by the method of Nelder and Mead on the logarithms of the gains, every point
-    being screened before it is simulated. The figure is measured on one window of one run, and no part of the proof.
+    By the method of Nelder and Mead on the logarithms of the gains, from the gains of the smallest norm and from the
+    best of the literature; every point is screened before it is simulated. The figure is measured on one window of one
+    run, and no part of the proof.
 
     Parameters
     ----------
@@ -133,18 +154,24 @@ def synthesise_sampled(
     rounds : int
         Simulations at most.
     compare : bool
+        Whether to tell the errors of the gains from the literature, too.
 
     Returns
     -------
     Synthesis or None
-        Its value is the metric, in its unit.
+        Its value is the metric, in its unit; never worse than that of gains from the literature that are proved.
     """
-    beta = coefficient_range(trial.fault, trial.divisor)
-    asked = question(trial.law, "norm", lipschitz=1, gain_range=beta, degrees=degrees)
-    first = synthesise(trial.law, "norm", lipschitz=1, gain_range=beta, degrees=asked.degrees, starts=1, compare=False)
-    if first is None:
-        return None
-    tried = _tried(trial, asked, first, rounds)
+    asked = question(trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=degrees)
+    known = [_measured(trial, asked, loop) for loop in asked.known]
+    small = synthesise(
+        trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=asked.degrees, starts=1, compare=False
+    )
+    begin = [tuple(small.gains.values())] if small else []
+    good = [one for one in known if one.value is not None]
+    begin += [tuple(one.gains.values()) for one in sorted(good, key=lambda one: one.value or 0.0)[:1]]
+    tried = {one.value: tuple(one.gains.values()) for one in good if one.value is not None}
+    for gains in begin:
+        tried |= _tried(trial, asked, gains, rounds // len(begin))
     for error, gains in sorted(tried.items(), key=lambda item: item[0]):
         loop = with_gains(asked.loop, dict(zip(asked.loop.gains, gains, strict=True)))
         certificate = find_certificate(loop, asked.degrees, subject=trial.law)
@@ -158,17 +185,19 @@ def synthesise_sampled(
             certificate=certificate,
             value=error,
             norm=scaled_norm(loop, asked.setting.exponents),
-            compared=_compared(trial, asked, error) if compare else (),
+            compared=tuple(replace(c, ratio=c.value and c.value / error) for c in known) if compare else (),
         )
     return None
 
 
-def _tried(trial: Sampling, asked: Question, first: Synthesis, rounds: int) -> dict[float, tuple[Fraction, ...]]:
-    """Screened gains by their errors."""
+def _tried(
+    trial: Sampling, asked: Question, begin: Sequence[Fraction], rounds: int
+) -> dict[float, tuple[Fraction, ...]]:
+    """Screened gains by their errors, from some gains on."""
     import numpy as np
     from scipy.optimize import minimize
 
-    base = {name: float(k) for name, k in first.gains.items()}
+    base = {name: float(k) for name, k in zip(asked.loop.gains, begin, strict=True)}
     free = [name for name, k in base.items() if k]
     setting = replace(asked.setting, degree=asked.degrees[-1])
     tried: dict[float, tuple[Fraction, ...]] = {}
@@ -189,12 +218,9 @@ def _tried(trial: Sampling, asked: Question, first: Synthesis, rounds: int) -> d
     return tried
 
 
-def _compared(trial: Sampling, asked: Question, value: float) -> tuple[Compared, ...]:
-    """Errors of the gains from the literature in the same trial; None for those without a proof."""
-    found = []
-    for loop in asked.known:
-        certificate = find_certificate(loop, asked.degrees, subject=trial.law)
-        error = trial.error(tuple(loop.gains.values())) if certificate else None
-        norm = scaled_norm(loop, asked.setting.exponents)
-        found.append(Compared(gains=dict(loop.gains), value=error, norm=norm, ratio=error and error / value))
-    return tuple(found)
+def _measured(trial: Sampling, asked: Question, loop: Loop) -> Compared:
+    """Error of gains from the literature in the same trial; None for those without a proof."""
+    certificate = find_certificate(loop, asked.degrees, subject=trial.law)
+    error = trial.error(tuple(loop.gains.values())) if certificate else None
+    norm = scaled_norm(loop, asked.setting.exponents)
+    return Compared(gains=dict(loop.gains), value=error, norm=norm, ratio=None, certificate=certificate)

@@ -1,6 +1,7 @@
 """`synthesise` on the command line."""
 
 import json
+from functools import cache, partial
 
 import pytest
 
@@ -60,7 +61,56 @@ def test_people_get_a_table(capsys):
     assert "these" in out
 
 
-@pytest.mark.parametrize("arguments", [("pid",), ("cta", "--objective", "speed"), ("cta", "--lipschitz", "-1")])
+def test_the_smallest_sampled_error_on_a_fault(capsys, tmp_path, monkeypatch):
+    from quakedesign.synthesis import sampled_gains
+
+    search = cache(partial(sampled_gains.synthesise_sampled, rounds=2))  # so that the second call is short
+    monkeypatch.setattr(sampled_gains, "synthesise", lambda *_, **__: None)
+    monkeypatch.setattr(sampled_gains, "synthesise_sampled", search)
+    path = tmp_path / "gains.json"
+    asked = ("cta", "real-fault", "--objective", "sampled", "--step", "92 ms", "--degree", "5")
+    code, out, _ = run(capsys, *asked, "--out", str(path), "--json")
+    found = json.loads(out)
+    certificate = qd.load_certificate(path)
+    assert code == 0
+    assert str(certificate.check()) == found["verdict"] == "proved"
+    assert found["gains"] == {name: str(k) for name, k in certificate.loop.gains.items()}
+    assert (found["objective"], found["unit"]) == ("max_slip_rate_error", "m/s")
+    assert (found["step"], found["scheme"], found["fault"]) == (0.092, "explicit", "real-fault")
+    assert min(c["ratio"] for c in found["compared"]) >= 1
+    code, out, _ = run(capsys, *asked)
+    assert code == 0
+    assert "measured, not proved" in out
+    assert "max_slip_rate_error [m/s]" in out
+
+
+def test_a_folder_that_does_not_exist_is_refused_before_the_search(capsys, tmp_path, monkeypatch):
+    from quakedesign.synthesis import gains
+
+    monkeypatch.setattr(gains, "synthesise", lambda *_, **__: pytest.fail("searched"))
+    for path in (tmp_path / "none" / "gains.json", tmp_path):
+        code, _, err = run(capsys, "cta", "--out", str(path), "--force")
+        assert code == 2
+        assert "certificate file" in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("pid",),
+        ("elqr",),
+        ("cta", "--objective", "speed"),
+        ("cta", "--lipschitz", "-1"),
+        ("cta", "--degree", "-1"),
+        ("cta", "--step", "1"),
+        ("cta", "real-fault"),
+        ("cta", "--objective", "sampled"),
+        ("cta", "nowhere", "--objective", "sampled"),
+        ("cta", "real-fault", "--objective", "sampled", "--step", "0"),
+        ("cta", "real-fault", "--objective", "sampled", "--starts", "2"),
+        ("cta", "real-fault", "--objective", "sampled", "--metric", "steps"),
+    ],
+)
 def test_input_that_cannot_be_understood(capsys, arguments):
     code, _, err = run(capsys, *arguments)
     assert code == 2

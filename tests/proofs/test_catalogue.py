@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import math
 from fractions import Fraction as F
 from pathlib import Path
 
@@ -19,17 +20,22 @@ LOOPS = [p for p in FILES if p not in POLYNOMIALS]
 each = pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 each_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda p: p.stem)
 
-# L̄ and [b_m, b_M] of every file; the four 2-CTA sets are those of Torres-González et al. (2017) for L̄ = 1
+# L̄ and [b_m, b_M] of every file; four 2-CTA sets are those of Torres-González et al. (2017) for L̄ = 1, the fifth and
+# the 2-DIA set of the same bound are the smallest that a synthesis found
 STATEMENTS = {
     "super-twisting_1.5_1.1": ("1", "1", "1"),
     "cta_7_5_2.3_1.1": ("1", "1", "1"),
     "cta_13_7.5_2.3_1.1": ("1", "1", "1"),
     "cta_19_10_2.3_1.1": ("1", "1", "1"),
     "cta_25_15_2.3_1.1": ("1", "1", "1"),
+    "cta_2.717_1.871_1.27_0.2638": ("1", "1", "1"),
     "dia_1_20_1_0": ("3/10", "1", "57/40"),
+    "dia_1.5625_5.248_1.183_0": ("1", "1", "1"),
     "dia_1_20_1_0.1": ("3/10", "1", "1"),
     "cta3_1_2_2_0.05_0.02_0.01": ("1/200", "1", "1"),
 }
+
+SMALLEST = {"cta_2.717_1.871_1.27_0.2638": (7, 5, 2.3, 1.1), "dia_1.5625_5.248_1.183_0": (38.55, 423.1, 1.031, 0)}
 
 SPECIFICATION = importlib.util.spec_from_file_location("catalogue_check", ROOT / "check.py")
 checker = importlib.util.module_from_spec(SPECIFICATION)
@@ -71,6 +77,13 @@ def test_a_name_says_law_and_gains(name):
     assert derived == certificate.loop
 
 
+@pytest.mark.parametrize("name", SMALLEST)
+def test_synthesised_gains_are_less_than_half_of_the_published_ones(name):
+    # the published 2-DIA gains (2, 5, 1.44e-4, 0), λ-scaled from L̄ = 1.3968e-4 to 1: (λ^⅓, λ^½, λ) of them
+    gains = load_certificate(ROOT / "certificates" / f"{name}.json").loop.gains
+    assert math.hypot(*map(float, gains.values())) < math.hypot(*SMALLEST[name]) / 2
+
+
 @pytest.mark.parametrize("fault", ["real-fault", "lab-fault"])
 def test_linear_certificates_cover_their_faults(fault):
     path = ROOT / "certificates" / f"elqr_{fault}.json"
@@ -102,7 +115,7 @@ def test_a_changed_number_is_refused_by_both(path, tmp_path):
         checker.check(text)
 
 
-@pytest.mark.parametrize("name", [n for n in STATEMENTS if not n.startswith(("dia_1_20_1_0.1", "cta3"))])
+@pytest.mark.parametrize("name", [n for n in STATEMENTS if not n.startswith(("dia_1_20_1_0.1", "cta3", *SMALLEST))])
 def test_most_files_bound_the_settling_time(name):
     certificate = load_certificate(ROOT / "certificates" / f"{name}.json")
     assert certificate.claims["decay"] > 0

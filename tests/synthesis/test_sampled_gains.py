@@ -1,5 +1,7 @@
 """Gains chosen by their sampled errors: measured again, proved, and better than the published ones."""
 
+from fractions import Fraction as F
+
 import pytest
 
 import quakedesign as qd
@@ -37,10 +39,38 @@ def test_smaller_gains_chatter_less_and_have_a_proof(fault):
     assert found.compared[0].ratio == pytest.approx(found.compared[0].value / found.value)
 
 
+def test_what_is_given_takes_the_place_of_what_the_fault_needs(fault):
+    trial = sampling(fault, lipschitz="1e-3", gain_range=("0.9", "1.2"), step=0.05)
+    assert 1e-3 <= trial.scale < 1.1e-3
+    assert trial.gain_range == (F(9, 10), F(6, 5))
+    assert trial.step == 0.05
+    assert trial.duration == 4000 * 0.05
+
+
+def test_gains_from_the_literature_are_returned_where_nothing_is_better(fault, monkeypatch):
+    from quakedesign.synthesis import sampled_gains
+
+    monkeypatch.setattr(sampled_gains, "synthesise", lambda *_, **__: None)
+    monkeypatch.setattr(sampled_gains, "_tried", lambda *_: {})
+    trial = sampling(fault, duration=400 * fault.sampling_time)
+    kept = synthesise_sampled(trial, degrees=(5,))
+    assert tuple(kept.gains.values()) in {tuple(c.gains.values()) for c in kept.compared}
+    assert min(c.ratio for c in kept.compared) == 1
+    assert kept.certificate.check() is Verdict.PROVED
+
+
 def test_bad_input_gets_one_clear_message(fault):
     with pytest.raises(ParameterError, match="sliding modes"):
         sampling(fault, "elqr")
     with pytest.raises(ParameterError, match="metric must be one of"):
         sampling(fault, metric="speed")
+    with pytest.raises(ParameterError, match="metric must be one of"):
+        sampling(fault, metric="steps")
+    with pytest.raises(ParameterError, match="scheme must be one of"):
+        sampling(fault, scheme="best")
+    with pytest.raises(ParameterError, match="step must be positive"):
+        sampling(fault, step=0)
+    with pytest.raises(ParameterError, match="lipschitz must be positive"):
+        sampling(fault, lipschitz=0)
     with pytest.raises(UnknownNameError):
         sampling(fault, "pid")
