@@ -113,9 +113,9 @@ def clock(last: float) -> tuple[float, str]:
 
 
 def band(time: np.ndarray, values: np.ndarray, width: int = 40) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle time, smallest and largest value of every `width` samples; what is left over counts as well."""
-    starts = np.arange(0, len(values), width)
-    ends = np.minimum(starts + width, len(values)) - 1
+    """Middle time, smallest and largest value of every `width` samples; what is left over belongs to the last."""
+    starts = np.arange(max(len(values) // width, 1)) * width
+    ends = np.append(starts[1:], len(values)) - 1
     low, high = (extreme.reduceat(values, starts) for extreme in (np.minimum, np.maximum))
     return (time[starts] + time[ends]) / 2, low, high
 

@@ -199,9 +199,11 @@ def test_close_ups_keep_every_step_of_the_start(study):
 def test_a_band_holds_every_value():
     values = np.sin(np.arange(101.0))
     middle, low, high = band(np.arange(101.0), values, 20)
-    assert len(middle) == 6
+    assert list(middle) == [9.5, 29.5, 49.5, 69.5, 90.0]
     assert (low.min(), high.max()) == (values.min(), values.max())
-    assert (low[-1], high[-1], middle[-1]) == (values[-1], values[-1], 100.0)
+    assert (low[-1], high[-1]) == (values[80:].min(), values[80:].max())
+    few = band(np.arange(3.0), values[:3], 20)
+    assert [list(v) for v in few] == [[1.0], [values[0]], [values[2]]]
 
 
 def test_units_suit_the_values():
