@@ -1,4 +1,4 @@
-"""Exact scaling by powers of two, so that a solver sees coefficients of about one whatever the units."""
+"""Exact scaling, so that a solver sees coefficients of about one whatever the units."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from quakedesign.sos.exact.statement import Statement
 
 @dataclass(frozen=True, kw_only=True)
 class Scaled:
-    """A statement in ũ = u/scale with every polynomial divided by a power of two.
+    """A statement in ũ = u/scale, scale powers of two, with every polynomial divided by its largest coefficient.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def scaled(statement: Statement) -> Scaled:
 
     def normal(polynomial: Polynomial) -> tuple[dict[Exponents, Fraction], Fraction]:
         moved = rescaled(polynomial, scale)
-        factor = power_of_two(max((abs(c) for c in moved.values()), default=Fraction(1)))
+        factor = max((abs(c) for c in moved.values()), default=Fraction(1))
         return {e: c / factor for e, c in moved.items()}, factor
 
     polynomial, multiplier = normal(statement.polynomial), normal(statement.multiplier)
@@ -100,11 +100,6 @@ def scaled(statement: Statement) -> Scaled:
 def decimal_units(scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
     """Scaled variables in units of a power of ten near their scale, where simple numbers are looked for."""
     return tuple(s / Fraction(10) ** round(_log2(s) / math.log2(10)) for s in scale)
-
-
-def power_of_two(value: Fraction) -> Fraction:
-    """Power of two near a positive number."""
-    return Fraction(2) ** round(_log2(value))
 
 
 def _log2(value: Fraction) -> float:
