@@ -4,8 +4,12 @@ import math
 import re
 from fractions import Fraction
 from numbers import Rational, Real
+from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError
+
+if TYPE_CHECKING:
+    import sympy as sp
 
 _DIGITS = 308  # so that float() of the number neither overflows nor vanishes
 _NUMBER = re.compile(r"[+-]?(\d+(/\d+)?|(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)", re.ASCII)
@@ -62,3 +66,26 @@ def nearest(value: float, denominator: int) -> Fraction:
     if not math.isfinite(value):
         raise ParameterError(f"a finite number is needed for rounding. Received {value!r}.")
     return Fraction(round(Fraction(value) * denominator), denominator)
+
+
+def fraction_of(value: Any) -> Fraction:
+    """Fraction of a rational of python-flint or SymPy, both of which have p and q."""
+    return Fraction(int(value.p), int(value.q))
+
+
+def to_sympy(value: Fraction) -> "sp.Rational":
+    """Rational of SymPy."""
+    import sympy as sp
+
+    return sp.Rational(value.numerator, value.denominator)
+
+
+def float_above(value: Fraction) -> float:
+    """Float at or just above a rational."""
+    number = float(value)
+    return number if Fraction(number) >= value else math.nextafter(number, math.inf)
+
+
+def float_below(value: Fraction) -> float:
+    """Float at or just below a rational."""
+    return -float_above(-value)

@@ -12,6 +12,7 @@ import sympy as sp
 from quakedesign.certificates.response import Response
 from quakedesign.controllers import LoopField, Subject
 from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.symbolic.terms import Term, from_terms, to_terms, without_nesting
@@ -250,17 +251,29 @@ def error_units(loop: Loop, model: LoopField | None = None) -> dict[str, Range]:
     The units are those of a model, or of the law of the package that the loop names.
     """
     from quakedesign.controllers import laws
-    from quakedesign.symbolic.balls import enclose
 
     if model is None and loop.law in laws():
         model = laws()[loop.law].loop_field()
-    units = model.units if model is not None else {}
+    return unit_ranges(loop, {str(state): unit for state, unit in model.units.items()} if model is not None else {})
+
+
+def unit_ranges(loop: Loop, units: Mapping[str, sp.Expr]) -> dict[str, Range]:
+    """Interval of the value of every unit, by the name of its state; one where there is none.
+
+    Raises
+    ------
+    CertificateError
+        For a unit that is not positive.
+    """
+    from quakedesign.symbolic.balls import enclose
+
     values = {**{n: (v, v) for n, v in loop.parameters.items()}, **{n: ends for n, (_, ends) in loop.roots.items()}}
     found: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))
     for state, unit in units.items():
         ball = enclose(unit, {s: values[s.name] for s in unit.free_symbols if isinstance(s, sp.Symbol)})
-        ends = [end.fmpq() for end in (ball.lower(), ball.upper())]
-        found[state.name] = (Fraction(int(ends[0].p), int(ends[0].q)), Fraction(int(ends[1].p), int(ends[1].q)))
+        low, high = (fraction_of(end.fmpq()) for end in (ball.lower(), ball.upper()))
+        require(low > 0, f"the unit of {state} must be positive. Received {unit}.")
+        found[state] = (low, high)
     return found
 
 

@@ -7,7 +7,6 @@ Two ways to split h, both rigorous:
   bounded by g1|e1| + g2|e2| and must leave V' negative (`Robustness`). The control does not enter.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from fractions import Fraction
@@ -31,6 +30,7 @@ from quakedesign.certificates.matched import (
 from quakedesign.certificates.robustness import Robustness
 from quakedesign.controllers import SlidingMode
 from quakedesign.fault import Fault
+from quakedesign.rationals import float_above, float_below, fraction_of
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.balls import enclose, upper_bound
 
@@ -207,11 +207,11 @@ def _domain(question: Question, level: Fraction, method: str, limit: str) -> Dom
     first, second, *_, last = question.sets.starts(level)
     return Domain(
         level=float(level),
-        slip_error=_up(errors.slip),
-        slip_rate_error=_up(errors.rate),
-        start_slip_error=_down(first),
-        start_slip_rate_error=_down(second),
-        start_perturbation=_down(last),
+        slip_error=float_above(errors.slip),
+        slip_rate_error=float_above(errors.rate),
+        start_slip_error=float_below(first),
+        start_slip_rate_error=float_below(second),
+        start_perturbation=float_below(last),
         method=method,
         limited_by=limit,
         feedforward=question.controller.feedforward.name,
@@ -265,16 +265,4 @@ def _root(level: Fraction, power: Fraction) -> Fraction:
     """Upper bound of level^power."""
     x = sp.Symbol("x", positive=True)
     end = enclose(x ** sp.Rational(power.numerator, power.denominator), {x: (level, level)}).upper().fmpq()
-    return Fraction(int(end.p), int(end.q))
-
-
-def _up(value: Fraction) -> float:
-    """Float not below a rational."""
-    number = float(value)
-    return number if Fraction(number) >= value else math.nextafter(number, math.inf)
-
-
-def _down(value: Fraction) -> float:
-    """Float not above a rational."""
-    number = float(value)
-    return number if Fraction(number) <= value else math.nextafter(number, -math.inf)
+    return fraction_of(end)

@@ -9,6 +9,7 @@ import sympy as sp
 from quakedesign.certificates.claim import Certificate, error_units, full_field
 from quakedesign.certificates.matched import Errors
 from quakedesign.controllers import LoopField
+from quakedesign.rationals import fraction_of
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.terms import from_terms
 
@@ -92,9 +93,9 @@ class LevelSets:
 
 def _top(enclosure: Any) -> Fraction:
     end = enclosure.upper().fmpq()
-    return Fraction(int(end.p), int(end.q))
+    return fraction_of(end)
 
 
 def _bottom(enclosure: Any) -> Fraction:
     end = enclosure.lower().fmpq()
-    return Fraction(int(end.p), int(end.q))
+    return fraction_of(end)

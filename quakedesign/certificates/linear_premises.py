@@ -19,7 +19,7 @@ from quakedesign.certificates.premises import (
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.balls import enclose, upper_bound
 
@@ -180,7 +180,7 @@ def _friction_at(fault: Fault, slip: Range) -> Range:
 
 def _end(end) -> Fraction:
     exact = end.fmpq()
-    return Fraction(int(exact.p), int(exact.q))
+    return fraction_of(exact)
 
 
 def linear_premises(fault: Fault, controller: Controller, certificate: Certificate | None) -> list[Premise]:
@@ -260,7 +260,7 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
 
 def _fraction(value) -> Fraction:
     exact = sp.nsimplify(value, rational=True)
-    return Fraction(int(exact.p), int(exact.q))
+    return fraction_of(exact)
 
 
 def _sympy(value: Fraction) -> sp.Rational:

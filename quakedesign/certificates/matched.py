@@ -9,7 +9,7 @@ import sympy as sp
 
 from quakedesign.controllers.feed_forward import NONE, FeedForward
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.balls import upper_bound
 
@@ -224,4 +224,4 @@ def initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
 
 def _fraction(value: sp.Rational) -> Fraction:
     exact = sp.nsimplify(value, rational=True)
-    return Fraction(int(exact.p), int(exact.q))
+    return fraction_of(exact)

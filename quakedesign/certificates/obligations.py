@@ -168,6 +168,7 @@ class Obligations:
                 inequalities.append({e: signs[lift] * c for e, c in argument.items()})
                 if all(c < 0 for c in inequalities[-1].values()):
                     return None
+        _require_different(inequalities, [lift for lift in self.loop.lifts if lift not in self.with_variable])
         return Cell(_word(signs), signs, tuple(equalities), tuple(inequalities))
 
     @property
@@ -231,6 +232,16 @@ class Obligations:
             return real_polynomial(self.derivative, tuple(self.loop.states), values)
         weights = {**self.loop.states, **self.lift_degrees}
         return self._kept(cell_polynomial(self.derivative, weights, signs, values))
+
+
+def _require_different(inequalities: Sequence[Polynomial], lifts: Sequence[str]) -> None:
+    """Refuse signs that are proportional to each other or to a variable of the cell: no engine takes one twice."""
+    largest = [max(map(abs, p.values())) for p in inequalities]
+    known = {tuple(sorted((e, c / m) for e, c in p.items())) for p, m in zip(inequalities, largest, strict=True)}
+    require(
+        len(known) == len(inequalities) and not any(len(p) == 1 and sum(p[0][0]) == 1 for p in known),
+        f"the signs {', '.join(lifts)} say the same twice, or that of one state. Write them as one, or as ⌈x⌋⁰.",
+    )
 
 
 def _signs(names: tuple[str, ...]) -> Iterator[dict[str, int]]:

@@ -1,6 +1,5 @@
 """What a certificate needs, against what a given fault, reference and disturbance ask for. Ball arithmetic only."""
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -24,6 +23,7 @@ from quakedesign.certificates.robustness import robustness
 from quakedesign.controllers import SlidingMode
 from quakedesign.controllers.feed_forward import FEED_FORWARDS, FeedForward, feed_forward
 from quakedesign.fault import Fault
+from quakedesign.rationals import float_above
 
 __all__ = [
     "Domain",
@@ -153,7 +153,7 @@ def matched_rate_premise(
     note += _with(controller)
     return Premise(
         name=name,
-        required=_up(required),
+        required=float_above(required),
         certified=float(against),
         unit="m/s^3",
         proved=certified is not None,
@@ -179,7 +179,7 @@ def _level_set(question: Question) -> Premise:
         return matched_rate_premise(fault, law, "level_set", errors, certified_lipschitz(question.certificate), start)
     return Premise(
         name="level_set",
-        required=_up(share),
+        required=float_above(share),
         certified=1.0,
         unit="-",
         note=start
@@ -192,9 +192,3 @@ def _with(controller: SlidingMode) -> str:
     """What the law adds to ν, for a note."""
     name = controller.feedforward.name
     return "" if name == "none" else f"; with {name} feed-forward"
-
-
-def _up(value: Fraction) -> float:
-    """Float not below a rational."""
-    number = float(value)
-    return number if Fraction(number) >= value else math.nextafter(number, math.inf)

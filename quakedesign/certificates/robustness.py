@@ -16,11 +16,9 @@ from quakedesign.certificates.forms import Form, largest_ratio
 from quakedesign.certificates.obligations import Obligations, degree
 from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError, KinkError
+from quakedesign.rationals import fraction_of
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.terms import Term, cell_polynomial, from_terms, lie_derivative, to_terms
-
-DECAY_CLAIMS = ("decay", "kappa")
-"""Names under which a certificate may claim κ of V' ≤ −κV^{(m+d)/m}."""
 
 Problem = tuple[tuple[Form, ...], tuple[Fraction, ...]]
 
@@ -106,10 +104,11 @@ class _Cells:
         return to_terms(found, [symbols[s] for s in self.loop.states])
 
     def push(self, slope: tuple[Term, ...], index: int, signs: dict[str, int], beta: Fraction) -> Form:
-        """β·∂V/∂e2·|e_i| on a cell, the error e_i at most a unit times the state."""
+        """β·∂V/∂e2·|e_i| on a cell, e_i at most a unit times the state; e2 is a unit times its state, too."""
         weight = self.weights[index]
         bare = cell_polynomial(slope, self.loop.states, signs, {})
-        beta *= error_units(self.loop, self.model)[list(self.loop.states)[index]][1]
+        units = list(error_units(self.loop, self.model).values())
+        beta *= units[index][1] / units[_PUSHED][0]
         raised = {tuple(k + weight * (j == index) for j, k in enumerate(e)): beta * c for e, c in bare.items()}
         return self.form(raised, self.m - self.weights[_PUSHED] + weight)
 
@@ -212,8 +211,8 @@ def decay_by_norms(certificate: Certificate) -> Fraction:
     )
     x = sp.Symbol("x", positive=True)
     power = enclose(x ** sp.Rational(cells.fallen, cells.m), {x: (largest, largest)}).upper().fmpq()
-    return certificate.claims["decrease"] / Fraction(int(power.p), int(power.q))
+    return certificate.claims["decrease"] / fraction_of(power)
 
 
 def _claimed(certificate: Certificate) -> Fraction | None:
-    return next((certificate.claims[name] for name in DECAY_CLAIMS if name in certificate.claims), None)
+    return certificate.claims.get("decay")

@@ -10,7 +10,7 @@ from quakedesign.certificates.linear_premises import Sectors, sectors
 from quakedesign.controllers import Controller, Signals, control_law
 from quakedesign.controllers.elqr import FEEDBACKS
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic.balls import upper_bound
 from quakedesign.symbolic.terms import Term
 
@@ -52,7 +52,7 @@ def fed_forward(controller: Controller) -> tuple[Fraction, Fraction]:
     )
     constant = sp.expand(-controller.pressure(signals))
     parts = [sp.Rational(constant.coeff(symbol)) for symbol in (r, rate)]
-    return Fraction(int(parts[0].p), int(parts[0].q)), Fraction(int(parts[1].p), int(parts[1].q))
+    return fraction_of(parts[0]), fraction_of(parts[1])
 
 
 def tracking_inputs(fault: Fault, controller: Controller, needed: Sectors) -> dict[str, Fraction]:

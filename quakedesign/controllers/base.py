@@ -11,7 +11,13 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
-from quakedesign.controllers.soundness import require_names, require_roots, sound_field, sound_states
+from quakedesign.controllers.soundness import (
+    require_names,
+    require_roots,
+    require_units,
+    sound_field,
+    sound_states,
+)
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
 
@@ -61,8 +67,9 @@ class LoopField:
     Raises
     ------
     ParameterError
-        For names that are equal or that a certificate file cannot hold, weights that are no integers from 1 to 12,
-        a rate that is missing, inexact or holds an unknown symbol.
+        For names that are equal or that a certificate file cannot hold, an unknown domain, states of one sign, weights
+        that are no integers from 1 to 12, a rate that is missing, inexact or holds an unknown symbol, a root of
+        anything but a gain or constant, a unit of anything but a state.
     """
 
     states: dict[sp.Symbol, int]
@@ -80,6 +87,7 @@ class LoopField:
         object.__setattr__(self, "states", sound_states(self.states, self.domain))
         require_names(known)
         require_roots(self.roots, numbers)
+        require_units(self.units, self.states, (*numbers, *self.roots))
         object.__setattr__(self, "field", sound_field(self.field, known, self.states))
 
     @property

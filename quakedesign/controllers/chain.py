@@ -10,6 +10,7 @@ from typing import ClassVar
 import sympy as sp
 
 from quakedesign.controllers.base import Law, LoopField
+from quakedesign.rationals import fraction_of
 
 beta, d = sp.symbols("beta d", real=True)
 
@@ -80,4 +81,4 @@ class IntegratorChain(Law):
 
 
 def _fraction(value: sp.Expr) -> Fraction:
-    return Fraction(int(value.p), int(value.q))
+    return fraction_of(value)

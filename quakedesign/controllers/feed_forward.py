@@ -7,7 +7,7 @@ import sympy as sp
 
 from quakedesign.errors import UnknownNameError
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
 
 
@@ -112,4 +112,4 @@ def feed_forward(name: str, fault: Fault, divisor: Fraction) -> FeedForward:
 
 def _fraction(value: sp.Expr) -> Fraction:
     exact = sp.nsimplify(value, rational=True)
-    return Fraction(int(exact.p), int(exact.q))
+    return fraction_of(exact)

@@ -23,8 +23,8 @@ from quakedesign.controllers.base import Controller, Signals
 from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.errors import ParameterError
 from quakedesign.fault.radical import Radical, radical
-from quakedesign.fault.scales import Scales, fraction_of, power_product
-from quakedesign.rationals import rational
+from quakedesign.fault.scales import Scales, power_product
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import AbsolutePower, SignedPower
 
 Form = dict[str, Fraction]

@@ -45,7 +45,9 @@ def sound_states(states: Mapping[sp.Symbol, int], domain: str) -> dict[sp.Symbol
     return {s: int(w) for s, w in weights.items()}
 
 
-def sound_field(field: Mapping[sp.Symbol, sp.Expr], known: Iterable[sp.Symbol], states: Iterable[sp.Symbol]):
+def sound_field(
+    field: Mapping[sp.Symbol, sp.Expr], known: Iterable[sp.Symbol], states: Iterable[sp.Symbol]
+) -> dict[sp.Symbol, sp.Expr]:
     """Rate of every state, in the order of the states; SymPy's own signs and absolute values as signed powers.
 
     Parameters
@@ -100,7 +102,7 @@ def _require_known(expression: sp.Expr, known: set[sp.Symbol], what: str) -> Non
     if unknown:
         twin = " Another symbol of this name has other assumptions." * (str(unknown[0]) in map(str, known))
         raise ParameterError(
-            f"{what} must hold states, gains, constants, uncertain parameters and roots only. "
+            f"{what} must hold only {', '.join(sorted(map(str, known))) or 'numbers'}. "
             f"Received {unknown[0]}.{twin} Declare every symbol once."
         )
 
@@ -133,3 +135,20 @@ def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Sym
     for root, of in roots.items():
         if of not in known:
             raise ParameterError(f"the root {root} must be that of a gain or constant. Received {of}.")
+
+
+def require_units(
+    units: Mapping[sp.Symbol, sp.Expr], states: Iterable[sp.Symbol], numbers: Iterable[sp.Symbol]
+) -> None:
+    """Refuse a unit of anything but a state, or one that holds anything but gains, constants and roots.
+
+    Raises
+    ------
+    ParameterError
+    """
+    order, known = tuple(states), set(numbers)
+    for state, unit in units.items():
+        if state not in order:
+            raise ParameterError(f"units belong to states, {', '.join(map(str, order))}. Received one of {state}.")
+        _require_exact(sp.sympify(unit), f"the unit of {state}")
+        _require_known(sp.sympify(unit), known, f"the unit of {state}")

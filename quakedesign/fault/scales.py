@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import prod
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Self
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault.dimensions import BASES, dimension, dimensional_matrix
 from quakedesign.fault.radical import Radical, radical
+from quakedesign.rationals import fraction_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,11 +77,6 @@ class Scales:
     def inverse(self) -> Self:
         """The way back."""
         return replace(self, factors={base: factor**-1 for base, factor in self.factors.items()})
-
-
-def fraction_of(value: Any) -> Fraction:
-    """Fraction from a SymPy rational."""
-    return Fraction(int(value.p), int(value.q))
 
 
 def power_product(bases: Mapping[str, Radical | Fraction | int], exponents: Mapping[str, Fraction]) -> Radical:

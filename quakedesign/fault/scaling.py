@@ -15,7 +15,8 @@ from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault.dimensions import BASES, PLANT_UNITS, Quantity, dimension, dimensional_matrix, quantities
 from quakedesign.fault.parameters import Fault
 from quakedesign.fault.radical import Radical, radical
-from quakedesign.fault.scales import Scales, fraction_of, power_product
+from quakedesign.fault.scales import Scales, power_product
+from quakedesign.rationals import fraction_of
 
 TOLERANCE = Fraction(1, 100)
 """Relative difference of a π-group up to which faults known to three digits count as similar."""

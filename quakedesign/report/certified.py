@@ -156,7 +156,10 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
 
 
 def _excluded(loop: Loop) -> list[int]:
-    """Degrees of V that an exact dual excludes, from the lowest on and without gaps, families of a few seconds only."""
+    """Degrees whose sums of even signed monomials an exact dual excludes, from the lowest on and without gaps.
+
+    Families of a few seconds only.
+    """
     small = (
         m for m in candidate_degrees(loop) if len(signed_monomials(loop.states, m, loop.domain)) <= _LARGEST_FAMILY
     )
@@ -169,8 +172,10 @@ def _nothing_lines(certificate: Certificate | None, kind: str, excluded: list[in
     if kind == "exact":
         return [_AGAINST[kind]]
     degrees = ", ".join(map(str, excluded))
-    told = f"an exact dual was found: no even V of degree {degrees}" if excluded else ""
-    return [_AGAINST[kind], f"{told} is positive and falls, whatever the proof" if told else "no exact dual was found"]
+    if not excluded:
+        return [_AGAINST[kind], "no exact dual was found"]
+    family = f"no sum of even signed monomials of degree {degrees}"
+    return [_AGAINST[kind], f"an exact dual was found: {family} is positive and falls, whatever the proof"]
 
 
 def _of_reach(name: str, gains: tuple[Number, ...], reach: Reach, ends: Ends, lipschitz: Number | None) -> Answer:

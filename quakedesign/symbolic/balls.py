@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 Box = Mapping[sp.Symbol, tuple[Fraction, Fraction]]
@@ -258,7 +258,7 @@ def _upper(expression: sp.Expr, box: Box) -> Any:
     if not enclosure.is_finite():
         return float("inf")
     top = enclosure.upper().fmpq()
-    return Fraction(int(top.p), int(top.q))
+    return fraction_of(top)
 
 
 def _lower(expression: sp.Expr, box: Box) -> Fraction:
@@ -266,4 +266,4 @@ def _lower(expression: sp.Expr, box: Box) -> Fraction:
     if not enclosure.is_finite():
         return Fraction(0)
     bottom = enclosure.abs_lower().fmpq()
-    return Fraction(int(bottom.p), int(bottom.q))
+    return fraction_of(bottom)

@@ -8,6 +8,7 @@ from itertools import product
 import sympy as sp
 
 from quakedesign.errors import CertificateError
+from quakedesign.rationals import fraction_of
 
 Polynomial = dict[tuple[int, ...], Fraction]
 
@@ -170,7 +171,7 @@ def as_data(
                 "where a root of k occurs."
             )
         if c:
-            found[tuple(int(n) for n in exponents)] = Fraction(int(c.p), int(c.q))
+            found[tuple(int(n) for n in exponents)] = fraction_of(c)
     return found
 
 

@@ -10,7 +10,7 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant, state_plant
 from quakedesign.symbolic.balls import Box, enclose
 from quakedesign.symbolic.equilibrium import operating_rate
@@ -244,7 +244,7 @@ def _ratio(terms: list[sp.Expr], box: Box) -> Interval:
 
 def _rational(value: Any) -> Fraction:
     exact = value.fmpq()
-    return Fraction(int(exact.p), int(exact.q))
+    return fraction_of(exact)
 
 
 def critical_stiffness(

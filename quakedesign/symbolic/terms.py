@@ -8,6 +8,7 @@ from itertools import count
 import sympy as sp
 
 from quakedesign.errors import CertificateError
+from quakedesign.rationals import fraction_of
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 Factor = tuple[str, Fraction, str]
@@ -96,7 +97,7 @@ def _split(part: sp.Expr, states: Container[sp.Symbol]) -> Term:
     powers = list[Factor]()
     for base, power in (factor.as_base_exp() for factor in sp.Mul.make_args(part)):
         if base.is_Rational and power.is_Integer:
-            coefficient *= Fraction(int(base.p), int(base.q)) ** int(power)
+            coefficient *= fraction_of(base) ** int(power)
         elif base.is_Symbol and base not in states and power.is_Integer and power > 0:
             parameters += [base.name] * int(power)
         else:
@@ -111,7 +112,7 @@ def _power(base: sp.Expr, power: sp.Expr, states: Container[sp.Symbol]) -> Facto
         state, exponent = base.args
         if state in states and exponent.is_Rational:
             odd = isinstance(base, SignedPower) and power % 2 == 1
-            return state.name, Fraction(int(exponent.p), int(exponent.q)) * int(power), "s" if odd else "a"
+            return state.name, fraction_of(exponent) * int(power), "s" if odd else "a"
     raise CertificateError(
         f"a certificate needs products of signed powers of single states. Received the factor {base**power}. "
         "Nested powers need a change of coordinates first."

@@ -8,7 +8,7 @@ import sympy as sp
 from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
 from quakedesign.controllers import LoopField, Subject, law, model_of
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.rationals import rational
+from quakedesign.rationals import rational, to_sympy
 from quakedesign.sos.solve.joint import Proposal
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov import candidate_degrees, find_certificate, finished, refute
@@ -24,7 +24,9 @@ def certify(
     lipschitz: Number,
     gain_range: tuple[Number, Number] = (1, 1),
 ) -> tuple[Verdict, Certificate | None]:
-    """Decide whether gains make the origin finite-time stable for |d| ≤ lipschitz and all β of a range.
+    """Decide whether gains make the origin stable for |d| ≤ lipschitz and all β of a range.
+
+    Globally asymptotically, and in finite time where the field has a negative degree.
 
     Parameters
     ----------
@@ -103,14 +105,19 @@ def closed_loop(
 
 def _require_declared(model: LoopField, ranges: Mapping[str, tuple[Fraction, Fraction]]) -> None:
     """Refuse numbers that a symbol's declaration excludes: SymPy has simplified the field by it."""
+    inside: dict[sp.Symbol, set[sp.Expr]] = {}
     for symbol in (*model.gains, *model.uncertain):
         low, high = ranges[str(symbol)]
-        inside = {low, high, min(max(low, Fraction(0)), high)}
+        inside[symbol] = {to_sympy(v) for v in (low, high, min(max(low, Fraction(0)), high))}
+        if low < high:
+            inside[symbol].add(to_sympy(low) + to_sympy(high - low) / sp.sqrt(2))
+    inside |= {root: {sp.sqrt(to_sympy(ranges[str(of)][0]))} for root, of in model.roots.items() if of in inside}
+    for symbol, values in inside.items():
         for kind, declared in symbol.assumptions0.items():
-            if any(getattr(sp.Rational(v.numerator, v.denominator), f"is_{kind}") != declared for v in inside):
-                value = low if low == high else f"[{low}, {high}]"
+            wrong = [v for v in values if getattr(v, f"is_{kind}") != declared]
+            if wrong:
                 raise ParameterError(
-                    f"{symbol} is declared {'' if declared else 'not '}{kind} in the loop. Received {value}. "
+                    f"{symbol} is declared {'' if declared else 'not '}{kind} in the loop. Received {wrong[0]}. "
                     "Declare it with real=True only."
                 )
 
@@ -177,7 +184,7 @@ def _ranges(
             f"lipschitz must not be negative and gain_range must be 0 < b_m <= b_M. Received {bound}, [{low}, {high}]."
         )
     known = {"beta": (low, high), "d": (-bound, bound)}
-    unknown = [str(u) for u in (*model.uncertain, *model.constants) if str(u) not in known]
+    unknown = [*(str(u) for u in model.uncertain if str(u) not in known), *map(str, model.constants)]
     if unknown or model.domain != "cells":
         raise ParameterError(
             "a Lipschitz bound applies to sliding-mode laws, uncertain in beta and d. "

@@ -8,6 +8,7 @@ from typing import Any
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligation, Obligations
 from quakedesign.errors import CertificateError
+from quakedesign.rationals import fraction_of
 from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.polynomial import monomial
 from quakedesign.symbolic.candidates import signed_monomials
@@ -60,6 +61,8 @@ class Dual:
     @property
     def holds(self) -> bool:
         """Whether it proves what it says, decided anew in exact arithmetic."""
+        if not _sharp(self.loop):
+            return False
         monomials = signed_monomials(self.loop.states, self.degree, self.loop.domain)
         rows = {row[0].name: row for row in _rows(self.loop, monomials)}
         totals = [Fraction(0)] * len(monomials)
@@ -75,7 +78,8 @@ class Dual:
 def dual(loop: Loop, degree: int, *, seed: int = 0) -> Dual | None:
     """Exact proof that no V of a degree serves a loop, or None when none is found.
 
-    None says nothing. None also for nested powers of positive exponents, whose cells hold few rational points.
+    None says nothing. None also for nested powers of positive exponents, whose cells hold few rational points, and for
+    roots of gains that are irrational: no end of their enclosure is a value that the loop takes.
 
     Parameters
     ----------
@@ -91,9 +95,14 @@ def dual(loop: Loop, degree: int, *, seed: int = 0) -> Dual | None:
         rows = list(_rows(loop, monomials)) if monomials else []
     except CertificateError:
         return None
-    if not rows or any(row[0].equalities for row in rows):
+    if not rows or not _sharp(loop) or any(row[0].equalities for row in rows):
         return None
     return _Search(loop, degree, monomials, rows, seed).result()
+
+
+def _sharp(loop: Loop) -> bool:
+    """Whether the loop takes every vertex of its ranges."""
+    return all(low == high for _, (low, high) in loop.roots.values())
 
 
 def _rows(loop: Loop, monomials: Sequence[Term]) -> Iterator[tuple[Obligation, ...]]:
@@ -118,7 +127,8 @@ def _value(polynomial: Polynomial, point: Sequence[Fraction]) -> Fraction:
 
 
 def _admits(one: Obligation, point: Sequence[Fraction]) -> bool:
-    return not one.equalities and all(_value(g, point) >= 0 for g in one.inequalities)
+    """Whether points inside the cell lie about this one, by continuity; where a condition is zero, they may not."""
+    return not one.equalities and all(_value(g, point) > 0 for g in one.inequalities)
 
 
 class _Search:
@@ -239,6 +249,6 @@ def _null_vector(rows: Sequence[Sequence[Fraction]]) -> list[Fraction] | None:
     if rank != len(rows) - 1:
         return None
     free = next(j for j in range(len(rows)) if j >= rank or reduced[j, j] != 1)
-    found = [Fraction(int(-reduced[i, free].p), int(reduced[i, free].q)) for i in range(rank)]
+    found = [-fraction_of(reduced[i, free]) for i in range(rank)]
     found.insert(free, Fraction(1))
     return found if min(found) > 0 else None

@@ -60,7 +60,8 @@ class Synthesis:
     certificate : Certificate
         Checked in exact arithmetic.
     value : float
-        What the certificate proves, in terms of the objective; rounded to the safe side.
+        In terms of the objective: what the certificate proves, rounded down where more is better; for `sampled` what
+        was measured.
     norm : float
         ‖k_i/L̄^{p_i}‖₂ of the gains.
     compared : tuple of Compared
@@ -166,6 +167,8 @@ def beside(asked: Question, mine: Synthesis | None, others: Sequence[Loop]) -> S
     for one in compared:
         if one.certificate is None or one.value is None or one.norm > (objective.bound or one.norm) * (1 + 1e-9):
             continue
+        if not _covers(one.certificate.loop, asked.loop):
+            continue
         if mine is None or objective.better(one.value, mine.value):
             mine = _synthesis(asked, one.certificate, one.value)
     if mine is None:
@@ -173,6 +176,14 @@ def beside(asked: Question, mine: Synthesis | None, others: Sequence[Loop]) -> S
     best = mine.value
     ratios = [one.value and (best / one.value if objective.larger else one.value / best) for one in compared]
     return replace(mine, compared=tuple(replace(c, ratio=r) for c, r in zip(compared, ratios, strict=True)))
+
+
+def _covers(proved: Loop, wanted: Loop) -> bool:
+    """Whether a proof is about all ranges that were asked for."""
+    return all(
+        proved.uncertain[name][0] <= low and high <= proved.uncertain[name][1]
+        for name, (low, high) in wanted.uncertain.items()
+    )
 
 
 def _climbed(setting: Setting, first: Sequence[Loop], wanted: int, workers: int) -> list[list[State]]:

@@ -213,9 +213,9 @@ class LargestRange(Objective):
         return reach.certificate if reach.value is not None else None
 
     def figure(self, certificate: Certificate, setting: Setting) -> float:
-        """ρ."""
+        """ρ, rounded down."""
         low, high = certificate.loop.uncertain["beta"]
-        return float(high / low) ** 0.5
+        return float(high / low) ** 0.5 * (1 - 1e-15)
 
 
 _KNOWN: dict[str, type[Objective]] = {o.name: o for o in (SmallestNorm, LargestDecay, LargestRange)}

@@ -7,6 +7,7 @@ from fractions import Fraction
 import sympy as sp
 
 from quakedesign.certificates import Loop
+from quakedesign.certificates.claim import unit_ranges
 from quakedesign.certificates.obligations import Obligation, Obligations, degree, power_sum
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.sos import Polynomial
@@ -27,11 +28,8 @@ def box(loop: Loop, units: Mapping[str, sp.Expr]) -> tuple[float, ...]:
     units : mapping of str to Expr
         Error that one unit of a state stands for, see `LoopField.units`.
     """
-    known = {name: sp.Rational(v.numerator, v.denominator) for name, v in loop.parameters.items()}
-    known |= {name: sp.Rational(high.numerator, high.denominator) for name, (_, high) in loop.ranges.items()}
-    bound = float(loop.uncertain["d"][1])
-    sizes = {name: float(unit.subs({s: known[s.name] for s in unit.free_symbols})) for name, unit in units.items()}
-    return tuple((bound / sizes.get(state, 1.0)) ** (1 / weight) for state, weight in loop.states.items())
+    bound, known = loop.uncertain["d"][1], unit_ranges(loop, units)
+    return tuple(float(bound / known[state][0]) ** (1 / weight) for state, weight in loop.states.items())
 
 
 def on_box(lyapunov: Sequence[Term], states: Mapping[str, int], sizes: Sequence[float]) -> float:

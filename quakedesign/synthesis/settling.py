@@ -7,9 +7,10 @@ from fractions import Fraction
 import sympy as sp
 
 from quakedesign.certificates import Certificate
+from quakedesign.certificates.claim import error_units
 from quakedesign.certificates.obligations import Obligations, degree
-from quakedesign.controllers import Subject
-from quakedesign.rationals import rational
+from quakedesign.controllers import LoopField, Subject, model_of
+from quakedesign.rationals import float_above, fraction_of, rational, to_sympy
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.terms import from_terms
 from quakedesign.synthesis.decision import Number, closed_loop
@@ -42,7 +43,7 @@ class Settling:
     seconds: float
 
 
-def settling(certificate: Certificate, start: Number = 1) -> Settling | None:
+def settling(certificate: Certificate, start: Number = 1, model: LoopField | None = None) -> Settling | None:
     """Bound on the settling time from all |e_i| ≤ start; None without a claimed decay or without finite time.
 
     Parameters
@@ -50,7 +51,9 @@ def settling(certificate: Certificate, start: Number = 1) -> Settling | None:
     certificate : Certificate
         Checked already.
     start : number or text
-        In the states of the loop (`LoopField.units` where they are not errors).
+        Largest size of every error, whatever the states of the loop (`LoopField.units`).
+    model : LoopField, optional
+        Loop of the law, for the units of its states; that of the law of the package by the certificate's name.
     """
     if "decay" not in certificate.claims:
         return None
@@ -62,13 +65,13 @@ def settling(certificate: Certificate, start: Number = 1) -> Settling | None:
     if power <= 0:
         return None
     factor = 1 / (kappa * power)
-    symbols = certificate.loop.symbols
-    level = enclose(
-        from_terms(certificate.lyapunov, symbols), {symbols[s]: (-size, size) for s in certificate.loop.states}
-    )
-    top = level.upper().fmpq()
-    bound = enclose(_rational(factor) * _BASE ** _rational(power), {_BASE: (Fraction(int(top.p), int(top.q)),) * 2})
-    return Settling(decay=kappa, factor=factor, power=power, start=size, seconds=_up(bound))
+    loop = certificate.loop
+    sizes = {loop.symbols[s]: size / unit for s, (unit, _) in error_units(loop, model).items()}
+    level = enclose(from_terms(certificate.lyapunov, loop.symbols), {s: (-v, v) for s, v in sizes.items()})
+    top = fraction_of(level.upper().fmpq())
+    bound = enclose(to_sympy(factor) * _BASE ** to_sympy(power), {_BASE: (top, top)})
+    seconds = float_above(fraction_of(bound.upper().fmpq()))
+    return Settling(decay=kappa, factor=factor, power=power, start=size, seconds=seconds)
 
 
 def fastest_settling(
@@ -104,22 +107,9 @@ def fastest_settling(
     for m in tried:
         plain = find_certificate(loop, m, subject=subject)
         faster = with_largest_decay(plain, balance(loop), subject) if plain else None
-        told = settling(faster, start) if faster else None
+        told = settling(faster, start, model_of(subject)[1]) if faster else None
         if faster and told:
             found.append((faster, told))
         if degrees is None and len(found) == 2:
             break
     return min(found, key=lambda one: one[1].seconds, default=None)
-
-
-def _rational(number: Fraction) -> sp.Rational:
-    return sp.Rational(number.numerator, number.denominator)
-
-
-def _up(ball) -> float:
-    """Float not below a ball."""
-    from math import inf, nextafter
-
-    end = ball.upper()
-    number = float(end)
-    return number if end <= number else nextafter(number, inf)

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 from quakedesign.certificates import Loop
 from quakedesign.errors import ParameterError
+from quakedesign.rationals import fraction_of
 from quakedesign.symbolic.terms import Term
 
 
@@ -50,7 +51,7 @@ def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fractio
             f"the terms of {loop.law} must determine how its gains scale. Received {solution or 'a contradiction'}. "
             "Leave out gains without effect."
         )
-    found = {name: Fraction(int(v.p), int(v.q)) for name, v in zip(unknown, solution, strict=True)}
+    found = {name: fraction_of(v) for name, v in zip(unknown, solution, strict=True)}
     return {name: found[name] for name in (*loop.gains, *loop.states)}
 
 

@@ -164,7 +164,7 @@ def test_the_bounds_on_what_the_decrease_withstands_are_rigorous_and_not_loose(f
 
 
 def test_a_claimed_decay_is_taken_as_it_is(found):
-    claiming = replace(found.certificate, claims={**found.certificate.claims, "kappa": F(1, 77)})
+    claiming = replace(found.certificate, claims={**found.certificate.claims, "decay": F(1, 77)})
     assert (decay(claiming).rate, decay(claiming).source) == (F(1, 77), "claimed")
 
 

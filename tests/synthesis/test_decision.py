@@ -175,6 +175,24 @@ def test_a_number_that_a_declaration_excludes_is_refused():
         certify(loop, (-2,), lipschitz=1)
 
 
+def test_a_declaration_that_only_the_ends_of_a_range_meet_is_refused():
+    whole = sp.Symbol("d", integer=True)
+    rate = -2 * k * SignedPower(x, 0) + whole + 100 * sp.sin(sp.pi * whole) * SignedPower(x, 0)
+    with pytest.raises(ParameterError, match="d is declared integer"):
+        certify(replace(PLAIN, field={x: rate}, uncertain=(whole,)), (1,), lipschitz=1)
+
+
+def test_a_root_that_is_declared_negative_is_refused():
+    below = sp.Symbol("r", negative=True)
+    with pytest.raises(ParameterError, match="r is declared"):
+        certify(replace(PLAIN, field={x: 2 * sp.sign(below * x) + d}, roots={below: k}), (4,), lipschitz=1)
+
+
+def test_signs_that_say_the_same_are_named():
+    with pytest.raises(CertificateError, match=r"that of one state\. Write"):
+        certify(replace(PLAIN, field={x: -2 * sp.sign(k * x) + d}), (3,), lipschitz=1)
+
+
 @pytest.mark.parametrize(
     ("rate", "error", "message"),
     [

@@ -1,12 +1,16 @@
 """Duals: exact proofs that no Lyapunov function of a family exists."""
 
 from dataclasses import replace
+from fractions import Fraction as F
 
 import numpy as np
 import pytest
+import sympy as sp
 
+from quakedesign.controllers import LoopField
+from quakedesign.symbolic import SignedPower
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.synthesis.decision import closed_loop
+from quakedesign.synthesis.decision import certify, closed_loop
 from quakedesign.synthesis.dual import dual
 
 WEAK = ("super-twisting", ("0.4", "1.5"))  # not stable for L = 1 (Seeber and Horn, 2018)
@@ -70,3 +74,35 @@ def test_none_where_there_is_a_proof_and_where_powers_are_nested():
 def test_a_degree_can_be_excluded_where_a_higher_one_proves():
     loop = closed_loop("cta", ("7", "5", "2.3", "1.1"), lipschitz=1, gain_range=(1, 334))
     assert dual(loop, 5).holds
+
+
+x, y, k, d, r = sp.symbols("x y k d r", real=True)
+
+
+def loop_in(field, **more):
+    states = dict.fromkeys(field, 1)
+    return LoopField(
+        states=states, field=field, gains=(k,), constants=(), domain="cells", **({"uncertain": (d,)} | more)
+    )
+
+
+@pytest.mark.parametrize("square", [x**2 * (x - y) ** 2, x**2 * (x**2 + y**2 - x * y)])
+def test_a_cell_without_interior_excludes_nothing(square):
+    # the sign of a square is one almost everywhere, so this is y' = −2⌈y⌋⁰ + d, which is stable
+    sign = SignedPower(sp.expand(square), 0)
+    model = loop_in({x: -k * SignedPower(x, 0), y: -2 * SignedPower(y, 0) * sign + d})
+    assert [dual(closed_loop(model, (2,), lipschitz=1), degree) for degree in (2, 3, 4)] == [None] * 3
+    plain = loop_in({x: -k * SignedPower(x, 0), y: -2 * SignedPower(y, 0) + d})
+    assert str(certify(plain, (2,), lipschitz=1)[0]) == "proved"
+
+
+def test_the_ends_of_an_irrational_root_exclude_nothing():
+    # between the lower end of the root's enclosure and √2: x' = −(√2 − q)⌈x⌋⁰ is stable, but not at that end
+    lower = closed_loop(loop_in({x: -r * SignedPower(x, 0)}, uncertain=(), roots={r: k}), (2,), lipschitz=0).roots["r"][
+        1
+    ][0]
+    q = next(lower + F(1, 2**n) for n in range(20, 60) if (lower + F(1, 2**n)) ** 2 < 2)
+    field = {x: -(r - sp.Rational(q.numerator, q.denominator)) * SignedPower(x, 0)}
+    loop = closed_loop(loop_in(field, uncertain=(), roots={r: k}), (2,), lipschitz=0)
+    assert lower < q
+    assert dual(loop, 2) is None

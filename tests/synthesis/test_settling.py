@@ -87,3 +87,19 @@ def test_without_a_claimed_decay_nothing_is_said():
 
 def test_gains_without_a_proof_have_no_settling_time():
     assert fastest_settling("super-twisting", ("0.4", "1.5"), lipschitz=1, degrees=4) is None
+
+
+def test_the_start_is_of_errors_whatever_the_states_stand_for():
+    # the 2-DIA's first state is κ³e1 with κ = √k_I1 = 2, so that |e1| ≤ 1/10 means |f1| ≤ 8/10
+    certificate, told = fastest_settling("dia", ("4", "20", "1", "0"), lipschitz="0.1", start=F(1, 10), degrees=5)
+    powers = {"s": lambda x, a: math.copysign(abs(x) ** a, x), "a": lambda x, a: abs(x) ** a}
+
+    def value(point):
+        return sum(
+            float(t.coefficient) * math.prod(powers[kind](point[s], float(a)) for s, a, kind in t.factors)
+            for t in certificate.lyapunov
+        )
+
+    corners = [{"f1": 0.8, "e2": second, "e3": third} for second in (-0.1, 0.1) for third in (-0.1, 0.1)]
+    least = float(told.factor) * max(map(value, corners)) ** float(told.power)
+    assert least <= told.seconds <= 4 * least

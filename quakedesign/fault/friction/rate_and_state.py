@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import require_positive
 from quakedesign.fault.friction.base import FrictionLaw
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -145,7 +145,7 @@ def outward(value: Any, *, up: bool) -> float:
     import sympy as sp
 
     if value.is_Rational:
-        exact = Fraction(int(value.p), int(value.q))
+        exact = fraction_of(value)
     else:
         near = rational(str(sp.N(value, _DIGITS)))
         exact = near + abs(near) * (_ROUNDING if up else -_ROUNDING)

@@ -6,6 +6,7 @@ from math import comb, prod
 from typing import Any, NamedTuple, NoReturn
 
 from quakedesign.errors import PolynomialError
+from quakedesign.rationals import fraction_of
 
 DEGREE = 60
 """Total degree of any intermediate polynomial, and largest exponent."""
@@ -148,7 +149,7 @@ class Expansion:
         """Exponents and rational coefficients of a result."""
         fields = [_FIELD * i for i in range(self._count)]
         return {
-            tuple(key >> field & (1 << _FIELD) - 1 for field in fields): Fraction(int(value.p), int(value.q))
+            tuple(key >> field & (1 << _FIELD) - 1 for field in fields): fraction_of(value)
             for key, value in terms.items()
         }
 

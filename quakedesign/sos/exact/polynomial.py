@@ -7,6 +7,8 @@ from itertools import combinations_with_replacement
 from operator import add
 from typing import Any
 
+from quakedesign.rationals import fraction_of
+
 Exponents = tuple[int, ...]
 Polynomial = Mapping[Exponents, Fraction]
 """Sparse polynomial: exponents to nonzero rational coefficient."""
@@ -30,7 +32,7 @@ def element(polynomial: Polynomial, variables: int) -> Any:
 
 def mapping(polynomial: Any) -> dict[Exponents, Fraction]:
     """Sparse form of an element of the ring."""
-    return {tuple(map(int, e)): Fraction(int(c.p), int(c.q)) for e, c in polynomial.to_dict().items()}
+    return {tuple(map(int, e)): fraction_of(c) for e, c in polynomial.to_dict().items()}
 
 
 def product(variables: int, factors: Iterable[Polynomial]) -> dict[Exponents, Fraction]:
@@ -131,4 +133,4 @@ def from_sympy(expression: Any, variables: Sequence[Any]) -> dict[Exponents, Fra
             f"a polynomial in {', '.join(map(str, variables))} with rational coefficients is needed. "
             f"Received {str(expression)[:80]} ({error}). Write floats as exact rationals."
         ) from None
-    return {tuple(e): Fraction(int(c.p), int(c.q)) for e, c in terms if c}
+    return {tuple(e): fraction_of(c) for e, c in terms if c}

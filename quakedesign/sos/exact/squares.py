@@ -7,6 +7,7 @@ from fractions import Fraction
 from math import lcm
 from typing import NamedTuple
 
+from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.definiteness import full_matrix, over_common_denominator, positive_definite_integers
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, ring, times
 
@@ -80,12 +81,12 @@ def in_echelon_form(square: Square) -> Square:
         for i, p in enumerate(polynomials)
     ]
     reduced, _ = fmpq_mat([[fmpq(c.numerator, c.denominator) for c in row] for row in rows]).rref()
-    table = [[Fraction(int(v.p), int(v.q)) for v in row] for row in reduced.tolist()]
+    table = [[fraction_of(v) for v in row] for row in reduced.tolist()]
     change = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row[len(support) :]] for row in table]).inv()
     gram = fmpq_mat([[fmpq(q.numerator, q.denominator) for q in row] for row in full_matrix(square.gram, size)])
     moved = (change.transpose() * gram * change).tolist()
     basis = tuple(as_element(dict(zip(support, row, strict=False))) for row in table)
-    upper = tuple(Fraction(int(moved[i][j].p), int(moved[i][j].q)) for i in range(size) for j in range(i, size))
+    upper = tuple(fraction_of(moved[i][j]) for i in range(size) for j in range(i, size))
     return Square(product=square.product, basis=basis, gram=upper)
 
 

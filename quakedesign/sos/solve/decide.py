@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from quakedesign.rationals import nearest
+from quakedesign.rationals import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree
 from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds, identity_holds
 from quakedesign.sos.exact.reduction import full_bases, parity_classes, reduced_bases
@@ -222,6 +222,6 @@ def _project(values: dict[Exponents, Fraction], rows) -> dict[Exponents, Fractio
         total = Fraction(0)
         for i in range(pivot + 1, len(keys)):
             if row[i] != 0:
-                total -= Fraction(int(row[i].p), int(row[i].q)) * values.get(keys[i], Fraction(0))
+                total -= fraction_of(row[i]) * values.get(keys[i], Fraction(0))
         result[keys[pivot]] = total
     return result

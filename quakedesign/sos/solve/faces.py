@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, evaluate, monomial
 from quakedesign.sos.exact.squares import Element, as_element
 from quakedesign.sos.solve.moment import Shape
@@ -57,7 +58,7 @@ class Block:
         if not kernel:
             return self
         reduced, rank = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in kernel]).rref()
-        rows = [[Fraction(int(v.p), int(v.q)) for v in row] for row in reduced.tolist()[:rank]]
+        rows = [[fraction_of(v) for v in row] for row in reduced.tolist()[:rank]]
         pivots = [next(i for i, v in enumerate(row) if v) for row in rows]
         size = len(self.monomials) if self.face is None else len(self.face)
         complement = []

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
-from quakedesign.rationals import nearest
+from quakedesign.rationals import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, product, times
 from quakedesign.sos.exact.proofs import Square, SumOfSquares, identity_holds, residual
 from quakedesign.sos.exact.statement import Statement
@@ -136,7 +136,7 @@ class _System:
         if not rows:
             return {} if not missing else None
         answer = matrix.solve(fmpq_mat([[fmpq(v.numerator, v.denominator)] for v in side]))
-        values = [Fraction(int(v[0].p), int(v[0].q)) for v in answer.tolist()]
+        values = [fraction_of(v[0]) for v in answer.tolist()]
         return dict(zip(chosen, values, strict=True))
 
     def _choose(self):

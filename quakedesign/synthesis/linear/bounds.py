@@ -9,7 +9,7 @@ from quakedesign.certificates.linear_premises import Sectors, rest_pressure, sec
 from quakedesign.certificates.premises import least_authority, plant_ranges
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
 
 Range = tuple[Fraction, Fraction]
@@ -115,7 +115,7 @@ def uncertainty_bounds(fault: Fault, *, loading_rate: float | str = 0) -> Uncert
     if speed < 0:
         raise ParameterError(f"loading_rate must not be negative. Received {float(speed):.4g} m/s. Give its size.")
     found, b, ranges = sectors(fault), least_authority(fault), plant_ranges(fault)
-    values = {name: Fraction(int(v.p), int(v.q)) for name, v in plant.plant_values(fault).items()}
+    values = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
     drift = ranges[plant.k_hat][1] * speed * rational(fault.reference.operation_time)
     parts = _terms(fault, found, ranges, values, drift)
     lasting = sum((max(map(abs, r)) for _, acts_on, r in parts if acts_on == "nothing"), Fraction(0)) / b
@@ -154,4 +154,4 @@ def _terms(fault: Fault, found: Sectors, ranges, values, drift: Fraction) -> lis
 
 def _fraction(value: sp.Expr) -> Fraction:
     exact = sp.nsimplify(value, rational=True)
-    return Fraction(int(exact.p), int(exact.q))
+    return fraction_of(exact)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from quakedesign.rationals import fraction_of
 from quakedesign.synthesis.linear.matrices import (
     Matrix,
     diagonal,
@@ -84,5 +85,5 @@ def refutes(question: Question, z: Sequence[Fraction]) -> bool:
         return value <= 0
     g1, g2 = question.inside.bounds
     root = arb(fmpq(*(lambda v: (v.numerator, v.denominator))(z1 * z2))).sqrt().lower().fmpq()
-    least = g1**2 * z1 + g2**2 * z2 + 2 * g1 * g2 * max(Fraction(int(root.p), int(root.q)), Fraction(0))
+    least = g1**2 * z1 + g2**2 * z2 + 2 * g1 * g2 * max(fraction_of(root), Fraction(0))
     return value - least <= 0  # min of a1z1 + a2z2 over the admissible D is (g1√z1 + g2√z2)²

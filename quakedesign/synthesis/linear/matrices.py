@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.definiteness import positive_definite
 
 Rows = Sequence[Sequence[Fraction]]
@@ -71,7 +72,7 @@ def inverse(a: Rows) -> Matrix:
     from flint import fmpq, fmpq_mat
 
     found = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in a]).inv()
-    return tuple(tuple(Fraction(int(v.p), int(v.q)) for v in row) for row in found.tolist())
+    return tuple(tuple(fraction_of(v) for v in row) for row in found.tolist())
 
 
 def trace_of_product(a: Rows, b: Rows) -> Fraction:
@@ -96,7 +97,7 @@ def frobenius(a: Rows) -> Fraction:
 
     square = sum((v * v for row in a for v in row), Fraction(0))
     end = arb(fmpq(square.numerator, square.denominator)).sqrt().upper().fmpq()
-    return Fraction(int(end.p), int(end.q))
+    return fraction_of(end)
 
 
 def definite(a: Rows) -> bool:
@@ -109,7 +110,7 @@ def characteristic(a: Rows) -> tuple[Fraction, ...]:
     from flint import fmpq, fmpq_mat
 
     found = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in a]).charpoly()
-    return tuple(Fraction(int(c.p), int(c.q)) for c in reversed(found.coeffs()))
+    return tuple(fraction_of(c) for c in reversed(found.coeffs()))
 
 
 def hurwitz(polynomial: Sequence[Fraction]) -> bool:

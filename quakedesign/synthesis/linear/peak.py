@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.claim import require
+from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.definiteness import full_matrix, positive_definite
 from quakedesign.synthesis.linear.polytope import ERROR_STATES, ErrorLoop
 
@@ -168,6 +169,6 @@ def tightest_bound(rows: Sequence[Sequence[Fraction]], output: Sequence[Fraction
     P = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows])
     column = fmpq_mat([[fmpq(v.numerator, v.denominator)] for v in output])
     square = (column.transpose() * P.solve(column))[0, 0]
-    value = Fraction(int(square.p), int(square.q))
+    value = fraction_of(square)
     unit = Fraction(10) ** (math.floor(math.log10(float(value)) / 2) - digits)
     return (math.isqrt(math.floor(value / unit**2)) + 2) * unit

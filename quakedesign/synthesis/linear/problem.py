@@ -9,7 +9,7 @@ from itertools import product
 from quakedesign.certificates.linear_premises import Sectors, sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
 
 Matrix = tuple[tuple[Fraction, ...], ...]
@@ -97,7 +97,7 @@ class LinearProblem:
     @classmethod
     def of(cls, fault: Fault) -> "LinearProblem":
         """Problem of a fault over its uncertainty box, about any constant reference up to the target slip."""
-        values = {symbol: Fraction(int(v.p), int(v.q)) for symbol, v in plant.plant_values(fault).items()}
+        values = {symbol: fraction_of(v) for symbol, v in plant.plant_values(fault).items()}
         return cls(stiffness=values[plant.k_hat], damping=values[plant.eta_hat], sectors=sectors(fault))
 
     @property

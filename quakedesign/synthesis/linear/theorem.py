@@ -13,7 +13,7 @@ from typing import Any
 from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.certificates.premises import least_authority, plant_ranges
 from quakedesign.fault import Fault, load_fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
 from quakedesign.synthesis.linear.care import solve_care
 from quakedesign.synthesis.linear.inverse_optimality import InverseOptimality, inverse_optimality
@@ -130,12 +130,12 @@ def printed_row(fault: Fault) -> Range:
     ranges, values = plant_ranges(fault), plant.plant_values(fault)
 
     def spread(symbol: Any) -> Fraction:
-        nominal = Fraction(int(values[symbol].p), int(values[symbol].q))
+        nominal = fraction_of(values[symbol])
         return max(ranges[symbol][1] - nominal, nominal - ranges[symbol][0])
 
     slope: Any = fault.friction.exact().slip_slope
     stress = ranges[plant.sigma][1]
-    weakening = Fraction(int(slope.p), int(slope.q)) if slope else Fraction(0)
+    weakening = fraction_of(slope) if slope else Fraction(0)
     b, growth = least_authority(fault), fault.disturbance
     first = spread(plant.k_hat) + weakening * stress * spread(plant.N_hat) + abs(rational(growth.slip_growth))
     return first / b, (spread(plant.eta_hat) + abs(rational(growth.rate_growth))) / b
@@ -183,7 +183,7 @@ def switched_growth(problem: LinearProblem, gains: Sequence[Fraction], switching
     for _ in range(7):
         power, n = power * power, 2 * n
         end = ((abs(power.trace()) / 4) ** (arb(1) / n)).lower().fmpq()
-        best = max(best, Fraction(int(end.p), int(end.q)))
+        best = max(best, fraction_of(end))
     return best
 
 
