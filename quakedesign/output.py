@@ -10,6 +10,23 @@ from pathlib import Path
 from quakedesign.errors import OutputError
 
 
+def require_room(path: Path) -> None:
+    """Refuse a place that cannot be written, before the work begins.
+
+    Raises
+    ------
+    OutputError
+    """
+    parent = path.absolute().parent
+    try:
+        with tempfile.TemporaryFile(dir=parent):
+            pass
+    except OSError as error:
+        raise OutputError(
+            f"{path} must be in a folder that can be written. Received {parent}: {error.strerror}. Choose another."
+        ) from None
+
+
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file through a temporary neighbour, so that no reader ever sees half of it.
 

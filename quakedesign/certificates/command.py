@@ -50,7 +50,8 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
     try:
         raw = read_json(path)
         if is_about_polynomial(raw):
-            return _polynomial(raw)
+            verdict_of, said = _polynomial(raw)
+            return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
         certificate = certificate_of(raw)
         verdict = certificate.check()
         more = _covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []

@@ -43,6 +43,9 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
+    except OSError as error:
+        where = error.filename or "the output"
+        _refuse(f"{where} cannot be used: {error.strerror or error}. Choose another place, or make room.")
     except Exception as error:
         if "QUAKEDESIGN_TRACEBACK" in os.environ:
             raise

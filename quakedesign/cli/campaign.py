@@ -13,11 +13,13 @@ from quakedesign.cli.shared import (
     MetresPerSecond,
     Push,
     Seconds,
+    Whole,
     app,
     console,
     print_json,
     progress,
 )
+from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:
     from quakedesign.simulation.campaign import Campaign, Problem
@@ -30,14 +32,14 @@ def campaign(
     fault: str,
     /,
     *,
-    samples: int,
+    samples: Whole,
     controller: str = "cta",
     gains: Gains = ("published",),
     scale: str | None = None,
     feedforward: str = "none",
     scheme: str = "explicit",
     step: Seconds | None = None,
-    substeps: int = 1,
+    substeps: Whole = 1,
     method: str = "dormand-prince",
     duration: Seconds | None = None,
     plant: str = "smooth",
@@ -48,10 +50,10 @@ def campaign(
     sensors: SensorOptions = _EXACT,
     initial_slip: Metres = 0.0,
     initial_rate: MetresPerSecond = 0.0,
-    seed: int = 0,
+    seed: Whole = 0,
     search: str | None = None,
     rerun: str | None = None,
-    workers: int | None = None,
+    workers: Whole | None = None,
     scheduler: str | None = None,
     out: Path | None = None,
     force: Force = False,
@@ -164,6 +166,8 @@ def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
     """Run one sample again and store it."""
     if index is None:
         return {}
+    if index.isdecimal() and int(index) >= len(done.outcomes):
+        raise ParameterError(f"rerun must be an index below {len(done.outcomes)}, or search-N. Received {index}.")
     run = done.trajectory(int(index) if index.isdecimal() else index)
     path = run.save(folder / f"sample-{index}.nc")
     return {"rerun": {"index": index, "file": str(path), "metrics": run.metrics.to_dict(), "events": dict(run.events)}}
@@ -194,4 +198,5 @@ def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], folder:
     for failure in answer["failures"]:
         span = f"{failure['samples'][0]} … {failure['samples'][-1]}"
         out.print(f"failed: samples {span}: {failure['reason']}", markup=False)
-    out.print(f"written: {folder}/ (results.json, samples.csv, distribution.png)", markup=False)
+    more = f", {Path(answer['rerun']['file']).name}" if "rerun" in answer else ""
+    out.print(f"written: {folder}/ (results.json, samples.csv, distribution.png{more})", markup=False)

@@ -14,6 +14,7 @@ from quakedesign.cli.shared import (
     Pascals,
     PascalsPerSecond,
     Seconds,
+    Whole,
 )
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class ActuatorOptions:
     lag
         Time constant of pump and pipe, such as '1 s'.
     diffusion
-        L^2/D of the rock between well and fault, such as '60 s'.
+        L^2/D of the rock between well and fault, such as '100 s'; the smaller, the more substeps it needs.
     storage
         Fluid that this rock takes up per pressure, such as '1e-4 m^3/Pa'; gives injected volume and flow rate.
     cells
@@ -58,7 +59,7 @@ class ActuatorOptions:
     lag: Seconds | None = None
     diffusion: Seconds | None = None
     storage: CubicMetresPerPascal | None = None
-    cells: int = 16
+    cells: Whole = 16
 
     def build(self, step: float) -> "Actuator":
         """Actuator for a sampling period [s]; raises `ParameterError`."""
@@ -84,9 +85,9 @@ class EstimateOptions:
         Of the differentiator.
     """
 
-    averaging: int = 1
+    averaging: Whole = 1
     differentiator_bound: MetresPerSecondSquared | None = None
-    filter_order: int = 0
+    filter_order: Whole = 0
 
 
 @Parameter(name="*", group=_SENSORS)

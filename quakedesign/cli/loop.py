@@ -12,12 +12,14 @@ from quakedesign.cli.shared import (
     MetresPerSecond,
     Push,
     Seconds,
+    Whole,
     app,
     console,
     new_file,
     print_json,
     progress,
 )
+from quakedesign.errors import ParameterError
 
 _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
 
@@ -34,14 +36,14 @@ def simulate(
     step: Seconds | None = None,
     duration: Seconds | None = None,
     scheme: str = "continuous",
-    substeps: int = 1,
+    substeps: Whole = 1,
     method: str = "dormand-prince",
     plant: str = "smooth",
     drift: MetresPerSecond = 0.0,
     perturbation: Push | None = None,
     actuator: ActuatorOptions = _DIRECT,
     sensors: SensorOptions = _EXACT,
-    seed: int = 0,
+    seed: Whole = 0,
     out: Path | None = None,
     force: Force = False,
     json: Json = False,
@@ -95,6 +97,8 @@ def simulate(
 
     new_file(out, "output file", force=force)
     found = load_fault(fault)
+    if controller == "none" and (gains != ("published",) or scale is not None or feedforward != "none"):
+        raise ParameterError("gains, scale and feedforward need a controller. Received none. Give --controller.")
     law = None if controller == "none" else choice(found, controller, gains, scale=scale, feedforward=feedforward)
     pushed = None if perturbation is None else read_perturbation(perturbation)
     period = found.sampling_time if step is None else step

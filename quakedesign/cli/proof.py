@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Gains, Json, app, console, new_file, print_json
+from quakedesign.cli.shared import ExactSeconds, Force, Gains, Json, app, console, new_file, print_json
 from quakedesign.errors import ParameterError
 
 
@@ -22,7 +22,7 @@ def certify(
     gain_range: tuple[str, str] | None = None,
     box: str | None = None,
     feedback: str | None = None,
-    step: str | None = None,
+    step: ExactSeconds | None = None,
     peaks: str | None = None,
     out: Path | None = None,
     force: Force = False,
@@ -53,7 +53,7 @@ def certify(
     feedback
         For the e-LQR: error (k1 and k2 act on x1 - r and x2 - r', the default) or state (on x1 and x2, as printed).
     step
-        For the e-LQR: sampling period in s for which p is held; the fault's unless given.
+        For the e-LQR: sampling period for which p is held, such as '140 ms' or 7/50 (s); the fault's unless given.
     peaks
         For the e-LQR: certify how fast the fault can slip at most, for every disturbance of a class: amplitude or rate.
     out

@@ -9,7 +9,8 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter
 from rich.console import Console
 
-from quakedesign.errors import OutputError, UnitError
+from quakedesign.errors import OutputError, ParameterError, UnitError
+from quakedesign.output import require_room
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Force = Annotated[bool, Parameter(negative="")]
@@ -30,6 +31,20 @@ def _reader(unit: str) -> Callable[[Any, Sequence[Any]], float]:
     return read
 
 
+def _whole(_type: Any, tokens: Sequence[Any]) -> int:
+    text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
+    try:
+        return int(text)
+    except ValueError:
+        raise ParameterError(f"{name} must be a whole number. Received {text!r}. Write for example 8.") from None
+
+
+def _exact_seconds(_type: Any, tokens: Sequence[Any]) -> str:
+    """Number as it is written, p/q among them, or that of a text with a unit."""
+    text = tokens[0].value
+    return repr(_with_unit(text, "s", "step")) if any(c.isalpha() for c in text.replace("e", "")) else text
+
+
 def _with_unit(text: str, unit: str, name: str) -> float:
     from quakedesign.fault.units import si_value
 
@@ -46,12 +61,15 @@ MetresPerSecondSquared = Annotated[float, Parameter(converter=_reader("m/s^2"))]
 Pascals = Annotated[float, Parameter(converter=_reader("Pa"))]
 PascalsPerSecond = Annotated[float, Parameter(converter=_reader("Pa/s"))]
 CubicMetresPerPascal = Annotated[float, Parameter(converter=_reader("m^3/Pa"))]
+ExactSeconds = Annotated[str, Parameter(converter=_exact_seconds)]
+Whole = Annotated[int, Parameter(converter=_whole)]
 Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 app = App(
     name="quakedesign",
     help="Design controllers that let a fault slip slowly instead of in an earthquake, and prove that they do.",
     version_flags=["--version"],
+    suppress_keyboard_interrupt=False,
 )
 
 
@@ -80,10 +98,15 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
     Raises
     ------
     OutputError
-        When it exists and force is not given.
+        When it exists and force is not given, or cannot be written.
     """
-    if path is not None and path.exists() and not force:
+    if path is None:
+        return
+    if path.exists() and not force:
         raise OutputError(f"{what} must be new. Received {path}, which exists. Give --force to replace it.")
+    if path.is_dir():
+        raise OutputError(f"{what} must be a file. Received {path}, which is a folder. Choose another --out.")
+    require_room(path)
 
 
 @contextmanager

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Json, Seconds, app, console, new_file, print_json
-from quakedesign.errors import OutputError, ParameterError, UnknownNameError
+from quakedesign.cli.shared import Force, Json, Seconds, Whole, app, console, new_file, print_json
+from quakedesign.errors import ParameterError, UnknownNameError
 
 if TYPE_CHECKING:
     from quakedesign.synthesis.gains import Synthesis
@@ -24,9 +24,9 @@ def synthesise(
     gain_range: tuple[str, str] | None = None,
     bound: float | None = None,
     degree: tuple[int, ...] = (),
-    starts: int | None = None,
-    seed: int | None = None,
-    workers: int | None = None,
+    starts: Whole | None = None,
+    seed: Whole | None = None,
+    workers: Whole | None = None,
     step: Seconds | None = None,
     scheme: str | None = None,
     metric: str | None = None,
@@ -82,7 +82,7 @@ def synthesise(
 
     if objective not in (*OBJECTIVES, "sampled"):
         raise UnknownNameError(f"objective must be one of {', '.join(OBJECTIVES)}, sampled. Received {objective!r}.")
-    _new_certificate(out, force=force)
+    new_file(out, "certificate file", force=force)
     began = perf_counter()
     of_search = {"starts": starts, "seed": seed, "workers": workers}
     of_trial = {"step": step, "scheme": scheme, "metric": metric}
@@ -107,18 +107,6 @@ def synthesise(
     else:
         _print(law, found, more)
     return 0 if found is not None else 1
-
-
-def _new_certificate(out: Path | None, *, force: bool) -> None:
-    """Refuse a place that cannot be written, before the work begins.
-
-    Raises
-    ------
-    OutputError
-    """
-    new_file(out, "certificate file", force=force)
-    if out is not None and (out.is_dir() or not out.absolute().parent.is_dir()):
-        raise OutputError(f"certificate file must be a file in a folder that exists. Received {out}. Make the folder.")
 
 
 def _given(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from quakedesign.fault.disturbance import Disturbance
 from quakedesign.fault.friction import FrictionLaw, friction_law, friction_laws
-from quakedesign.fault.parameters import Fault
+from quakedesign.fault.parameters import Fault, require_fault
 from quakedesign.fault.reference import Reference
 from quakedesign.fault.scenario import load_fault, parse_fault, presets
 from quakedesign.fault.uncertainty import BOXES, UncertaintyBox, uncertainty_box
@@ -19,5 +19,6 @@ __all__ = [
     "load_fault",
     "parse_fault",
     "presets",
+    "require_fault",
     "uncertainty_box",
 ]

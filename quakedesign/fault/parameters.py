@@ -176,3 +176,15 @@ class Fault:
         from quakedesign.fault.statics import rest_slip
 
         return rest_slip(self)
+
+
+def require_fault(fault: Fault) -> Fault:
+    """The fault, if it is one.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not isinstance(fault, Fault):
+        raise ParameterError(f"fault must be a Fault. Received {fault!r:.60}. Write load_fault('real-fault'), say.")
+    return fault

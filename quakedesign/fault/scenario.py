@@ -86,7 +86,9 @@ def parse_fault(text: str, name: str) -> Fault:
 
 @cache
 def _model() -> Any:
-    from pydantic import BaseModel, ConfigDict
+    from typing import Annotated
+
+    from pydantic import BaseModel, ConfigDict, Field
 
     class Strict(BaseModel):
         model_config = ConfigDict(extra="forbid", strict=True)
@@ -109,7 +111,7 @@ def _model() -> Any:
         authority: str | float = 0.0
 
     class Scenario(Strict):
-        name: str
+        name: Annotated[str, Field(pattern=r"^[\w][\w .+-]{0,59}$")]
         source: str
         density: str
         shear_modulus: str
@@ -132,7 +134,12 @@ def _validated(raw: dict[str, Any], name: str) -> Any:
     except ValidationError as error:
         deepest = max(error.errors(), key=lambda item: len(item["loc"]))
         where = ".".join(str(part) for part in deepest["loc"] if part not in _BRANCHES)
-        said = {"missing": f"{where} must be given. Received nothing", "extra_forbidden": f"{where} is not a known key"}
+        said = {
+            "missing": f"{where} must be given. Received nothing",
+            "extra_forbidden": f"{where} is not a known key",
+            "string_pattern_mismatch": f"{where} must be of at most 60 letters, digits, spaces and _ . + -, beginning "
+            f"with a letter or digit. Received {str(deepest['input'])[:60]!r}",
+        }
         wrong = f"{where} has the wrong type. Received {str(deepest['input'])[:60]!r}"
         raise ScenarioError(
             f"{name}: {said.get(deepest['type'], wrong)}. Every quantity is a text with a unit; compare with a preset."

@@ -9,7 +9,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import Variant, certified_lipschitz
 from quakedesign.controllers import SlidingMode, published
-from quakedesign.fault import Fault
+from quakedesign.fault import Fault, require_fault
 from quakedesign.report.headlines import AS_IN_THE_PAPER, headline
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate, simulation_scheme
 from quakedesign.simulation.step_stability import amplification
@@ -79,7 +79,7 @@ class Entry:
         }
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Comparison:
     """Uncontrolled, published and designed on one fault.
 
@@ -118,6 +118,9 @@ class Comparison:
 
         return figures(self)
 
+    def __repr__(self) -> str:
+        return "\n".join((f"Comparison on {self.fault.name}:", *(f"  {e.label}: {headline(e)}" for e in self.entries)))
+
     def _repr_html_(self) -> str:
         from quakedesign.report.page import table_html
 
@@ -152,6 +155,7 @@ def compare(
     -------
     Comparison
     """
+    require_fault(fault)
     tell = progress or (lambda _what, _done: None)
     schemes = {"designed": scheme, "published": published_scheme or AS_IN_THE_PAPER}
     for name in schemes.values():

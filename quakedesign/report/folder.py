@@ -1,7 +1,6 @@
 """The folder of results, complete or not there."""
 
 import json
-import os
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.certificates import Certificate, certificate_text
 from quakedesign.errors import OutputError
-from quakedesign.output import whole_folder
+from quakedesign.output import require_room, whole_folder
 from quakedesign.report.comparison import Comparison, Entry
 from quakedesign.report.facts import fault_dict, fault_sentences
 from quakedesign.report.numbers import csv_text, printed, table
@@ -32,11 +31,7 @@ def prepare(out: Path, *, force: bool) -> None:
         raise OutputError(f"output folder must be new. Received {out}, which exists. Give --force to replace it.")
     if out.exists() and not (out / "results.json").is_file():
         raise OutputError(f"only a folder with results.json is replaced. Received {out}. Choose another --out.")
-    parent = out.absolute().parent
-    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
-        raise OutputError(
-            f"output folder must be in a folder that can be written. Received {out}. Choose another --out."
-        )
+    require_room(out)
 
 
 def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:

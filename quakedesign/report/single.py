@@ -89,7 +89,8 @@ def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> tuple[Contro
         known = published(fault.name)
         if name not in known:
             raise UnknownNameError(
-                f"published gains exist for real-fault and lab-fault. Received {fault.name!r}. Give --gains."
+                f"published gains exist for real-fault and lab-fault. Received {fault.name!r}. "
+                "Give --gains designed, or the gains of the law."
             )
         return known[name], None
     if gains == DESIGNED:

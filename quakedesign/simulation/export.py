@@ -138,7 +138,9 @@ def export_controller(
 
 def _require_free(folder: Path, force: bool) -> None:
     if folder.exists() and not force:
-        raise OutputError(f"the folder of an export must be new. Received {folder}, which exists. Force to replace it.")
+        raise OutputError(
+            f"the folder of an export must be new. Received {folder}, which exists. Give --force to replace it."
+        )
     if folder.exists() and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= {SOURCE, HEADER}):
         raise OutputError(f"only a folder with {SOURCE} and {HEADER} is replaced. Received {folder}. Choose another.")
     parent = folder.absolute().parent

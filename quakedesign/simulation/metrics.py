@@ -122,7 +122,7 @@ _UNITS = {
     "pressure_total_variation": "Pa",
     "reverse_slip_fraction": "",
     "peak_slip_rate": "m/s",
-    "max_h_rate": "m^3 Pa/(kg s^3)",
+    "max_h_rate": "m/s^3",
     "max_pressure": "Pa",
     "min_pressure": "Pa",
     "settled_from": "s",

@@ -8,7 +8,7 @@ from typing import Any
 
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
-from quakedesign.fault import Fault
+from quakedesign.fault import Fault, require_fault
 from quakedesign.simulation.actuators import Actuator
 from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
 from quakedesign.simulation.assembly import trajectory
@@ -113,7 +113,7 @@ def simulate(
         When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
         cannot go on, or when the checkpoint is that of another run.
     """
-    fault.require_memoryless("a controlled run")
+    require_fault(fault).require_memoryless("a controlled run")
     setting = Setting.of(fault, step, duration, samples, settled_from)
     if variation:
         variation.require_within(fault)

@@ -18,7 +18,7 @@ SIGNALS = {
     "pressure": ("fluid pressure p", "Pa"),
     "reference": ("reference slip r", "m"),
     "reference_rate": ("reference slip rate r'", "m/s"),
-    "matched_perturbation": ("matched perturbation h", "m^3 Pa/(kg s^2)"),
+    "matched_perturbation": ("matched perturbation h", "m/s^2"),
     "friction": ("friction coefficient", ""),
     "shear_stress": ("shear stress that resists slip", "Pa"),
     "moment_rate": ("seismic moment rate", "N m/s"),

@@ -6,7 +6,7 @@ from functools import cached_property
 import mpmath
 import sympy as sp
 
-from quakedesign.fault import Fault
+from quakedesign.fault import Fault, require_fault
 from quakedesign.symbolic import plant, state_plant
 from quakedesign.symbolic.equilibrium import operating_rate
 from quakedesign.symbolic.plant import ErrorDynamics
@@ -132,4 +132,4 @@ def derive(fault: Fault) -> Model:
     Model
         With ``instability``, ``error_dynamics``, ``jacobian`` (SymPy) and ``_repr_latex_``.
     """
-    return Model(fault)
+    return Model(require_fault(fault))

@@ -17,7 +17,7 @@ from quakedesign.certificates.premises import (
 from quakedesign.controllers import Controller, SlidingMode, control_law, family
 from quakedesign.controllers.feed_forward import NONE, FeedForward, feed_forward
 from quakedesign.errors import CertificateError, KinkError, ParameterError, UnknownNameError
-from quakedesign.fault import Fault
+from quakedesign.fault import Fault, require_fault
 from quakedesign.synthesis.designed import Design
 from quakedesign.synthesis.finishing import claims_of, finish
 from quakedesign.synthesis.linear.analysis import unstable_vertex, why_undecided
@@ -64,6 +64,7 @@ def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none", 
     ParameterError
         For a feed-forward with a law that takes none, or a sliding mode that shall be designed for a held pressure.
     """
+    require_fault(fault)
     if controller not in DESIGNABLE:
         raise UnknownNameError(f"controller to design must be one of {', '.join(DESIGNABLE)}. Received {controller!r}.")
     fault.require_memoryless("design")

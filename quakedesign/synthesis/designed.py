@@ -16,7 +16,7 @@ from quakedesign.synthesis.linear.facts import held_facts
 from quakedesign.synthesis.linear.problem import LinearProblem
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Design:
     """A controller for one fault, what is proved of it, and under which premises.
 
@@ -97,6 +97,10 @@ class Design:
             return None
         gains = tuple(self.controller.gains.values())
         return held_facts(LinearProblem.of(self.fault), gains, rational(self.fault.sampling_time))
+
+    def __repr__(self) -> str:
+        gains = ", ".join(f"{name} = {value}" for name, value in self.gains.items()) or "none"
+        return f"Design of {self.title} for {self.fault.name}: {self.verdict}; gains {gains}"
 
     def _repr_html_(self) -> str:
         from html import escape

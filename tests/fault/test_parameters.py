@@ -97,3 +97,15 @@ def test_a_fault_is_a_value():
     assert REAL.with_disturbance(LAB.disturbance).disturbance == LAB.disturbance
     with pytest.raises(AttributeError):
         REAL.density = 1.0
+
+
+def test_a_name_in_place_of_a_fault_is_refused_with_the_remedy():
+    import quakedesign as qd
+
+    for call in (
+        lambda: qd.design("real-fault", "cta"),
+        lambda: qd.simulate("real-fault"),
+        lambda: qd.derive("real-fault"),
+    ):
+        with pytest.raises(ParameterError, match=r"Received 'real-fault'\. Write load_fault"):
+            call()

@@ -92,6 +92,7 @@ WRONG = {
     "nan box": (BOX, "uncertainty = { damping = nan }", ParameterError, "uncertainty.damping must be a finite number"),
     "unknown box part": (BOX, "uncertainty = { mass = 0.1 }", ScenarioError, "uncertainty.mass is not a known key"),
     "number as box": (BOX, "uncertainty = 3", ScenarioError, "uncertainty has the wrong type. Received '3'"),
+    "path as name": ('name = "real-fault"', 'name = "a/../b"', ScenarioError, "name must be of at most 60 letters"),
     "number as name": ('name = "real-fault"', "name = 3", ScenarioError, "name has the wrong type"),
     "no operation": ("184.17 hour", "0 hour", ParameterError, "operation_time must be positive"),
     "coarse sampling": ("184 ms", "1 hour", ParameterError, "sampling_time must be at most a thousandth"),

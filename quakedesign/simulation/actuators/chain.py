@@ -1,5 +1,6 @@
 """Stages in a row."""
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -81,7 +82,7 @@ class Actuator:
             if times > 1:
                 raise ParameterError(
                     f"a substep must be at most {LONGEST / stage.fastest:.3g} s for the {stage.name}. "
-                    f"Received {substep:.3g} s. Take {times:.3g} times as many substeps, or leave the stage out."
+                    f"Received {substep:.3g} s. Take {math.ceil(times)} times as many substeps, or leave the stage out."
                 )
 
     def hold(self, numbers: list[Any], memory: list[Any], pressure: Any, step: float) -> tuple[Any, Any, list[Any]]:

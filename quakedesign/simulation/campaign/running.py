@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from dataclasses import fields
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ from quakedesign.simulation.campaign.space import Sample, Space, require_count, 
 from quakedesign.simulation.campaign.worker import advance
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.loading import Load
+from quakedesign.simulation.metrics import ActuatorMetrics
 from quakedesign.simulation.run import Setting
 from quakedesign.simulation.schemes import Scheme, simulation_scheme
 
@@ -126,6 +128,8 @@ def run_campaign(
         When the folder holds another campaign, or the workers cannot be reached.
     """
     require_count(samples)
+    if metric is not None:
+        require_metric(metric, [field.name for field in fields(ActuatorMetrics)])
     if scheduler and executor:
         raise ParameterError("give a scheduler or an executor. Received both. Leave one out.")
     began = perf_counter()

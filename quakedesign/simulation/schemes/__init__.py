@@ -35,9 +35,10 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
         raise ParameterError(f"scheme must be one of {', '.join(sorted(schemes()))}. Received {name!r}.")
     kind = schemes()[name]
     known: set[str] = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
-    for setting in settings.keys() - known:
+    for setting in sorted(settings.keys() - known):
+        able = [n for n, one in schemes().items() if is_dataclass(one) and setting in {f.name for f in fields(one)}]
         raise ParameterError(
-            f"the scheme {name} has {', '.join(sorted(known)) or 'no settings'}. Received {setting}. "
-            "Use another scheme, or leave it out."
+            f"settings of {setting} are for the schemes {', '.join(sorted(able)) or 'of nobody'}. "
+            f"Received {name}. Use one of them, or leave the settings out."
         )
     return kind(**settings)

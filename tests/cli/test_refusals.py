@@ -1,0 +1,103 @@
+"""What is wrong is refused in one line before any work is done; nothing is left behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from quakedesign.cli import main
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(list(map(str, arguments)))
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["map", "cta", "--over", "k1", "k2", "--points", "2.5"], "points must be a whole number. Received '2.5'"),
+        (["campaign", "lab-fault", "--samples", "2.5"], "samples must be a whole number. Received '2.5'"),
+        (["simulate", "lab-fault", "--scheme", "explicit", "--substeps", "1.7"], "substeps must be a whole number"),
+        (["simulate", "lab-fault", "--gains", "1", "2", "3", "4"], "need a controller. Received none"),
+        (["simulate", "lab-fault", "--controller", "cta", "--saturation", "5 MPa"], "Received continuous"),
+        (["certify", "elqr", "lab-fault", "--gains", "1", "2", "3", "4", "--step", "1 m"], "step"),
+    ],
+)
+def test_one_line_says_what_is_wrong(capsys, tmp_path, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["design", "lab-fault", "--out"],
+        ["sampling", "lab-fault", "--out"],
+        ["map", "cta", "--over", "k1", "k2", "--out"],
+        ["simulate", "lab-fault", "--out"],
+        ["certify", "cta", "--gains", "7", "5", "2.3", "1.1", "--lipschitz", "1", "--out"],
+    ],
+)
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(capsys, tmp_path, monkeypatch, arguments):
+    for module in ("quakedesign.simulation.run", "quakedesign.synthesis.lyapunov", "quakedesign.synthesis.maps"):
+        __import__(module)
+    monkeypatch.setattr("quakedesign.synthesis.lyapunov.find_certificate", lambda *_, **__: pytest.fail("searched"))
+    code, out, err = run(capsys, *arguments, tmp_path / "none" / "there")
+    assert (code, out) == (2, "")
+    assert "must be in a folder that can be written" in err
+
+
+def test_an_unknown_metric_is_refused_before_any_sample_runs(capsys, tmp_path):
+    folder = tmp_path / "campaign"
+    code, _, err = run(capsys, "campaign", "lab-fault", "--samples", "2", "--search", "foo", "--out", folder)
+    assert code == 2
+    assert "metric must be one of" in err
+    assert not folder.exists()
+
+
+def test_a_step_has_a_unit_or_is_a_fraction_of_seconds(capsys):
+    gains = ("1.88e9", "5.79e8", "1.02e6", "18.52")
+    steps = []
+    for written in ("92 ms", "23/250", "0.092"):
+        code, out, _ = run(capsys, "certify", "elqr", "real-fault", "--gains", *gains, "--step", written, "--json")
+        assert code == 0
+        steps.append(json.loads(out)["held"]["step"])
+    assert len(set(steps)) == 1
+
+
+def test_a_proof_about_a_polynomial_says_nothing_about_a_fault(capsys, tmp_path):
+    file = tmp_path / "square.json"
+    assert run(capsys, "sos", "x^2 + 1", "--out", file)[0] == 0
+    code, out, _ = run(capsys, "check", file, "--fault", "lab-fault")
+    assert code == 0
+    assert "nothing is said about lab-fault" in out
+
+
+def test_an_interruption_ends_with_one_line(tmp_path):
+    command = [sys.executable, "-m", "quakedesign", "synthesise", "cta", "--objective", "decay", "--workers", "1"]
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    time.sleep(4)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.strip().splitlines()[-1] == "quakedesign: interrupted; nothing was written."
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no full device")
+def test_a_full_disk_is_no_defect():
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "quakedesign", "fault", "lab-fault", "--json"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2
+    assert "No space left on device" in done.stderr
