@@ -75,7 +75,8 @@ def _slips(axis: Any, comparison: "Comparison", origin: str, sizes: tuple[float,
     runs = runs_of(comparison.of(origin))
     for place, (entry, run) in enumerate(runs):
         width = 1.5 * (len(runs) - place)
-        axis.plot(run.time / divisor, run.slip / size, **style(entry) | {"linewidth": width, "linestyle": "solid"})
+        look = style(entry) | {"linewidth": width, "linestyle": "solid", "label": entry.design.title}
+        axis.plot(run.time / divisor, run.slip / size, **look)
     axis.plot(runs[0][1].time / divisor, known(runs[0][1].reference) / size, color="black", linestyle=":", linewidth=1)
     axis.legend(loc="lower right", fontsize=SMALL - 1)
     named(axis, f"{origin} gains")

@@ -111,6 +111,7 @@ def friction_coefficient(comparison: "Comparison") -> Any:
     for bound, name, side in ((low, "smallest", "top"), (high, "largest", "bottom")):
         axis.axhline(float(bound), color="grey", linestyle=":", linewidth=1)
         axis.annotate(f"{name} {float(bound):.4g}", (1, float(bound)), xycoords=("axes fraction", "data"),
+                      xytext=(-4, -3 if side == "top" else 3), textcoords="offset points",
                       ha="right", va=side, fontsize=SMALL - 1, color="#444444")  # fmt: skip
     axis.margins(y=0.12)
     axis.set_xlabel(f"time [{unit}]")
@@ -132,7 +133,7 @@ def errors_and_power(comparison: "Comparison") -> Any:
     _notes(axes[1, 2], basis)
     return finish(
         drawing,
-        f"{comparison.fault.name}: errors and average power, over those of the {basis.label}",
+        f"{comparison.fault.name}: errors and RMS pressure, over those of the {basis.label}",
         [run for _, run in runs_of(entry for entry, _ in shown)],
         with_diverged(comparison.entries),
     )
@@ -154,7 +155,7 @@ def _bars(axis: Any, shown: "list[tuple[Entry, dict[str, Any]]]", name: str, tit
     if logarithmic:
         axis.set_xscale("log")
         low, high = min(*values, 1.0), max(*values, 1.0)
-        axis.set_xlim(low / 2, high * (high / low) ** 0.45 * 4)
+        axis.set_xlim(low / 2, high * (high / low) ** 0.6 * 4)
     else:
         axis.set_xlim(0, 1.4 * max(*values, 1.0))
 

@@ -35,6 +35,7 @@ def figure(campaign: "Campaign") -> Any:
     problem = campaign.problem
     law = problem.controller.title if problem.controller else "no control"
     drawing.suptitle(f"{problem.fault.name}, {law}: {count} samples, {diverged} diverge")
+    drawing.supxlabel(f"scheme {problem.scheme.name}, step {problem.setting.step:g} s", fontsize=7)
     return drawing
 
 
@@ -49,9 +50,12 @@ def _distribution(axis: Any, campaign: "Campaign", name: str) -> None:
         value = campaign.quantiles((level,))[name][f"{level:g}"]
         if value is not None:
             axis.axvline(value, color="grey", linestyle=":", linewidth=1)
-            axis.annotate(label, (value, level), fontsize=7, textcoords="offset points", xytext=(2, -8))
+            side = {"ha": "right", "xytext": (-2, 2)} if level > 0.5 else {"ha": "left", "xytext": (2, 2)}
+            axis.annotate(label, (value, level), fontsize=7, textcoords="offset points", **side)
     if len(finite) and finite[0] > 0 and finite[-1] > _DECADES * finite[0]:
         axis.set_xscale("log")
+    else:
+        axis.locator_params(axis="x", nbins=5)
     axis.set_xlabel(f"{name.replace('_', ' ')} [{StickMetrics.unit(name) or '-'}]")
     if axis.get_subplotspec().is_first_col():
         axis.set_ylabel("share of samples [-]")
