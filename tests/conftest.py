@@ -1,4 +1,8 @@
-"""Random tests draw the same examples every time."""
+"""Random tests draw the same examples every time; every worker computes on one thread, as there is one per core."""
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from hypothesis import settings
 

@@ -16,7 +16,7 @@ def run(capsys, *arguments):
     return stop.value.code, out, err
 
 
-@pytest.fixture(scope="module", params=["real-fault", "lab-fault"])
+@pytest.fixture(scope="module", params=["real-fault", pytest.param("lab-fault", marks=pytest.mark.slow)])
 def main_job(request, tmp_path_factory):
     """The main job as a user runs it."""
     folder = tmp_path_factory.mktemp("job")
