@@ -91,9 +91,11 @@ def controllers(name: str) -> list[str]:
 
 
 def positive(comparison: Any) -> bool:
-    """Whether every design is proved and the premises hold that do not depend on a run or on the start."""
+    """Whether every design is proved and its premises hold but for those on run and start; no run diverges or opens."""
     needed = {"along_reference", "control_coefficient", "friction_slope"}
     return all(
-        str(entry.design.verdict) == "proved" and all(p.holds for p in entry.design.premises if p.name in needed)
+        str(entry.design.verdict) == "proved"
+        and all(p.holds for p in entry.design.premises if p.name in needed)
+        and not (entry.run is not None and {"diverged", "opening"} & set(entry.run.events))
         for entry in comparison.of("designed")
     )

@@ -101,3 +101,21 @@ def test_a_full_disk_is_no_defect():
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 2
     assert "No space left on device" in done.stderr
+
+
+def test_a_design_whose_run_opens_the_fault_is_no_positive_answer(capsys, tmp_path):
+    import importlib.resources
+
+    text = (importlib.resources.files("quakedesign.fault") / "presets" / "lab-fault.toml").read_text()
+    text = (
+        text.replace('"lab-fault"', '"hasty"')
+        .replace("1 hour", "1 s")
+        .replace("target_slip = ", 'target_slip = "2 m" # ')
+    )
+    path = tmp_path / "hasty.toml"
+    path.write_text(text)
+    code, out, _ = run(capsys, "design", path, "--controller", "elqr", "--out", tmp_path / "out", "--json")
+    (found,) = json.loads(out)["controllers"].values()
+    assert found["verdict"] == "proved"
+    assert {"opening", "diverged"} & set(found["events"])
+    assert code == 1
