@@ -24,6 +24,10 @@ class UnknownNameError(QuakedesignError, KeyError):
         return str(self.args[0])
 
 
+class UnsupportedError(QuakedesignError, NotImplementedError):
+    """An expression or model for which no method is known."""
+
+
 class KinkError(QuakedesignError, ArithmeticError):
     """A derivative asked for at a point where the expression has none."""
 

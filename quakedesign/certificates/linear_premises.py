@@ -19,7 +19,7 @@ from quakedesign.certificates.premises import (
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import fraction_of, rational
+from quakedesign.rationals import fraction_of, rational, to_sympy
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.balls import enclose, upper_bound
 
@@ -92,17 +92,19 @@ def effective_stress(fault: Fault) -> tuple[Fraction, bool]:
     p* balances friction, spring and the disturbance's growth at rest at r0 (ERRATA 8); friction there is anything that
     the box allows.
     """
-    ranges, start = plant_ranges(fault), _sympy(static_friction(fault))
-    known = {_growth: _sympy(rational(fault.disturbance.slip_growth)), _drift: 0, plant.mu_star: start}
+    ranges, start = plant_ranges(fault), to_sympy(static_friction(fault))
+    known = {_growth: to_sympy(rational(fault.disturbance.slip_growth)), _drift: 0, plant.mu_star: start}
     numerator = sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r)
     target = rational(fault.reference.target_slip)
-    least = sp.Max(_sympy(friction_range(fault)[0]), start - _sympy(_fraction(fault.friction.exact().slip_slope)) * _r)
+    least = sp.Max(
+        to_sympy(friction_range(fault)[0]), start - to_sympy(_fraction(fault.friction.exact().slip_slope)) * _r
+    )
     box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)} | {_r: (Fraction(0), target)}
     stress = upper_bound(numerator / least, box, pieces=400)
-    lowest = numerator.subs(_r, _sympy(target)).subs(
-        {plant.k_hat: _sympy(box[plant.k_hat][1]), plant.N_hat: _sympy(box[plant.N_hat][0])}
+    lowest = numerator.subs(_r, to_sympy(target)).subs(
+        {plant.k_hat: to_sympy(box[plant.k_hat][1]), plant.N_hat: to_sympy(box[plant.N_hat][0])}
     )
-    return stress, bool(lowest.subs(plant.sigma, _sympy(box[plant.sigma][0])) > 0)
+    return stress, bool(lowest.subs(plant.sigma, to_sympy(box[plant.sigma][0])) > 0)
 
 
 def rest_pressure(
@@ -160,8 +162,8 @@ def _net_stress() -> sp.Expr:
 def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]:
     """p* in symbols, written so that few of them repeat, and their ranges."""
     known = {
-        _growth: _sympy(rational(fault.disturbance.slip_growth)),
-        plant.mu_star: _sympy(static_friction(fault)),
+        _growth: to_sympy(rational(fault.disturbance.slip_growth)),
+        plant.mu_star: to_sympy(static_friction(fault)),
     }
     expression = plant.sigma - sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r) / _mu  # μ once
     ranges = plant_ranges(fault)
@@ -261,7 +263,3 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
 def _fraction(value) -> Fraction:
     exact = sp.nsimplify(value, rational=True)
     return fraction_of(exact)
-
-
-def _sympy(value: Fraction) -> sp.Rational:
-    return sp.Rational(value.numerator, value.denominator)

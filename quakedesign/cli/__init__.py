@@ -1,5 +1,6 @@
 """The command line. Every command returns its exit code; heavy libraries load inside the commands."""
 
+import errno
 import io
 import os
 import sys
@@ -25,6 +26,10 @@ __all__ = [
 ]
 
 
+_PLACES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
+"""What a disk refuses, as against a defect."""
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its code; every refusal is one line on stderr and exit code 2."""
     for stream in (sys.stdout, sys.stderr):
@@ -43,12 +48,12 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
-    except OSError as error:
-        where = error.filename or "the output"
-        _refuse(f"{where} cannot be used: {error.strerror or error}. Choose another place, or make room.")
     except Exception as error:
         if "QUAKEDESIGN_TRACEBACK" in os.environ:
             raise
+        if isinstance(error, OSError) and error.errno in _PLACES:
+            where = error.filename or "the output"
+            _refuse(f"{where} cannot be written: {error.strerror}. Choose another place, or make room.")
         defect = " ".join(f"{type(error).__name__}: {error}".split())
         print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the place.", file=sys.stderr)
         sys.exit(3)

@@ -119,22 +119,20 @@ def campaign(
         Print JSON.
     """
     from quakedesign.fault import load_fault
-    from quakedesign.report.single import chosen_controller
+    from quakedesign.report.single import optional_choice
     from quakedesign.simulation import Load
     from quakedesign.simulation import perturbation as read_perturbation
     from quakedesign.simulation.campaign import campaign_problem, run_campaign
     from quakedesign.simulation.run import sampled_scheme
 
+    if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
+        raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
     found = load_fault(fault, box=box)
     period = found.sampling_time if step is None else step
-    law = (
-        None
-        if controller == "none"
-        else chosen_controller(found, controller, gains, scale=scale, feedforward=feedforward)
-    )
+    law = optional_choice(found, controller, gains, scale=scale, feedforward=feedforward)
     problem = campaign_problem(
         found,
-        law,
+        law.controller if law else None,
         scheme=sampled_scheme(scheme, substeps, actuator.build(period), sensors.build(period)),
         step=step,
         method=method,
@@ -166,8 +164,6 @@ def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
     """Run one sample again and store it."""
     if index is None:
         return {}
-    if index.isdecimal() and int(index) >= len(done.outcomes):
-        raise ParameterError(f"rerun must be an index below {len(done.outcomes)}, or search-N. Received {index}.")
     run = done.trajectory(int(index) if index.isdecimal() else index)
     path = run.save(folder / f"sample-{index}.nc")
     return {"rerun": {"index": index, "file": str(path), "metrics": run.metrics.to_dict(), "events": dict(run.events)}}

@@ -19,7 +19,6 @@ from quakedesign.cli.shared import (
     print_json,
     progress,
 )
-from quakedesign.errors import ParameterError
 
 _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
 
@@ -91,15 +90,13 @@ def simulate(
         Print JSON.
     """
     from quakedesign.fault import load_fault
-    from quakedesign.report.single import choice, run_single
+    from quakedesign.report.single import optional_choice, run_single
     from quakedesign.simulation import Load
     from quakedesign.simulation import perturbation as read_perturbation
 
     new_file(out, "output file", force=force)
     found = load_fault(fault)
-    if controller == "none" and (gains != ("published",) or scale is not None or feedforward != "none"):
-        raise ParameterError("gains, scale and feedforward need a controller. Received none. Give --controller.")
-    law = None if controller == "none" else choice(found, controller, gains, scale=scale, feedforward=feedforward)
+    law = optional_choice(found, controller, gains, scale=scale, feedforward=feedforward)
     pushed = None if perturbation is None else read_perturbation(perturbation)
     period = found.sampling_time if step is None else step
     chain, told = actuator.build(period), sensors.build(period, seed)

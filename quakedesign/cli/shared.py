@@ -11,6 +11,7 @@ from rich.console import Console
 
 from quakedesign.errors import OutputError, ParameterError, UnitError
 from quakedesign.output import require_room
+from quakedesign.rationals import rational
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Force = Annotated[bool, Parameter(negative="")]
@@ -42,7 +43,11 @@ def _whole(_type: Any, tokens: Sequence[Any]) -> int:
 def _exact_seconds(_type: Any, tokens: Sequence[Any]) -> str:
     """Number as it is written, p/q among them, or that of a text with a unit."""
     text = tokens[0].value
-    return repr(_with_unit(text, "s", "step")) if any(c.isalpha() for c in text.replace("e", "")) else text
+    try:
+        rational(text)
+    except ParameterError:
+        return repr(_with_unit(text, "s", "step"))
+    return text
 
 
 def _with_unit(text: str, unit: str, name: str) -> float:

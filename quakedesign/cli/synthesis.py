@@ -23,7 +23,7 @@ def synthesise(
     lipschitz: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     gain_range: tuple[str, str] | None = None,
     bound: float | None = None,
-    degree: tuple[int, ...] = (),
+    degree: tuple[Whole, ...] = (),
     starts: Whole | None = None,
     seed: Whole | None = None,
     workers: Whole | None = None,

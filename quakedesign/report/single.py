@@ -44,6 +44,23 @@ def chosen_controller(
     return choice(fault, name, gains, scale=scale, feedforward=feedforward).controller
 
 
+def optional_choice(
+    fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
+) -> Choice | None:
+    """A `choice`, which see, or None for the name ``none``.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        Also for gains, a scale or a feed-forward of no controller.
+    """
+    if name != "none":
+        return choice(fault, name, gains, scale=scale, feedforward=feedforward)
+    if gains != PUBLISHED or scale is not None or feedforward != "none":
+        raise ParameterError("gains, scale and feedforward need a controller. Received none. Give --controller.")
+    return None
+
+
 def choice(
     fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
 ) -> Choice:

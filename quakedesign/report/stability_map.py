@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from quakedesign.errors import UnsupportedError
 from quakedesign.fault import Fault
 
 _COLOURS = {"stable": "#BFD9EC", "unstable": "#F3C6B2"}
@@ -110,7 +111,7 @@ def _functions(fault: Fault, rate: float, inertia: bool) -> tuple[Any, Any, list
     limits = [float(sp.re(r)) for c in fixed for r in c.nroots() if sp.im(r) == 0 and sp.re(r) > 0]
     try:
         critical = state_plant.critical_stiffness(law.symbolic(), inertia=inertia) / plant.N_hat
-    except NotImplementedError:
+    except UnsupportedError:
         return conditions, lambda s: np.full(np.shape(s), np.nan), limits
     known = {**law.values(), **values, state_plant.loading_rate: at, plant.sigma: stress, plant.p: 0}
     function = sp.lambdify(stress, sp.N(critical.subs(known)))

@@ -9,7 +9,7 @@ from quakedesign.controllers import Controller
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_positive
-from quakedesign.output import whole_folder, write_whole
+from quakedesign.output import require_room, whole_folder, write_whole
 from quakedesign.simulation.c_source import header_text, source_text
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.integrators import integrator
@@ -143,9 +143,7 @@ def _require_free(folder: Path, force: bool) -> None:
         )
     if folder.exists() and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= {SOURCE, HEADER}):
         raise OutputError(f"only a folder with {SOURCE} and {HEADER} is replaced. Received {folder}. Choose another.")
-    parent = folder.absolute().parent
-    if not parent.is_dir():
-        raise OutputError(f"{parent} is no folder. Create it, or choose another.")
+    require_room(folder)
 
 
 def _software(scheme: Scheme) -> Sampled:

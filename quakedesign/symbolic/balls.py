@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy as sp
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
@@ -42,7 +42,7 @@ def enclose(expression: sp.Expr, box: Box) -> Any:
 
     Raises
     ------
-    NotImplementedError
+    UnsupportedError
         For a function without an enclosure.
     """
     return _compiled(sp.sympify(expression))({symbol: ball(*ends) for symbol, ends in box.items()})
@@ -125,7 +125,7 @@ def _of_one(function: Callable[[Any], Any], values: list[Any]) -> Any:
 
 def _without(what: str) -> Operation:
     def refuse(values: list[Any]) -> Any:
-        raise NotImplementedError(f"no enclosure for {what}")
+        raise UnsupportedError(f"no enclosure for {what}. Write it with powers, exp, log, sin, cos, asinh, Min or Max.")
 
     return refuse
 

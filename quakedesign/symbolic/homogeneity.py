@@ -6,7 +6,7 @@ from itertools import combinations, islice, product
 
 import sympy as sp
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.filippov import FilippovField
 from quakedesign.symbolic.normal_form import normal_form, signs, symbols_of
@@ -255,6 +255,6 @@ def _on_a_switch(found: Counterexample) -> bool:
 def _differ(left: sp.Expr, right: sp.Expr) -> bool:
     try:
         enclosure = enclose(left - right, {})
-    except (NotImplementedError, AttributeError):
+    except (UnsupportedError, AttributeError):
         return False
     return bool(enclosure.is_finite() and not enclosure.contains(0))

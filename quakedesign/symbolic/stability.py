@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant, state_plant
@@ -183,7 +183,7 @@ def _condition(
     points = {s: (Fraction(str(v)), Fraction(str(v))) for s, v in parameters.items()}
     try:
         margin = _enclosed(inserted, {**points, **ranges})
-    except NotImplementedError:  # a parameter as exponent, say: with its number there may be an enclosure
+    except UnsupportedError:  # a parameter as exponent, say: with its number there may be an enclosure
         margin = _enclosed([t.subs(parameters) for t in inserted], {**points, **ranges})
     return Condition(expression=expression, margin=margin, exact=False)
 

@@ -8,6 +8,7 @@ from functools import cache
 
 import sympy as sp
 
+from quakedesign.errors import UnsupportedError
 from quakedesign.fault import FrictionLaw
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, mu_star, p, sigma
@@ -160,14 +161,14 @@ def critical_stiffness(law: FrictionLaw, *, inertia: bool = True) -> sp.Expr:
 
     Raises
     ------
-    NotImplementedError
+    UnsupportedError
         When a condition is not linear in the stiffness (several state variables).
     """
     roots: list[sp.Expr] = []
     for condition in stability_conditions(law.state_names, inertia=inertia):
         poly = sp.Poly(condition.subs(_absent(law)), k_hat)
         if poly.degree() > 1:
-            raise NotImplementedError("the critical stiffness has a closed form for at most one state variable")
+            raise UnsupportedError("the critical stiffness has a closed form for at most one state variable")
         if poly.degree() == 1:
             slope, offset = poly.all_coeffs()
             roots.append(_inserted(sp.factor(-offset / slope), law))

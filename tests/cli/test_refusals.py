@@ -1,5 +1,7 @@
 """What is wrong is refused in one line before any work is done; nothing is left behind."""
 
+import errno
+import io
 import json
 import os
 import signal
@@ -26,6 +28,9 @@ def run(capsys, *arguments):
         (["campaign", "lab-fault", "--samples", "2.5"], "samples must be a whole number. Received '2.5'"),
         (["simulate", "lab-fault", "--scheme", "explicit", "--substeps", "1.7"], "substeps must be a whole number"),
         (["simulate", "lab-fault", "--gains", "1", "2", "3", "4"], "need a controller. Received none"),
+        (["campaign", "lab-fault", "--samples", "2", "--controller", "none", "--scale", "2"], "need a controller"),
+        (["campaign", "lab-fault", "--samples", "2", "--rerun", "2"], "rerun must be an index below 2"),
+        (["synthesise", "cta", "--degree", "5.5"], 'unable to convert "5.5" into int'),
         (["simulate", "lab-fault", "--controller", "cta", "--saturation", "5 MPa"], "Received continuous"),
         (["certify", "elqr", "lab-fault", "--gains", "1", "2", "3", "4", "--step", "1 m"], "step"),
     ],
@@ -69,7 +74,7 @@ def test_an_unknown_metric_is_refused_before_any_sample_runs(capsys, tmp_path):
 def test_a_step_has_a_unit_or_is_a_fraction_of_seconds(capsys):
     gains = ("1.88e9", "5.79e8", "1.02e6", "18.52")
     steps = []
-    for written in ("92 ms", "23/250", "0.092"):
+    for written in ("92 ms", "23/250", "0.092", "9.2E-2"):
         code, out, _ = run(capsys, "certify", "elqr", "real-fault", "--gains", *gains, "--step", written, "--json")
         assert code == 0
         steps.append(json.loads(out)["held"]["step"])
@@ -94,13 +99,25 @@ def test_an_interruption_ends_with_one_line(tmp_path):
     assert err.strip().splitlines()[-1] == "quakedesign: interrupted; nothing was written."
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no full device")
-def test_a_full_disk_is_no_defect():
-    with open("/dev/full", "w") as full:
-        command = [sys.executable, "-m", "quakedesign", "fault", "lab-fault", "--json"]
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 2
-    assert "No space left on device" in done.stderr
+class Full(io.StringIO):
+    """A stream on a full disk."""
+
+    def write(self, _text):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_a_full_disk_is_no_defect(capsys, monkeypatch):
+    monkeypatch.setattr(sys, "stdout", Full())
+    code, _, err = run(capsys, "fault", "lab-fault", "--json")
+    assert code == 2
+    assert "No space left on device" in err
+
+
+def test_another_error_of_the_system_stays_a_defect(capsys, monkeypatch):
+    monkeypatch.setattr("quakedesign.fault.load_fault", lambda *_, **__: os.read(-1, 1))
+    code, _, err = run(capsys, "fault", "lab-fault")
+    assert code == 3
+    assert "defect: OSError" in err
 
 
 def test_a_design_whose_run_opens_the_fault_is_no_positive_answer(capsys, tmp_path):

@@ -168,7 +168,7 @@ def test_what_is_there_stays_unless_forced(tmp_path):
     (target / "notes").write_text("mine")
     with pytest.raises(OutputError, match="only a folder"):
         export_controller(LAB, PUBLISHED["cta"], target, force=True)
-    with pytest.raises(OutputError, match="no folder"):
+    with pytest.raises(OutputError, match="must be in a folder that can be written"):
         export_controller(LAB, PUBLISHED["cta"], tmp_path / "none" / "c")
 
 

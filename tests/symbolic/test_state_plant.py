@@ -9,6 +9,7 @@ import mpmath
 import pytest
 import sympy as sp
 
+from quakedesign.errors import UnsupportedError
 from quakedesign.fault import FrictionLaw, friction_law, friction_laws
 from quakedesign.symbolic import plant, state_plant
 from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, p, sigma
@@ -287,7 +288,7 @@ def test_no_derivation_takes_more_than_two_seconds(name):
 
 
 def test_a_closed_critical_stiffness_needs_at_most_one_state():
-    with pytest.raises(NotImplementedError, match="at most one state"):
+    with pytest.raises(UnsupportedError, match="at most one state"):
         state_plant.critical_stiffness(TwoStates().symbolic())
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import require_positive
 from quakedesign.fault.friction.base import FrictionLaw
-from quakedesign.rationals import fraction_of, rational
+from quakedesign.rationals import float_above, float_below, fraction_of, rational
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -140,8 +140,6 @@ class RateAndState(FrictionLaw):
 
 def outward(value: Any, *, up: bool) -> float:
     """Float that is not below (`up`) or not above an exact SymPy number."""
-    import math
-
     import sympy as sp
 
     if value.is_Rational:
@@ -149,10 +147,7 @@ def outward(value: Any, *, up: bool) -> float:
     else:
         near = rational(str(sp.N(value, _DIGITS)))
         exact = near + abs(near) * (_ROUNDING if up else -_ROUNDING)
-    nearest = float(exact)
-    if (Fraction(nearest) < exact) if up else (Fraction(nearest) > exact):
-        return math.nextafter(nearest, math.inf if up else -math.inf)
-    return nearest
+    return float_above(exact) if up else float_below(exact)
 
 
 def aging_rate(rate: Any, theta: Any, critical_slip: Any) -> Any:
