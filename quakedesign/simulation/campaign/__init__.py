@@ -1,7 +1,7 @@
 """Campaigns: many samples of one closed loop, in batches that survive whatever stops them."""
 
 from quakedesign.simulation.campaign.crews import SerialExecutor
-from quakedesign.simulation.campaign.problem import Outcome, Problem
+from quakedesign.simulation.campaign.problem import Problem, SampleResult
 from quakedesign.simulation.campaign.result import Campaign, Failure
 from quakedesign.simulation.campaign.running import campaign_problem, run_campaign
 from quakedesign.simulation.campaign.search import Worst
@@ -10,9 +10,9 @@ from quakedesign.simulation.campaign.space import Sample, Space
 __all__ = [
     "Campaign",
     "Failure",
-    "Outcome",
     "Problem",
     "Sample",
+    "SampleResult",
     "SerialExecutor",
     "Space",
     "Worst",

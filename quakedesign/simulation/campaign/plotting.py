@@ -31,7 +31,7 @@ def figure(campaign: "Campaign") -> Any:
         axis.set_visible(False)
     for axis, name in zip(axes, names, strict=False):
         _distribution(axis, campaign, name)
-    diverged, count = len(campaign.events["diverged"]), len(campaign.outcomes)
+    diverged, count = len(campaign.events["diverged"]), len(campaign.results)
     problem = campaign.problem
     law = problem.controller.title if problem.controller else "no control"
     drawing.suptitle(f"{problem.fault.name}, {law}: {count} samples, {diverged} diverge")

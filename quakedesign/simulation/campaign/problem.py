@@ -56,7 +56,7 @@ class ReleasedRecorder(Recorder):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class SampleResult:
     """What is known of a sample that has been run; a diverged one has events, but no figures.
 
     Attributes
@@ -171,15 +171,15 @@ class Problem:
             "versions": library_versions("quakedesign", "casadi", "numpy", "scipy", "sympy"),
         }
 
-    def outcomes(self, ends: "Sequence[np.ndarray]") -> list[Outcome]:
+    def results(self, ends: "Sequence[np.ndarray]") -> list[SampleResult]:
         """What the vectors at the end tell."""
         import casadi as ca
 
         vector = ca.SX.sym("z", self._watched.size)
         observe = ca.Function("observe", [vector], [self._watched.observe(vector)])
-        return [self._outcome(observe(end).full().ravel()) for end in ends]
+        return [self._result(observe(end).full().ravel()) for end in ends]
 
-    def _outcome(self, end: Any) -> Outcome:
+    def _result(self, end: Any) -> SampleResult:
         watched = self._watched.watched(end)
         found = metrics(
             watched,
@@ -192,7 +192,7 @@ class Problem:
             further=self._watched.scheme.described,
         ).to_dict()
         figures = {name: value for name, value in found.items() if value is not None and name not in _NOT_COMPARED}
-        return Outcome(figures=figures, events=events(watched))
+        return SampleResult(figures=figures, events=events(watched))
 
     def trajectory(self, sample: Sample, samples: int) -> Trajectory:
         """Run of a sample with about that many instants, with the digits that it has in the campaign."""

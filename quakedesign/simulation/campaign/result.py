@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError
 from quakedesign.output import write_whole
-from quakedesign.simulation.campaign.problem import Outcome, Problem
+from quakedesign.simulation.campaign.problem import Problem, SampleResult
 from quakedesign.simulation.campaign.search import Worst
 from quakedesign.simulation.campaign.space import UNITS
 from quakedesign.simulation.metrics import EVENTS, StickMetrics
@@ -47,18 +47,18 @@ class Campaign:
     Attributes
     ----------
     problem : Problem
-    outcomes : tuple of Outcome or None
+    results : tuple of SampleResult or None
         By index; None for a sample of a batch that failed.
     failures : tuple of Failure
     resumed : int
-        Number of samples whose outcome was found in the folder.
+        Number of samples whose result was found in the folder.
     search : Worst or None
     seconds : float
         Time that this call took [s].
     """
 
     problem: Problem = field(repr=False)
-    outcomes: tuple[Outcome | None, ...] = field(repr=False)
+    results: tuple[SampleResult | None, ...] = field(repr=False)
     failures: tuple[Failure, ...] = ()
     resumed: int = 0
     search: Worst | None = None
@@ -67,7 +67,7 @@ class Campaign:
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """Names of the metrics that the samples have."""
-        return metric_names([outcome for outcome in self.outcomes if outcome])
+        return metric_names([result for result in self.results if result])
 
     def values(self, metric: str) -> "np.ndarray":
         """One metric of all samples, shape (samples,): infinite for a diverged one, nan for one that failed.
@@ -80,7 +80,7 @@ class Campaign:
         import numpy as np
 
         require_metric(metric, self.metrics)
-        return np.array([math.nan if outcome is None else badness(outcome, metric) for outcome in self.outcomes]) * (
+        return np.array([math.nan if result is None else badness(result, metric) for result in self.results]) * (
             -1 if metric in _LESS_IS_WORSE else 1
         )
 
@@ -107,8 +107,8 @@ class Campaign:
     @cached_property
     def events(self) -> dict[str, list[int]]:
         """Indices of the samples in which something happened, by what."""
-        pairs = [(i, outcome) for i, outcome in enumerate(self.outcomes) if outcome]
-        return {name: [i for i, outcome in pairs if name in outcome.events] for name in EVENTS}
+        pairs = [(i, result) for i, result in enumerate(self.results) if result]
+        return {name: [i for i, result in pairs if name in result.events] for name in EVENTS}
 
     def trajectory(self, index: int | str, samples: int = 2000) -> Trajectory:
         """Run one sample again, with about that many instants and the digits that it has in the campaign.
@@ -137,7 +137,7 @@ class Campaign:
     def to_dict(self) -> dict[str, Any]:
         """Return what JSON can hold: samples, worst, quantiles, events, failures, search, resumed."""
         return {
-            "samples": len(self.outcomes),
+            "samples": len(self.results),
             "worst": {metric: [self._told(i, metric) for i in self.worst(metric)] for metric in self.metrics},
             "quantiles": self.quantiles(),
             "events": {name: {"count": len(found), "first": found[:SHOWN]} for name, found in self.events.items()},
@@ -165,7 +165,7 @@ class Campaign:
         """Return a pandas DataFrame over the index: numbers that differ, and metrics, with units; nan where unknown."""
         import pandas as pd
 
-        numbers = [self.problem.sample(i).numbers for i in range(len(self.outcomes))]
+        numbers = [self.problem.sample(i).numbers for i in range(len(self.results))]
         columns: dict[str, Any] = {
             f"{name} [{UNITS.get(name, '-')}]": [n[name] for n in numbers] for name in numbers[0]
         }
@@ -198,9 +198,9 @@ class Campaign:
         return figure(self)
 
 
-def metric_names(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
-    """Names of the metrics that any of the outcomes has, in order."""
-    return tuple(dict.fromkeys(name for outcome in outcomes for name in outcome.figures))
+def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
+    """Names of the metrics that any of the results has, in order."""
+    return tuple(dict.fromkeys(name for result in results for name in result.figures))
 
 
 def require_metric(metric: str, known: Sequence[str]) -> None:
@@ -216,11 +216,11 @@ def require_metric(metric: str, known: Sequence[str]) -> None:
         )
 
 
-def badness(outcome: Outcome, metric: str) -> float:
+def badness(result: SampleResult, metric: str) -> float:
     """Value of a metric, or its negative where less is worse; infinite for a diverged sample, or one too large."""
-    if metric not in outcome.figures:
+    if metric not in result.figures:
         return math.inf
-    value = outcome.figures[metric]
+    value = result.figures[metric]
     return -value if metric in _LESS_IS_WORSE else value
 
 

@@ -14,7 +14,7 @@ from quakedesign.fault import Fault
 from quakedesign.simulation.campaign.crews import Cluster, Crew, Given, Processes
 from quakedesign.simulation.campaign.dispatch import dispatch
 from quakedesign.simulation.campaign.ledger import Ledger
-from quakedesign.simulation.campaign.problem import Outcome, Problem
+from quakedesign.simulation.campaign.problem import Problem, SampleResult
 from quakedesign.simulation.campaign.program import Program
 from quakedesign.simulation.campaign.result import Campaign, Failure, badness, metric_names, require_metric
 from quakedesign.simulation.campaign.search import Worst, search
@@ -138,11 +138,11 @@ def run_campaign(
     with _crew(workers, scheduler, executor) as crew:
         runner = _Runner(problem, ledger, program, crew, batch, tell)
         chosen = [problem.sample(i) for i in range(samples)]
-        outcomes = runner.outcomes(chosen, list(map(str, range(samples))), "samples")
-        worst = runner.search(outcomes, metric, rounds) if metric else None
+        results = runner.results(chosen, list(map(str, range(samples))), "samples")
+        worst = runner.search(results, metric, rounds) if metric else None
     return Campaign(
         problem=problem,
-        outcomes=tuple(outcomes),
+        results=tuple(results),
         failures=tuple(runner.failures),
         resumed=runner.resumed,
         search=worst,
@@ -157,7 +157,7 @@ def _crew(workers: int | None, scheduler: str | None, executor: Executor | None)
 
 
 class _Runner:
-    """Outcomes of samples, from the ledger or from the crew."""
+    """Results of samples, from the ledger or from the crew."""
 
     def __init__(
         self, problem: Problem, ledger: Ledger, program: Program, crew: Crew, batch: int | None, tell: Tell
@@ -170,17 +170,17 @@ class _Runner:
 
     @property
     def resumed(self) -> int:
-        """Number of samples whose outcome was in the folder."""
+        """Number of samples whose result was in the folder."""
         return len(self._used & self._filed)
 
-    def outcomes(self, samples: Sequence[Sample], names: Sequence[str], what: str) -> list[Outcome | None]:
-        """Outcome of every sample, None where its batch failed."""
+    def results(self, samples: Sequence[Sample], names: Sequence[str], what: str) -> list[SampleResult | None]:
+        """Result of every sample, None where its batch failed."""
         starts = [self._problem.start(sample) for sample in samples]
         missing = [i for i, start in enumerate(starts) if start.tobytes() not in self._known]
         self._used.update(start.tobytes() for start in starts)
         self._compute([starts[i] for i in missing], [names[i] for i in missing], what, len(starts))
         ends = [self._known.get(start.tobytes()) for start in starts]
-        found = iter(self._problem.outcomes([end for end in ends if end is not None]))
+        found = iter(self._problem.results([end for end in ends if end is not None]))
         return [None if end is None else next(found) for end in ends]
 
     def _compute(self, starts: "list[np.ndarray]", names: list[str], what: str, total: int) -> None:
@@ -210,12 +210,12 @@ class _Runner:
         shared = -(-count // (BATCHES_PER_WORKER * self._crew.width))
         return max(1, min(LARGEST_BATCH, shared, BATCH_STEPS // self._problem.setting.steps))
 
-    def search(self, outcomes: Sequence[Outcome | None], metric: str, rounds: int) -> Worst | None:
+    def search(self, results: Sequence[SampleResult | None], metric: str, rounds: int) -> Worst | None:
         """Worst sample by a metric, from the worst one known and the corners on; None where all failed."""
-        known = [(i, outcome) for i, outcome in enumerate(outcomes) if outcome]
+        known = [(i, result) for i, result in enumerate(results) if result]
         if not known:
             return None
-        require_metric(metric, metric_names([outcome for _, outcome in known]))
+        require_metric(metric, metric_names([result for _, result in known]))
         first = max(known, key=lambda pair: badness(pair[1], metric))[0]
         counter = 0
 
@@ -223,8 +223,8 @@ class _Runner:
             nonlocal counter
             names = [f"search-{counter + i}" for i in range(len(samples))]
             counter += len(samples)
-            found = self.outcomes(samples, names, f"search, {counter} samples")
-            return [-math.inf if outcome is None else badness(outcome, metric) for outcome in found]
+            found = self.results(samples, names, f"search, {counter} samples")
+            return [-math.inf if result is None else badness(result, metric) for result in found]
 
         start, seed = self._problem.point(first), self._problem.sample(first).noise_seed
         return search(self._problem.space, metric, evaluate, [start], noise_seed=seed, rounds=rounds)

@@ -55,7 +55,7 @@ def test_divergence_is_that_of_the_sampled_linear_loop():
     samples = [problem.sample(i) for i in range(32)]
     ends = advance(problem.program, [problem.start(s) for s in samples], problem.setting.steps)
     radii = np.array([spectral_radius(sample.variation) for sample in samples])
-    found = np.array([outcome.diverged for outcome in problem.outcomes(ends)])
+    found = np.array([result.diverged for result in problem.results(ends)])
     clear = (radii < 1) | (radii > 1.012)  # 1.012^4000 is 5e20
     assert min(sum(found[clear]), sum(~found[clear])) > 3
     assert np.array_equal(found[clear], radii[clear] > 1)

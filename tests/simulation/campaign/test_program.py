@@ -32,7 +32,7 @@ def ends(tmp_path_factory):
 
 
 def test_some_diverge_and_some_do_not(ends):
-    diverged = [outcome.diverged for outcome in PROBLEM.outcomes(ends)]
+    diverged = [result.diverged for result in PROBLEM.results(ends)]
     assert 0 < sum(diverged) < 16
 
 
@@ -73,13 +73,13 @@ def test_a_sample_is_what_simulate_gives():
 
     problem = campaign_problem(LAB, LAW, scheme=SCHEME, duration=0.1)
     sample = problem.sample(3)
-    (outcome,) = problem.outcomes(advance(problem.program, [problem.start(sample)], problem.setting.steps))
+    (result,) = problem.results(advance(problem.program, [problem.start(sample)], problem.setting.steps))
     scheme = reseeded(SCHEME, sample.noise_seed)
     run = simulate(LAB, LAW, scheme=scheme, duration=0.1, variation=Variation(**_varied(sample)))
     figures = run.metrics.to_dict()
-    assert outcome.figures
-    assert outcome.figures == {name: figures[name] for name in outcome.figures}
-    assert outcome.events == run.events
+    assert result.figures
+    assert result.figures == {name: figures[name] for name in result.figures}
+    assert result.events == run.events
 
 
 def _varied(sample):

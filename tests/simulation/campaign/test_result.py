@@ -8,22 +8,22 @@ import pytest
 from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.simulation.campaign import Campaign, Outcome, campaign_problem
+from quakedesign.simulation.campaign import Campaign, SampleResult, campaign_problem
 from quakedesign.simulation.campaign.result import LEVELS, Failure
 
 PROBLEM = campaign_problem(load_fault("lab-fault"), published("lab-fault")["elqr"], duration=0.1)
 RANDOM = np.random.default_rng(0)
 
 
-def outcome(value):
+def result(value):
     if value is None:
-        return Outcome(figures={}, events={"diverged": 0.1})
-    return Outcome(figures={"max_slip_error": value, "min_pressure": -value}, events={})
+        return SampleResult(figures={}, events={"diverged": 0.1})
+    return SampleResult(figures={"max_slip_error": value, "min_pressure": -value}, events={})
 
 
 def campaign(values, **more):
-    found = [None if value is math.nan else outcome(value) for value in values]
-    return Campaign(problem=PROBLEM, outcomes=tuple(found), **more)
+    found = [None if value is math.nan else result(value) for value in values]
+    return Campaign(problem=PROBLEM, results=tuple(found), **more)
 
 
 @pytest.mark.parametrize("count", [1, 2, 19, 20, 100])

@@ -101,7 +101,7 @@ def test_more_samples_begin_with_those_that_are_there(serial, tmp_path):
     few = run_campaign(PROBLEM, 10, tmp_path, executor=SerialExecutor())
     more = run_campaign(PROBLEM, COUNT, tmp_path, executor=SerialExecutor())
     assert (few.resumed, more.resumed) == (0, 10)
-    assert more.outcomes == serial[0].outcomes
+    assert more.results == serial[0].results
 
 
 def test_a_sample_run_again_has_its_digits(serial):
@@ -109,13 +109,13 @@ def test_a_sample_run_again_has_its_digits(serial):
     worst = found.worst("max_slip_rate_error", COUNT)
     for index in (worst[-1], worst[0], f"search-{found.search.index}"):
         run = found.trajectory(index, samples=20)
-        outcome = found.outcomes[index] if isinstance(index, int) else None
+        result = found.results[index] if isinstance(index, int) else None
         assert len(run.time) > 1
-        if outcome is None:
+        if result is None:
             assert ("diverged" in run.events) == np.isinf(found.search.value)
         else:
-            assert {name: getattr(run.metrics, name) for name in outcome.figures} == outcome.figures
-            assert run.events == outcome.events
+            assert {name: getattr(run.metrics, name) for name in result.figures} == result.figures
+            assert run.events == result.events
 
 
 def test_an_interruption_leaves_what_is_done(serial, tmp_path):
