@@ -1,8 +1,13 @@
 """The exceptions of quakedesign: one small tree, each message says what, expected, received, remedy."""
 
+from quakedesign.text import one_line
+
 
 class QuakedesignError(Exception):
     """Anything that quakedesign refuses; the command line prints it as one line and exits with 2."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
 
 
 class ParameterError(QuakedesignError, ValueError):

@@ -16,7 +16,7 @@ import quakedesign
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "quakedesign"
-EVERYWHERE = {"quakedesign.errors", "quakedesign.rationals", "quakedesign.output"}
+EVERYWHERE = {"quakedesign.errors", "quakedesign.rationals", "quakedesign.output", "quakedesign.text"}
 BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "certificates", "simulation")
 MAY_IMPORT = {
     "fault": (),
@@ -33,6 +33,7 @@ MAY_IMPORT = {
     "__main__": ("cli",),
     "__init__": (),
     "errors": (),
+    "text": (),
     "rationals": (),
     "output": (),
 }

@@ -4,12 +4,14 @@ import errno
 import io
 import os
 import sys
+import warnings
 
 from cyclopts import CycloptsError
 
 from quakedesign.cli import campaign, design, figures, gain_map, loop, plant, polynomial, proof, synthesis
 from quakedesign.cli.shared import app
 from quakedesign.errors import QuakedesignError
+from quakedesign.text import one_line
 
 __all__ = [
     "app",
@@ -35,6 +37,8 @@ def main(arguments: list[str] | None = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    if arguments is None and not sys.warnoptions:
+        _without_warnings()
     try:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.exit(code if isinstance(code, int) else 0)
@@ -54,11 +58,17 @@ def main(arguments: list[str] | None = None) -> None:
         if isinstance(error, OSError) and error.errno in _PLACES:
             where = error.filename or "the output"
             _refuse(f"{where} cannot be written: {error.strerror}. Choose another place, or make room.")
-        defect = " ".join(f"{type(error).__name__}: {error}".split())
+        defect = one_line(f"{type(error).__name__}: {error}")
         print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the place.", file=sys.stderr)
         sys.exit(3)
 
 
+def _without_warnings() -> None:
+    """Keep warnings of libraries from users, in workers too; ``python -W default -m quakedesign`` shows them."""
+    warnings.simplefilter("ignore")
+    os.environ.setdefault("PYTHONWARNINGS", "ignore")
+
+
 def _refuse(reason: str) -> None:
-    print("quakedesign: " + " ".join(reason.split()), file=sys.stderr)
+    print(f"quakedesign: {one_line(reason)}", file=sys.stderr)
     sys.exit(2)

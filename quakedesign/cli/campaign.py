@@ -20,6 +20,7 @@ from quakedesign.cli.shared import (
     progress,
 )
 from quakedesign.errors import ParameterError
+from quakedesign.text import one_line
 
 if TYPE_CHECKING:
     from quakedesign.simulation.campaign import Campaign, Problem
@@ -151,7 +152,7 @@ def campaign(
             done.save(folder)
             answer = done.to_dict() | _again(done, rerun, folder)
     except KeyboardInterrupt:
-        print(f"quakedesign: interrupted; the same command goes on from {folder}.", file=sys.stderr)
+        print(one_line(f"quakedesign: interrupted; the same command goes on from {folder}."), file=sys.stderr)
         return 130
     if json:
         print_json(answer)
@@ -178,7 +179,7 @@ def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], folder:
     happened = ", ".join(f"{len(found)} {name.replace('_', ' ')}" for name, found in done.events.items() if found)
     law = problem.controller.title if problem.controller else "no control"
     out.print(f"{problem.fault.name}, {law}: {answer['samples']} samples, {answer['resumed']} of them from files")
-    out.print(f"events (samples): {happened or 'none'}", markup=False)
+    out.print(f"events (samples): {happened or 'none'}")
     levels = ("0.05", "0.5", "0.95", "1")
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     for column in ("metric", "unit", "5 %", "50 %", "95 %", "worst", "samples"):
@@ -190,9 +191,9 @@ def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], folder:
     out.print(table, soft_wrap=False)
     for told in (answer["search"],) if answer["search"] else ():
         value = "diverges" if told["value"] is None else f"{told['value']:.6g} {StickMetrics.unit(told['metric'])}"
-        out.print(f"search: {told['metric']} = {value} in {told['index']} of {told['looked_at']} samples", markup=False)
+        out.print(f"search: {told['metric']} = {value} in {told['index']} of {told['looked_at']} samples")
     for failure in answer["failures"]:
         span = f"{failure['samples'][0]} … {failure['samples'][-1]}"
-        out.print(f"failed: samples {span}: {failure['reason']}", markup=False)
+        out.print(f"failed: samples {span}: {failure['reason']}")
     more = f", {Path(answer['rerun']['file']).name}" if "rerun" in answer else ""
-    out.print(f"written: {folder}/ (results.json, samples.csv, distribution.png{more})", markup=False)
+    out.print(f"written: {folder}/ (results.json, samples.csv, distribution.png{more})")

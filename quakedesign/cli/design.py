@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Json, app, console, print_json, progress
+from quakedesign.cli.shared import Force, Json, app, console, print_json, print_lines, progress
 from quakedesign.errors import ParameterError, UnknownNameError
 
 
@@ -72,7 +72,7 @@ def design(
         from quakedesign.report.terminal import print_comparison
 
         print_comparison(comparison, console())
-        console().print(f"\nwritten: {folder}/ (results.json, report.html, certificates, figures)")
+        print_lines(["", f"written: {folder}/ (results.json, report.html, certificates, figures)"])
     return 0 if positive(comparison) else 1
 
 

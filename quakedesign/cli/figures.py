@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from quakedesign.cli.design import controllers, positive
-from quakedesign.cli.shared import Force, Json, app, console, print_json, progress
+from quakedesign.cli.shared import Force, Json, app, console, print_json, print_lines, progress
 
 
 @app.command
@@ -52,8 +52,7 @@ def compare(
         from quakedesign.report.terminal import print_comparison
 
         print_comparison(comparison, console())
-        for line in printed_lines(printed(comparison)):
-            print(line)
+        print_lines(printed_lines(printed(comparison)))
     return 0 if positive(comparison) else 1
 
 
@@ -111,9 +110,8 @@ def figures(
     if json:
         print_json(results)
         return 0
-    for drawn in results["figures"].values():
-        print(f"{folder}/{drawn['file']}" + (f": {drawn['paper']} of the paper" if drawn["paper"] else ""))
-    for line in printed_lines(results["printed"]):
-        print(line)
-    console().print(f"\nwritten: {folder}/ (also results.json, numbers.csv, report.html, certificates)")
+    files = [(drawn["file"], drawn["paper"]) for drawn in results["figures"].values()]
+    print_lines(f"{folder}/{file}" + (f": {paper} of the paper" if paper else "") for file, paper in files)
+    print_lines(printed_lines(results["printed"]))
+    print_lines(["", f"written: {folder}/ (also results.json, numbers.csv, report.html, certificates)"])
     return 0

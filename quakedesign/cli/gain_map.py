@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Gains, Json, Whole, app, console, print_json, progress
+from quakedesign.cli.shared import Force, Gains, Json, Whole, app, print_json, print_lines, progress
 from quakedesign.errors import ParameterError
 
 Numbers = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
@@ -96,8 +96,7 @@ def gain_map(
     if json:
         print_json(facts)
     else:
-        for line in gain_map_lines(drawn):
-            console().print(line, markup=False)
-        console().print(f"written: {folder}/ (map.png, map.csv, results.json, certificates)", markup=False)
+        written = f"written: {folder}/ (map.png, map.csv, results.json, certificates)"
+        print_lines([*gain_map_lines(drawn), written])
     proved = all(level["edge_proved"] == level["edge"] for level in facts["levels"])
     return 0 if proved and any(level["screened"] for level in facts["levels"]) else 1

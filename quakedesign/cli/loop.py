@@ -17,6 +17,7 @@ from quakedesign.cli.shared import (
     console,
     new_file,
     print_json,
+    print_lines,
     progress,
 )
 
@@ -143,7 +144,8 @@ def _print_run(trajectory: Any, premises: Any) -> None:
 
     print_run(trajectory, premises, console())
     if trajectory.energy:
-        print(f"  energy that the integration loses: {trajectory.energy.relative_residual:.2g} of the largest share")
+        lost = f"{trajectory.energy.relative_residual:.2g} of the largest share"
+        print_lines([f"  energy that the integration loses: {lost}"])
 
 
 @app.command
@@ -205,7 +207,7 @@ def sampling(
         print_json(results)
     else:
         print_sampling(report, console())
-        console().print(f"\nwritten: {folder}/ (results.json, figures)")
+        print_lines(["", f"written: {folder}/ (results.json, figures)"])
     return 0
 
 
@@ -269,5 +271,5 @@ def export(
     if json:
         print_json(answer)
     else:
-        print("\n".join(export_lines(answer)))
+        print_lines(export_lines(answer))
     return 0

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Gains, Json, app, console, print_json, progress
+from quakedesign.cli.shared import Gains, Json, app, console, print_json, print_lines, progress
 
 
 @app.command
@@ -28,7 +28,8 @@ def fault(fault: str, /, *, box: str | None = None, json: Json = False) -> int:
         print_json(fault_dict(found))
         return 0
     screen = console()
-    screen.print(f"[bold]{found.name}[/bold] ({found.source})")
+    screen.print(found.name, style="bold", end=" ")
+    screen.print(f"({found.source})")
     for line in fault_sentences(found):
         screen.print(f"  {line}")
     return 0
@@ -71,11 +72,11 @@ def derive(fault: str, /, *, latex: Annotated[bool, Parameter(negative="")] = Fa
         print_json(found)
         return 0
     screen = console()
-    screen.print("e1' = e2, e2' = beta (nu + h)", markup=False)
+    screen.print("e1' = e2, e2' = beta (nu + h)")
     for name in ("beta", "h"):
-        screen.print(f"{name} = {found['error_dynamics'][name]}", markup=False)
+        screen.print(f"{name} = {found['error_dynamics'][name]}")
     for name in ("jacobian", "instability", "unstable"):
-        screen.print(f"{name}: {found[name]}", markup=False)
+        screen.print(f"{name}: {found[name]}")
     return 0
 
 
@@ -114,7 +115,7 @@ def scale(
     if json:
         print_json(answer)
     else:
-        print("\n".join(scale_lines(answer)))
+        print_lines(scale_lines(answer))
     return 0
 
 
@@ -141,6 +142,7 @@ def errata(*rows: int, json: Json = False) -> int:
         print_json({"errata": found})
     else:
         for row in found:
-            print(f"{row['row']}. {'holds' if row['holds'] else 'DOES NOT HOLD'} ({row['kind']}): {row['evidence']}")
-            print(f"    printed: {row['printed']}\n    correct: {row['correct']}")
+            held = "holds" if row["holds"] else "DOES NOT HOLD"
+            told = f"{row['row']}. {held} ({row['kind']}): {row['evidence']}"
+            print_lines([told, f"    printed: {row['printed']}", f"    correct: {row['correct']}"])
     return 0

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Json, app, new_file, print_json
+from quakedesign.cli.shared import Force, Json, app, new_file, print_json, print_lines
 
 Text = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
@@ -71,5 +71,5 @@ def sos(
     if json:
         print_json(found)
     else:
-        print("\n".join(sentences(answer, verbose=verbose)))
+        print_lines(sentences(answer, verbose=verbose))
     return 0 if found["verdict"] == "sos" else 1

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import ExactSeconds, Force, Gains, Json, app, console, new_file, print_json
+from quakedesign.cli.shared import ExactSeconds, Force, Gains, Json, app, new_file, print_json, print_lines
 from quakedesign.errors import ParameterError
 
 
@@ -102,8 +102,7 @@ def _certify_for_rate(
     if json:
         print_json({**answer.facts, "certificate": str(out) if answer.certificate is not None and out else None})
     else:
-        for line in answer.lines:
-            console().print(line, markup=False)
+        print_lines(answer.lines)
     return 0 if str(answer.verdict) == "proved" else 1
 
 
@@ -132,8 +131,7 @@ def _certify_on_fault(
     if json:
         print_json(found)
     else:
-        for line in verdict_lines(judged):
-            console().print(line, markup=False)
+        print_lines(verdict_lines(judged))
     return 0 if found["verdict"] == "proved" and (peaks is None or judged.peaks is not None) else 1
 
 
@@ -159,7 +157,5 @@ def check(*files: Path, fault: str | None = None, json: Json = False) -> int:
         print_json({"files": {path: verdict for path, (verdict, _) in verdicts.items()}})
     else:
         for path, (verdict, statement) in verdicts.items():
-            print(f"{path}: {verdict}")
-            for line in statement:
-                print(f"    {line}")
+            print_lines([f"{path}: {verdict}", *(f"    {line}" for line in statement)])
     return 0 if all(verdict == "proved" for verdict, _ in verdicts.values()) else 1

@@ -1,17 +1,19 @@
 """What all commands share: the application, options, output and progress."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 from rich.console import Console
+from rich.text import Text
 
 from quakedesign.errors import OutputError, ParameterError, UnitError
 from quakedesign.output import require_room
 from quakedesign.rationals import rational
+from quakedesign.text import visible
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Force = Annotated[bool, Parameter(negative="")]
@@ -92,9 +94,23 @@ def print_json(value: dict[str, Any]) -> None:
     print(json.dumps(value, indent=1, allow_nan=False))
 
 
-def console() -> Console:
-    """Console for people, on stdout."""
-    return Console(highlight=False, soft_wrap=True)
+def print_lines(lines: Iterable[str]) -> None:
+    """Print an answer in words on stdout."""
+    screen = console()
+    for line in lines:
+        screen.print(line)
+
+
+class _Screen(Console):
+    """Console on which a string is text: no markup, no emoji, nothing that a terminal would obey."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(visible(text), **options)
+
+
+def console(**options: Any) -> Console:
+    """Console for people, on stdout unless told; every string is one line of text."""
+    return _Screen(markup=False, emoji=False, highlight=False, soft_wrap=True, **options)
 
 
 def new_file(path: Path | None, what: str, *, force: bool) -> None:

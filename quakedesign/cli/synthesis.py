@@ -168,15 +168,15 @@ def _print(law: str, found: "Synthesis | None", more: Mapping[str, Any]) -> None
 
     out = console()
     if found is None:
-        out.print(f"undecided: no gains of {law} were proved", markup=False)
+        out.print(f"undecided: no gains of {law} were proved")
         return
     gains = ", ".join(f"{name} = {k}" for name, k in found.gains.items())
     ranges = found.certificate.loop.uncertain
     beta = f", β in [{ranges['beta'][0]}, {ranges['beta'][1]}]" if "beta" in ranges else ""
-    out.print(f"proved: {law} with {gains} for |h'| <= {ranges['d'][1]}{beta}", markup=False)
+    out.print(f"proved: {law} with {gains} for |h'| <= {ranges['d'][1]}{beta}")
     if more:
         of_run = "{scheme} run on {fault} with scale {scale}, T_s = {step:.4g} s, over {duration:.4g} s"
-        out.print(f"measured, not proved: {found.objective} of one {of_run.format(**more)}", markup=False)
+        out.print(f"measured, not proved: {found.objective} of one {of_run.format(**more)}")
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     unit = "" if found.unit == "-" else f" [{found.unit}]"
     for column in ("gains", f"{found.objective}{unit}", "norm", "better by"):

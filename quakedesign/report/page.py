@@ -11,6 +11,7 @@ from quakedesign.report.headlines import (
     scheme_sentence,
 )
 from quakedesign.report.tables import COLUMNS, FOOTNOTE, rows
+from quakedesign.text import visible
 
 if TYPE_CHECKING:
     from quakedesign.report.comparison import Comparison
@@ -54,7 +55,12 @@ img{max-width:100%}code{background:#f3f3f3;padding:0 .2rem}</style></head><body>
 def _environment() -> Any:
     from jinja2 import Environment, StrictUndefined
 
-    return Environment(autoescape=True, undefined=StrictUndefined)
+    return Environment(autoescape=True, undefined=StrictUndefined, finalize=_shown)
+
+
+def _shown(value: Any) -> Any:
+    """Text of users as text; the page's own markup has none."""
+    return visible(value) if isinstance(value, str) else value
 
 
 def table_html(comparison: "Comparison") -> str:

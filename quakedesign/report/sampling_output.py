@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from quakedesign.output import whole_folder, write_whole
@@ -31,20 +30,22 @@ def write_sampling(report: SamplingReport, folder: Path) -> dict[str, Any]:
 
 def print_sampling(report: SamplingReport, console: Any) -> None:
     """Table of the schemes, and one of every study."""
-    console.print(f"[bold]{report.fault.name}[/bold], T_s = {report.fault.sampling_time:g} s")
+    console.print(report.fault.name, style="bold", end=", ")
+    console.print(f"T_s = {report.fault.sampling_time:g} s")
     console.print(_table(COLUMNS, [row.cells() for row in report.rows], WIDTHS), soft_wrap=False)
     for row in report.rows:
         if {"diverged", "opening"} & set(row.run.events):
-            console.print(f"{row.label}, {row.scheme}: {dict(row.run.events)}", markup=False)
-    console.print(FOOTNOTE, markup=False)
+            console.print(f"{row.label}, {row.scheme}: {dict(row.run.events)}")
+    console.print(FOOTNOTE)
     for name, study in report.studies.items():
-        console.print(f"\n[bold]{escape(study.title)}[/bold]")
+        console.print()
+        console.print(study.title, style="bold")
         levels = f"largest errors at {study.label} {study.levels[0]:.3g} … {study.levels[-1]:.3g} {study.unit}".rstrip()
         if name == "orders":
             levels = (
                 f"error ~ T_s^order for T_s = {study.levels[-1]:.3g} … {study.levels[0]:.3g} s, errors at the latter"
             )
-        console.print(levels, markup=False)
+        console.print(levels)
         head, rows = order_rows(study) if name == "orders" else study_rows(study)
         console.print(_table(head, rows, (13,) if name == "orders" else (13, 10)), soft_wrap=False)
 
@@ -55,7 +56,7 @@ def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], widths: tuple[int
     texts = min(len(widths), 2)
     for i, column in enumerate(head):
         width = widths[i] if i < len(widths) else None
-        table.add_column(escape(column), justify="left" if i < texts else "right", width=width)
+        table.add_column(column, justify="left" if i < texts else "right", width=width)
     for row in rows:
-        table.add_row(*map(escape, row))
+        table.add_row(*row)
     return table

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from quakedesign.report.comparison import Comparison
@@ -25,35 +24,40 @@ if TYPE_CHECKING:
 
 def print_comparison(comparison: Comparison, console: Any) -> None:
     """Fault, gains, verdicts with premises, and one table."""
-    console.print(f"[bold]{comparison.fault.name}[/bold] ({comparison.fault.source})")
+    console.print(comparison.fault.name, style="bold", end=" ")
+    console.print(f"({comparison.fault.source})")
     for line in fault_sentences(comparison.fault):
         console.print(f"  {line}")
     for entry in (*comparison.of("designed"), *comparison.of("published")):
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in entry.design.gains.items())
-        console.print(f"\n[bold]{entry.label}[/bold]: {headline(entry)}")
-        console.print(f"  gains: {gains or 'none'}", markup=False)
+        console.print()
+        console.print(entry.label, style="bold", end=": ")
+        console.print(headline(entry))
+        console.print(f"  gains: {gains or 'none'}")
         for premise in entry.design.premises:
-            console.print(f"  {_line(premise)}", markup=False)
+            console.print(f"  {_line(premise)}")
         if entry.design.domain is not None:
-            console.print(f"  {domain_sentence(entry.design.domain)}", markup=False)
+            console.print(f"  {domain_sentence(entry.design.domain)}")
         if entry.variants:
             _print_feedforward(entry, console)
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     for i, (column, width) in enumerate(zip(COLUMNS, (17, 9, 8, 8, 8, 8, 8, 4), strict=True)):
-        table.add_column(escape(column), justify="left" if i < 2 else "right", width=width)
+        table.add_column(column, justify="left" if i < 2 else "right", width=width)
     for row in rows(comparison):
         table.add_row(*row)
-    console.print("\n[bold]closed loop[/bold], errors after a quarter of the task")
+    console.print()
+    console.print("closed loop", style="bold", end=", ")
+    console.print("errors after a quarter of the task")
     console.print(table, soft_wrap=False)
-    console.print(FOOTNOTE, markup=False)
-    console.print(f"{scheme_sentence(comparison)}.", markup=False)
+    console.print(FOOTNOTE)
+    console.print(f"{scheme_sentence(comparison)}.")
 
 
 def _print_feedforward(entry: "Entry", console: Any) -> None:
     """What the same gains are certified for with every named feed-forward."""
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 2))
     for i, column in enumerate(FEEDFORWARD_COLUMNS):
-        table.add_column(escape(column), justify="left" if i < 1 else "right")
+        table.add_column(column, justify="left" if i < 1 else "right")
     for row in feedforward_rows(entry.variants):
         table.add_row(*row)
     console.print(table)
@@ -71,11 +75,11 @@ def _line(premise: "Premise") -> str:
 
 def print_run(run: "Trajectory", premises: "Sequence[Premise]", console: Any) -> None:
     """Metrics with units, events and premises of one run."""
-    console.print(f"[bold]{run.name}[/bold]")
+    console.print(run.name, style="bold")
     for name, number in run.metrics.to_dict().items():
         if number is not None:
-            console.print(f"  {name} = {number + 0.0:.6g} {run.metrics.unit(name)}".rstrip(), markup=False)
+            console.print(f"  {name} = {number + 0.0:.6g} {run.metrics.unit(name)}".rstrip())
     for name, time in run.events.items():
         console.print(f"  {name} first at {time:.6g} s")
     for premise in premises:
-        console.print(f"  {_line(premise)}", markup=False)
+        console.print(f"  {_line(premise)}")

@@ -5,9 +5,9 @@ import json
 from dataclasses import replace
 
 import pytest
-from rich.console import Console
 
 from quakedesign.certificates import Verdict
+from quakedesign.cli.shared import console
 from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Reference, load_fault
@@ -89,7 +89,7 @@ def test_a_divergence_among_them_is_told_and_leaves_no_number_that_is_none(compa
 
 def test_the_terminal_says_it_within_eighty_columns(compared):
     out = io.StringIO()
-    print_comparison(compared, Console(file=out, width=80))
+    print_comparison(compared, console(file=out, width=80))
     assert max(map(len, out.getvalue().splitlines())) <= 80
     assert "compensated for designed gains and explicit for published gains" in " ".join(out.getvalue().split())
 

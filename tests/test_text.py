@@ -1,0 +1,55 @@
+"""Text of users is shown as text: nothing that a terminal obeys, nothing endless."""
+
+import pickle
+import unicodedata
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quakedesign import errors
+from quakedesign.text import one_line, visible
+
+EXCEPTIONS = [e for e in vars(errors).values() if isinstance(e, type) and issubclass(e, errors.QuakedesignError)]
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("G = 30 GPa, Δμ", "G = 30 GPa, Δμ"),
+        ("see [/foo] [bold]x[/bold] :bomb:", "see [/foo] [bold]x[/bold] :bomb:"),
+        ("\x1b[2J\x07", r"\x1b[2J\x07"),
+        ("a\nproved\r\tb", r"a\nproved\r\tb"),
+        ("\x9b31m", r"\x9b31m"),
+        ("\u202eevil\u2028", r"\u202eevil\u2028"),
+        ("\U000e0041", r"\U000e0041"),
+    ],
+)
+def test_what_a_terminal_obeys_is_written_out(text, shown):
+    assert visible(text) == shown
+
+
+@given(st.text())
+def test_one_line_is_one_printable_line_and_stays_itself(text):
+    line = one_line(text)
+    assert not [c for c in line if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp")]
+    assert one_line(line) == line
+
+
+def test_long_words_and_long_messages_lose_their_middle():
+    path = "/tmp/" + "a" * 5000 + "/fault.toml"
+    line = one_line(f"fault file cannot be read: {path}: File name too long.")
+    assert len(line) < 300
+    assert line.startswith("fault file cannot be read: /tmp/aaa")
+    assert line.endswith("a/fault.toml: File name too long.")
+    assert f"({len(path) + 1} characters)" in line
+    assert len(one_line("word " * 5000)) <= 2000
+
+
+@pytest.mark.parametrize("kind", EXCEPTIONS)
+def test_every_refusal_is_one_visible_line_and_survives_a_worker(kind):
+    error = kind("first\nsecond \x1b[31m " + "x" * 400)
+    said = str(error)
+    assert said.startswith(r"first second \x1b[31m xxx")
+    assert len(said) < 250
+    assert str(pickle.loads(pickle.dumps(error))) == said
