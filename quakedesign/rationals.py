@@ -2,6 +2,7 @@
 
 import math
 import re
+import sys
 from fractions import Fraction
 from numbers import Rational, Real
 from typing import TYPE_CHECKING, Any
@@ -35,7 +36,7 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
         When the value is not a finite number of at most 300 characters and 308 digits.
     """
     if isinstance(value, Fraction):
-        return value
+        return value if type(value) is Fraction else Fraction(value)
     exact = _read(value, name)
     if max(abs(exact.numerator), exact.denominator) >= 10**_DIGITS:
         raise ParameterError(f"{name} must have at most {_DIGITS} digits. Received more. Round it, or check its unit.")
@@ -81,8 +82,11 @@ def to_sympy(value: Fraction) -> "sp.Rational":
 
 
 def float_above(value: Fraction) -> float:
-    """Float at or just above a rational."""
-    number = float(value)
+    """Float at or just above a rational, infinite above the largest."""
+    try:
+        number = float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -sys.float_info.max
     return number if Fraction(number) >= value else math.nextafter(number, math.inf)
 
 

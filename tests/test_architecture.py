@@ -16,7 +16,7 @@ import quakedesign
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "quakedesign"
-EVERYWHERE = {"quakedesign.errors", "quakedesign.rationals", "quakedesign.output", "quakedesign.text"}
+EVERYWHERE = {f"quakedesign.{name}" for name in ("errors", "rationals", "output", "text", "bounds")}
 BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "certificates", "simulation")
 MAY_IMPORT = {
     "fault": (),
@@ -36,6 +36,7 @@ MAY_IMPORT = {
     "text": (),
     "rationals": (),
     "output": (),
+    "bounds": (),
 }
 SOLVERS = {"cvxpy", "clarabel", "scs", "osqp", "ecos", "mosek", "scipy", "control", "casadi"}
 HEAVY = {
