@@ -486,7 +486,7 @@ def describe(loop: Loop) -> list[str]:
     ranges = {name: f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()}
     roots = {name: f"root: {ranges.pop(name)} is the positive square root of {of}" for name, of in loop.roots.items()}
     return [
-        f"law {loop.law}: the name is not verified, the verdict is about the field below",
+        f"law {loop.law}: no name is verified, the verdict is about the field below",
         f"gains and constants: {named(loop.numbers)}",
         f"domain: {loop.domain}; states with weights: {named(loop.weights)}",
         f"uncertain, measurable in time: {', '.join(ranges.values()) or 'none'}",
@@ -1000,8 +1000,9 @@ def bound_obligations(
 
 
 def describe_bounds(loop: Loop, inputs: list[Input], outputs: dict[str, list[Term]]) -> list[str]:
-    """Describe what is bounded, and why."""
-    lines = [f"output {output} = {sum_text(terms, loop)}" for output, terms in outputs.items()]
+    """Describe what is bounded, and why: rows, since what the file calls them says nothing."""
+    rows = {output: sum_text(terms, loop) for output, terms in outputs.items()}
+    lines = [f"row of the output {output}, a name that is not verified: {row}" for output, row in rows.items()]
     for one in inputs:
         limits = zip((one.name, f"d{one.name}/dt"), one.limits, strict=False)
         lines.append(f"input, measurable in time: {', '.join(f'|{name}| <= {limit}' for name, limit in limits)}")
@@ -1009,10 +1010,10 @@ def describe_bounds(loop: Loop, inputs: list[Input], outputs: dict[str, list[Ter
         for i, entry in enumerate(one.sets):
             text = f"V{i} = {sum_text(entry.function, own)}, decay {entry.decay}"
             lines.append(f"invariant under {one.name} alone: {text}")
-        lines += [f"under {one.name} alone: |{output}| <= {bound}" for output, (bound, _) in one.bounds.items()]
+        lines += [f"under {one.name} alone: |{rows[output]}| <= {bound}" for output, (bound, _) in one.bounds.items()]
     totals = {output: sum(one.bounds[output][0] for one in inputs) for output in outputs}
     need(max(map(length, totals.values())) <= MAX_BITS, "a sum of bounds", "of at most 599 digits", "a longer one")
-    bounds = ", ".join(f"|{output}| <= {total}" for output, total in totals.items())
+    bounds = ", ".join(f"|{rows[output]}| <= {total}" for output, total in totals.items())
     return [*lines, f"conclusion: from rest, under all inputs within their limits, {bounds} at all times"]
 
 

@@ -6,6 +6,7 @@ from itertools import product
 
 from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, loop_of, require
 from quakedesign.certificates.error_coordinates import in_error_coordinates, without_inputs
+from quakedesign.certificates.meaning import require_true_names
 from quakedesign.certificates.obligations import Obligation, claimed, different
 from quakedesign.certificates.response import Response
 from quakedesign.certificates.response_obligations import demanded, require_sound
@@ -86,6 +87,7 @@ def _check_proof(certificate: Certificate) -> None:
 
 def _check_response(certificate: Certificate, response: Response) -> None:
     require_sound(certificate.loop, response)
+    require_true_names(certificate.loop, response)
     _check_witnesses(certificate, demanded(certificate.loop, response))
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from quakedesign.certificates.claim import Certificate, Verdict
 from quakedesign.certificates.files import certificate_of, read_json
 from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.meaning import meaning, require_degree_of_slip
 from quakedesign.certificates.premises import (
     Errors,
     certified_lipschitz,
@@ -75,6 +76,7 @@ def _covers(certificate: Certificate, fault: Fault) -> list[str]:
 
     A sliding mode's certificate is about the base gains; the scale λ that the fault needs is said.
     """
+    require_degree_of_slip(certificate.loop)
     loop, said = certificate.loop, [f"covers {certificate.loop.law} on {fault.name}, box {fault.box.name}"]
     if loop.domain == "reals":
         needed = sectors(fault)
@@ -115,13 +117,14 @@ def statement(certificate: Certificate) -> list[str]:
 
 
 def _response(certificate: Certificate, response: Response) -> list[str]:
-    """Limits of the inputs and the bounds of the outputs."""
+    """Limits of the inputs and the bounds of the outputs, by their rows; it is said where a name says nothing."""
     loop, lines = certificate.loop, ["start: all states zero"]
     for name, limits in loop.inputs.items():
         words = (f"|{name}| <= {limits[0]}", *(f"|{name}'| <= {rate}" for rate in limits[1:]))
-        lines.append(f"measurable {' and '.join(words)}")
+        lines.append(f"measurable, acting as above: {' and '.join(words)}")
     for output, row in response.outputs.items():
         parts = ", ".join(f"{name} {part.bounds[output].bound}" for name, part in response.parts.items())
-        line = f"{output} = {from_terms(row, loop.symbols)}"
-        lines.append(f"|{output}| <= {response.total(output)} for ever, {line} (of this: {parts})")
+        name = output if meaning(loop, row) == output else f"{output} for the file, a name that is not verified"
+        line = f"|{from_terms(row, loop.symbols)}| <= {response.total(output)} for ever: {name}"
+        lines.append(f"{line} (of this: {parts})")
     return lines

@@ -7,6 +7,7 @@ import sympy as sp
 
 from quakedesign.certificates.claim import Certificate, Loop, require
 from quakedesign.certificates.linear_premises import Sectors, sectors
+from quakedesign.certificates.meaning import SLIP_RATE_ERROR, meaning
 from quakedesign.controllers import Controller, Signals, control_law
 from quakedesign.controllers.elqr import FEEDBACKS
 from quakedesign.fault import Fault
@@ -123,7 +124,7 @@ def peaks_covered(certificate: Certificate, fault: Fault) -> list[str]:
     loop, response = certificate.loop, certificate.response
     require(response is not None, "the certificate bounds no outputs.")
     assert response is not None
-    law, needed = control_law(loop.law).from_values(tuple(loop.gains.values())), sectors(fault)
+    law, needed = control_law(loop.law)(gains=loop.gains), sectors(fault)
     rate_limited = len(loop.inputs.get("disturbance", ())) == 2
     laws = [replace(law, feedback=f) for f in FEEDBACKS] if hasattr(law, "feedback") else [law]  # type: ignore[call-arg]
     wanted = [needed_inputs(fault, one, needed, rate_limited) for one in laws]
@@ -131,8 +132,9 @@ def peaks_covered(certificate: Certificate, fault: Fault) -> list[str]:
     require(bool(covered), f"the inputs are smaller than those of {fault.name}, or act elsewhere.")
     kinds = " or ".join(one.feedback for one in covered if hasattr(one, "feedback"))
     said = [f"covers the task's reference and disturbance{f', feedback of the {kinds}' if kinds else ''}"]
-    if "slip_rate_error" in response.outputs:
-        peak = reference_rates(fault).first + response.total("slip_rate_error")
+    bounds = [response.total(name) for name, row in response.outputs.items() if meaning(loop, row) == SLIP_RATE_ERROR]
+    if bounds:
+        peak = reference_rates(fault).first + min(bounds)
         said.append(f"the slip rate never exceeds {float(peak):.6g} m/s (from rest, p acting at once)")
     return said
 

@@ -402,7 +402,7 @@ def test_a_refutation_by_hand_is_refuted(make):
 
 def test_the_statement_says_everything_that_was_verified():
     assert verify(weighted_pair()).statement == (
-        "law weighted-pair: the name is not verified, the verdict is about the field below",
+        "law weighted-pair: no name is verified, the verdict is about the field below",
         "gains and constants: k = 2",
         "domain: cells; states with weights: x = 2, y = 1",
         "uncertain, measurable in time: d in [-1/2, 1/2]",
@@ -428,8 +428,9 @@ def test_bounds_under_inputs_add_up():
     """And 7/10 is above the true supremum 2 * (1/2) / 3."""
     statement = verify(driven()).statement
     assert "input, measurable in time: |v| <= 1/2, |dv/dt| <= 1" in statement
-    assert "under u alone: |y| <= 1/5" in statement
-    ending = "from rest, under all inputs within their limits, |y| <= 7/10 at all times"
+    assert "row of the output y, a name that is not verified: 1*x" in statement
+    assert "under u alone: |1*x| <= 1/5" in statement
+    ending = "from rest, under all inputs within their limits, |1*x| <= 7/10 at all times"
     assert statement[-1] == f"conclusion: {ending}"
 
 
@@ -1431,7 +1432,7 @@ def test_each_file_gets_a_block(write):
         f"{refutation}: refuted",
         f"{broken}: invalid: a key must be unique in its object. Received 'format'",
     ]
-    assert any("the name is not verified" in line for line in lines)
+    assert any("no name is verified" in line for line in lines)
 
 
 @pytest.mark.parametrize(

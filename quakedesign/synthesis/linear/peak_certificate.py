@@ -5,6 +5,7 @@ from fractions import Fraction
 
 from quakedesign.certificates import Certificate, Loop, Witness, loop_of
 from quakedesign.certificates.error_coordinates import in_error_coordinates
+from quakedesign.certificates.meaning import rows
 from quakedesign.certificates.obligations import Obligation
 from quakedesign.certificates.response import InputResponse, InvariantSet, OutputBound, Response
 from quakedesign.certificates.response_obligations import demanded
@@ -37,7 +38,7 @@ def peak_certificate(peaks: CertifiedPeaks, controller: Controller) -> Certifica
     outputs = dict.fromkeys(output for _, output in peaks.bounds)
     loop = _with_inputs(controller, bounds.loop, {name: limits for name, (limits, _) in parts.items()})
     response = Response(
-        outputs={output: _row(output, loop) for output in outputs},
+        outputs={output: rows(loop)[output] for output in outputs},
         parts={name: part for name, (_, part) in parts.items()},
     )
     witnesses: dict[str, Witness] = {}
@@ -60,21 +61,6 @@ def _with_inputs(controller: Controller, known: ErrorLoop, inputs: dict[str, tup
     )
     pushes = {state: [Term(Fraction(1), (n,), ()) for n in inputs if ENTERS[n] == state] for state in loop.states}
     return replace(loop, inputs=inputs, field={s: (*terms, *pushes[s]) for s, terms in loop.field.items()})
-
-
-def _row(output: str, loop: Loop) -> tuple[Term, ...]:
-    """Output as terms, with the names of the gains."""
-
-    def state(name: str, coefficient: int, *gains: str) -> Term:
-        return Term(Fraction(coefficient), gains, ((name, Fraction(1), "s"),))
-
-    first, second, *_ = loop.gains
-    rows = {
-        "slip_error": (state("e1", 1),),
-        "slip_rate_error": (state("e2", 1),),
-        "pressure_offset": (state("e1", -1, first), state("e2", -1, second), state("zeta", -1)),
-    }
-    return rows[output]
 
 
 def _part(name: str, peaks: CertifiedPeaks) -> tuple[tuple[Fraction, ...], InputResponse]:

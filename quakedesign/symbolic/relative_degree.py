@@ -1,0 +1,29 @@
+"""How many derivatives of an output it takes until the control appears."""
+
+from collections.abc import Mapping
+
+import sympy as sp
+
+from quakedesign.symbolic.terms import lie_derivative
+
+
+def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control: sp.Symbol) -> int | None:
+    """Least n for which the nth derivative of the output along the field depends on the control.
+
+    Parameters
+    ----------
+    output : Expr
+    field : mapping of Symbol to Expr
+        Rate of every state.
+    control : Symbol
+
+    Returns
+    -------
+    int or None
+        None where as many derivatives as there are states do not depend on it, and so no later one does at all points.
+    """
+    for degree in range(1, len(field) + 1):
+        output = sp.expand(lie_derivative(output, field))
+        if output.has(control):
+            return degree
+    return None
