@@ -27,13 +27,13 @@ from quakedesign.certificates import Loop
 from quakedesign.certificates.command import check_files
 from quakedesign.sos.solve.joint import JointProgram, Proposal
 from quakedesign.sos.solve.moment import settings
-from quakedesign.synthesis.decision import closed_loop
-from quakedesign.synthesis.lyapunov import family_of, finished
-from quakedesign.synthesis.mapping import Screener, Sheet
-from quakedesign.synthesis.maps import axis
-from quakedesign.synthesis.questions import largest_lipschitz
-from quakedesign.synthesis.scales import balance
-from quakedesign.synthesis.sweep import ACCURACY, Sweep
+from quakedesign.synthesis.analysis.certify import closed_loop
+from quakedesign.synthesis.analysis.gain_map import axis
+from quakedesign.synthesis.analysis.gain_map_workers import Screener, Sheet
+from quakedesign.synthesis.analysis.margins import largest_lipschitz
+from quakedesign.synthesis.analysis.parametric_program import ACCURACY, Sweep
+from quakedesign.synthesis.lyapunov.balancing import balance
+from quakedesign.synthesis.lyapunov.search import family_of, finished
 
 DEGREE = 5
 SETS = (("5", "5", "2.3", "1.1"), ("5", "15", "2.3", "1.1"), ("7", "5", "2.3", "1.1"), ("25", "15", "2.3", "1.1"))

@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from time import perf_counter
 
 import quakedesign as qd
-from quakedesign.synthesis.gain_table import improvements
-from quakedesign.synthesis.objectives import OBJECTIVES
-from quakedesign.synthesis.sampled_gains import sampling, synthesise_sampled
+from quakedesign.synthesis.gains.improvements import improvements
+from quakedesign.synthesis.gains.objectives import OBJECTIVES
+from quakedesign.synthesis.gains.sampled_objective import sampling, synthesise_sampled
 
 DEGREES = {
     ("cta", "norm"): (5, 6),

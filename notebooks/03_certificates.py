@@ -50,7 +50,7 @@ print("\n".join(lines))
 # $\kappa$ in $\dot V \le -\kappa V^{4/5}$: the origin is reached within $\frac{5}{\kappa}V(0)^{1/5}$.
 
 # %%
-from quakedesign.synthesis.settling import settling
+from quakedesign.synthesis.analysis.settling_time import settling
 
 print(f"settles from |e_i| <= 1 within {settling(certificate, 1).seconds:.3g} s")
 

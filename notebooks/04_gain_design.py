@@ -22,10 +22,10 @@ import pandas as pd
 
 # %matplotlib inline
 from quakedesign.report.gain_map import gain_map_figure
-from quakedesign.synthesis.gain_table import improvements
-from quakedesign.synthesis.gains import synthesise
-from quakedesign.synthesis.maps import gain_map
-from quakedesign.synthesis.questions import largest_lipschitz
+from quakedesign.synthesis.gains.improvements import improvements
+from quakedesign.synthesis.gains.synthesise import synthesise
+from quakedesign.synthesis.analysis.gain_map import gain_map
+from quakedesign.synthesis.analysis.margins import largest_lipschitz
 
 # %% [markdown]
 # ## The smallest gains for a given disturbance

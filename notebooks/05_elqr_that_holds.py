@@ -33,12 +33,12 @@ import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.report.linear import verdict_lines
 from quakedesign.simulation import natural_earthquake
-from quakedesign.synthesis.linear import theorem
-from quakedesign.synthesis.linear.bounds import uncertainty_bounds
+from quakedesign.synthesis.linear.analysis.robust_stability import printed_theorem as theorem
+from quakedesign.synthesis.linear.plant.uncertainty_bounds import uncertainty_bounds
 from quakedesign.synthesis.linear.certified_peaks import loop_for
 from quakedesign.synthesis.linear.disturbance_search import bang_bang, rate_limited, response
 from quakedesign.synthesis.linear.peak_certificate import peak_certificate
-from quakedesign.synthesis.linear.verdict import judge
+from quakedesign.synthesis.linear.analysis.verdict import judge
 
 # %% [markdown]
 # ## Friction that the bound does not contain

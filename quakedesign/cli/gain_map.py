@@ -70,7 +70,7 @@ def gain_map(
     from quakedesign.controllers import family
     from quakedesign.report.folder import prepare
     from quakedesign.report.gain_map import gain_map_lines, write_gain_map
-    from quakedesign.synthesis.maps import gain_map as mapped
+    from quakedesign.synthesis.analysis.gain_map import gain_map as mapped
 
     folder = out or Path(f"quakedesign-map-{law}")
     prepare(folder, force=force)

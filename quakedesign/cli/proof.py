@@ -116,7 +116,7 @@ def _certify_on_fault(
     from quakedesign.controllers.elqr import ExtendedLQR
     from quakedesign.fault import load_fault
     from quakedesign.report.linear import verdict_lines
-    from quakedesign.synthesis.linear.verdict import judge
+    from quakedesign.synthesis.linear.analysis.verdict import judge
 
     began = perf_counter()
     controller = ExtendedLQR.from_values(gains, feedback=feedback)

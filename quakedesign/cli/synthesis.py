@@ -10,7 +10,7 @@ from quakedesign.cli.shared import Force, Json, Seconds, Whole, app, console, ne
 from quakedesign.errors import ParameterError, UnknownNameError
 
 if TYPE_CHECKING:
-    from quakedesign.synthesis.gains import Synthesis
+    from quakedesign.synthesis.gains.synthesise import Synthesis
 
 
 @app.command
@@ -78,7 +78,7 @@ def synthesise(
     """
     from time import perf_counter
 
-    from quakedesign.synthesis.objectives import OBJECTIVES
+    from quakedesign.synthesis.gains.objectives import OBJECTIVES
 
     if objective not in (*OBJECTIVES, "sampled"):
         raise UnknownNameError(f"objective must be one of {', '.join(OBJECTIVES)}, sampled. Received {objective!r}.")
@@ -91,7 +91,7 @@ def synthesise(
         found, more = _sampled(law, fault, lipschitz, gain_range, degree, _given(of_trial))
     else:
         _refuse(objective, {"FAULT": fault, **{f"--{name}": given for name, given in of_trial.items()}})
-        from quakedesign.synthesis.gains import synthesise as search
+        from quakedesign.synthesis.gains.synthesise import synthesise as search
 
         ranges = {"lipschitz": lipschitz or "1", "gain_range": gain_range or ("1", "1")}
         options = {"workers": 2, **_given(of_search), "degrees": degree or None, "bound": bound, **ranges}
@@ -130,7 +130,7 @@ def _sampled(
 ) -> tuple["Synthesis | None", dict[str, Any]]:  # fmt: skip
     """Gains whose sampled run errs least, and how they were tried."""
     from quakedesign.fault import load_fault
-    from quakedesign.synthesis.sampled_gains import sampling, synthesise_sampled
+    from quakedesign.synthesis.gains.sampled_objective import sampling, synthesise_sampled
 
     if fault is None:
         raise ParameterError(

@@ -12,11 +12,17 @@ from quakedesign.certificates import Certificate, Loop, Verdict
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.synthesis.decision import Number, certify, closed_loop
-from quakedesign.synthesis.dual import dual
-from quakedesign.synthesis.lyapunov import candidate_degrees, refute
-from quakedesign.synthesis.questions import Reach, against, largest_gain_range, largest_lipschitz, necessary_limit
-from quakedesign.synthesis.settling import Settling, fastest_settling
+from quakedesign.synthesis.analysis.certify import Number, certify, closed_loop
+from quakedesign.synthesis.analysis.margins import (
+    Reach,
+    against,
+    largest_gain_range,
+    largest_lipschitz,
+    necessary_limit,
+)
+from quakedesign.synthesis.analysis.settling_time import Settling, fastest_settling
+from quakedesign.synthesis.lyapunov.infeasibility import dual
+from quakedesign.synthesis.lyapunov.search import candidate_degrees, refute
 
 _LARGEST_FAMILY = 24  # monomials of V
 MAXIMIZE = ("lipschitz", "beta", "beta-factor", "decay")

@@ -15,9 +15,9 @@ from quakedesign.simulation import Trajectory, natural_earthquake, simulate, sim
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis import Design, assess
 from quakedesign.synthesis import design as synthesise
+from quakedesign.synthesis.analysis.sampling_time import largest_sampling_time, on_trajectory
 from quakedesign.synthesis.linear.certified_peaks import CLASSES, CertifiedPeaks
-from quakedesign.synthesis.linear.scaled_design import vertex_poles
-from quakedesign.synthesis.sampling import largest_sampling_time, on_trajectory
+from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
 
 
 @dataclass(frozen=True, kw_only=True)

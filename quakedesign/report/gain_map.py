@@ -12,8 +12,8 @@ import numpy as np
 from quakedesign.controllers import LoopField, law
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.drawing import SMALL, WIDTH
-from quakedesign.synthesis.mapping import Place
-from quakedesign.synthesis.maps import GainMap
+from quakedesign.synthesis.analysis.gain_map import GainMap
+from quakedesign.synthesis.analysis.gain_map_workers import Place
 
 _FAILED = "#D55E00"
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from quakedesign.rationals import rational
+from quakedesign.synthesis.linear.analysis.verdict import LinearVerdict
 from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks
-from quakedesign.synthesis.linear.verdict import LinearVerdict
 
 
 def held_sentence(held: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """Every search: gains with a proof, and verdicts on given gains."""
 
-from quakedesign.synthesis.decision import certify
+from quakedesign.synthesis.analysis.certify import certify
 from quakedesign.synthesis.design import DESIGNABLE, Design, assess, design
 
 __all__ = ["DESIGNABLE", "Design", "assess", "certify", "design"]

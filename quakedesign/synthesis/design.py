@@ -19,15 +19,15 @@ from quakedesign.controllers.feed_forward import NONE, FeedForward, feed_forward
 from quakedesign.errors import CertificateError, KinkError, ParameterError, UnknownNameError
 from quakedesign.fault import Fault, require_fault
 from quakedesign.synthesis.designed import Design
-from quakedesign.synthesis.finishing import claims_of, finish
-from quakedesign.synthesis.linear.analysis import unstable_vertex, why_undecided
-from quakedesign.synthesis.linear.lmi import finished_exactly, robust_stability
-from quakedesign.synthesis.linear.matrices import Matrix
-from quakedesign.synthesis.linear.polytope import error_loop
-from quakedesign.synthesis.linear.redesign import sampled_design
-from quakedesign.synthesis.linear.riccati import RiccatiDesign, riccati_design
-from quakedesign.synthesis.lyapunov import find_certificate
-from quakedesign.synthesis.quadratic import quadratic_margin
+from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability
+from quakedesign.synthesis.linear.analysis.robust_stability import unstable_vertex, why_undecided
+from quakedesign.synthesis.linear.design.discrete_riccati import sampled_design
+from quakedesign.synthesis.linear.design.riccati import RiccatiDesign, riccati_design
+from quakedesign.synthesis.linear.plant.polytope import error_loop
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix
+from quakedesign.synthesis.lyapunov.certify_exactly import claims_of, finish
+from quakedesign.synthesis.lyapunov.quadratic import quadratic_margin
+from quakedesign.synthesis.lyapunov.search import find_certificate
 
 DESIGNABLE = ("cta", "dia", "elqr")
 _HEADROOM = Fraction(11, 10)

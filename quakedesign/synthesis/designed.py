@@ -11,9 +11,9 @@ from quakedesign.controllers import Controller, SlidingMode, control_law
 from quakedesign.controllers.feed_forward import NONE
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
+from quakedesign.synthesis.linear.analysis.facts import held_facts
 from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks, certified_peaks
-from quakedesign.synthesis.linear.facts import held_facts
-from quakedesign.synthesis.linear.problem import LinearProblem
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

@@ -8,7 +8,7 @@ import sympy as sp
 from quakedesign.certificates.error_coordinates import STATES, in_error_coordinates
 from quakedesign.controllers import LoopField, model_of
 from quakedesign.errors import CertificateError
-from quakedesign.synthesis.linear.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
 
 GAINS = {"k1": F(7), "k2": F(5, 2), "k3": F(11, 3), "k4": F(13)}
 VALUES = {**GAINS, "b": F(3, 5), "beta": F(6, 5), "s": F(2), "w": F(1, 7)}

@@ -11,9 +11,9 @@ from matplotlib.collections import PathCollection, QuadMesh
 from quakedesign.certificates import Verdict, load_certificate
 from quakedesign.errors import OutputError
 from quakedesign.report import gain_map as report
-from quakedesign.synthesis.decision import closed_loop
-from quakedesign.synthesis.mapping import Sheet
-from quakedesign.synthesis.maps import GainMap, gain_map
+from quakedesign.synthesis.analysis.certify import closed_loop
+from quakedesign.synthesis.analysis.gain_map import GainMap, gain_map
+from quakedesign.synthesis.analysis.gain_map_workers import Sheet
 
 
 @pytest.fixture(scope="module")

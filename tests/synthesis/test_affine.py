@@ -6,7 +6,7 @@ import pytest
 from quakedesign.certificates.obligations import Obligation
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.sos.solve.joint import Demand
-from quakedesign.synthesis.affine import AffineProgram, Limits
+from quakedesign.synthesis.gains.affine_program import AffineProgram, Limits
 
 SQUARE = {(2,): 1.0}
 TEMPLATE = statement_of(Obligation("", {(2,): 1}), "reals")

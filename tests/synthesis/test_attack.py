@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from quakedesign.certificates import Verdict, certificate_text
-from quakedesign.synthesis.decision import certify
+from quakedesign.synthesis.analysis.certify import certify
 
 SPECIFICATION = importlib.util.spec_from_file_location("attack", Path(__file__).with_name("attack.py"))
 attack = importlib.util.module_from_spec(SPECIFICATION)

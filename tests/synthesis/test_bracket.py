@@ -5,8 +5,8 @@ from fractions import Fraction as F
 
 import pytest
 
-from quakedesign.synthesis.bracket import TOLERANCE, first_below, last_success
-from quakedesign.synthesis.sweep import Frame, Screened
+from quakedesign.synthesis.analysis.parametric_program import Frame, Screened
+from quakedesign.synthesis.analysis.root_bracketing import TOLERANCE, first_below, last_success
 
 FRAME = Frame(scale=(F(1),), pace=1.0)
 ROOT = math.sqrt(0.7)

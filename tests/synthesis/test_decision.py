@@ -15,7 +15,7 @@ from quakedesign.controllers import LoopField, law, laws
 from quakedesign.controllers.chain import IntegratorChain
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
 from quakedesign.symbolic import SignedPower
-from quakedesign.synthesis.decision import certify
+from quakedesign.synthesis.analysis.certify import certify
 
 PATH = Path(__file__).parents[2] / "proofs" / "check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("user_law_check", PATH)

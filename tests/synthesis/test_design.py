@@ -14,8 +14,8 @@ from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Disturbance
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis.design import assess, smallest_root
-from quakedesign.synthesis.linear.riccati import riccati_design
-from quakedesign.synthesis.linear.scaled_design import vertex_poles
+from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
+from quakedesign.synthesis.linear.design.riccati import riccati_design
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ import sympy as sp
 from quakedesign.controllers import LoopField
 from quakedesign.symbolic import SignedPower
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.synthesis.decision import certify, closed_loop
-from quakedesign.synthesis.dual import dual
+from quakedesign.synthesis.analysis.certify import certify, closed_loop
+from quakedesign.synthesis.lyapunov.infeasibility import dual
 
 WEAK = ("super-twisting", ("0.4", "1.5"))  # not stable for L = 1 (Seeber and Horn, 2018)
 

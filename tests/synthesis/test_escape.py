@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.synthesis.decision import closed_loop
-from quakedesign.synthesis.escape import escape
+from quakedesign.synthesis.analysis.certify import closed_loop
+from quakedesign.synthesis.analysis.falsification import escape
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "escape_region", Path(__file__).with_name("super_twisting_region.py")

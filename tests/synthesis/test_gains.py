@@ -13,10 +13,10 @@ from quakedesign.certificates import Verdict, certificate_text
 from quakedesign.controllers import LoopField
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.symbolic import SignedPower
-from quakedesign.synthesis.gain_question import begin_with, question
-from quakedesign.synthesis.gain_table import improvements
-from quakedesign.synthesis.gains import given, synthesise
-from quakedesign.synthesis.objectives import OBJECTIVES
+from quakedesign.synthesis.gains.improvements import improvements
+from quakedesign.synthesis.gains.objectives import OBJECTIVES
+from quakedesign.synthesis.gains.problem import begin_with, question
+from quakedesign.synthesis.gains.synthesise import given, synthesise
 
 FAST = {"degrees": (5,), "starts": 1, "compare": False}
 
@@ -85,7 +85,7 @@ def test_the_fastest_decay_at_equal_norm():
     assert found.norm <= math.hypot(7, 5, 2.3, 1.1) * (1 + 1e-9)
     assert found.certificate.check() is Verdict.PROVED
     # by the other room's bound on the settling time from all |e_i| ≤ 1, with V enclosed there in its own way
-    from quakedesign.synthesis.settling import settling
+    from quakedesign.synthesis.analysis.settling_time import settling
 
     bound = settling(found.certificate, 1)
     assert bound.seconds == pytest.approx(1 / found.value, rel=0.01)
@@ -94,7 +94,7 @@ def test_the_fastest_decay_at_equal_norm():
 
 
 def test_gains_of_the_literature_are_returned_where_the_search_finds_nothing_better(monkeypatch):
-    from quakedesign.synthesis import gains
+    from quakedesign.synthesis.gains import synthesise as gains
 
     monkeypatch.setattr(gains, "_climbed", lambda *_: [])
     kept = synthesise("cta", "norm", degrees=(5,), starts=1)
@@ -106,7 +106,7 @@ def test_gains_of_the_literature_are_returned_where_the_search_finds_nothing_bet
 
 
 def test_no_set_beyond_the_bound_on_the_norm_takes_the_place_of_gains_found(monkeypatch):
-    from quakedesign.synthesis import gains
+    from quakedesign.synthesis.gains import synthesise as gains
 
     monkeypatch.setattr(gains, "_climbed", lambda *_: [])
     kept = synthesise("cta", "beta", degrees=(5,), starts=1)
@@ -120,8 +120,8 @@ def test_the_range_of_given_gains_is_the_largest_of_their_family():
     reached = given(asked, asked.known[0])
     low, high = reached.certificate.loop.uncertain["beta"]
     assert reached.value == pytest.approx(math.sqrt(high / low))
-    from quakedesign.synthesis.decision import closed_loop
-    from quakedesign.synthesis.lyapunov import find_certificate
+    from quakedesign.synthesis.analysis.certify import closed_loop
+    from quakedesign.synthesis.lyapunov.search import find_certificate
 
     ends = (low * F(999, 1000), high * F(1001, 1000))
     assert find_certificate(closed_loop("cta", (7, 5, "2.3", "1.1"), lipschitz=1, gain_range=ends), 5) is None
@@ -159,7 +159,7 @@ def test_a_law_of_the_users_own():
 
 
 def test_without_a_proof_there_are_no_gains(monkeypatch):
-    from quakedesign.synthesis import objectives
+    from quakedesign.synthesis.gains.synthesise import objectives
 
     monkeypatch.setattr(objectives, "find_certificate", lambda *a, **k: None)
     assert synthesise("super-twisting", "norm", degrees=(4,), starts=1) is None

@@ -6,8 +6,8 @@ import pytest
 
 from quakedesign.certificates import Verdict, loop_of
 from quakedesign.controllers import law
-from quakedesign.synthesis.decision import certify
-from quakedesign.synthesis.lyapunov import candidate_degrees, find_certificate
+from quakedesign.synthesis.analysis.certify import certify
+from quakedesign.synthesis.lyapunov.search import candidate_degrees, find_certificate
 
 
 def loop(name, gains, lipschitz):

@@ -9,9 +9,9 @@ import pytest
 
 from quakedesign.certificates import Verdict, parse_certificate
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis import maps
-from quakedesign.synthesis.mapping import Crew, Screener
-from quakedesign.synthesis.maps import SHARES, axis, gain_map
+from quakedesign.synthesis.analysis import gain_map as maps
+from quakedesign.synthesis.analysis.gain_map import SHARES, axis, gain_map
+from quakedesign.synthesis.analysis.gain_map_workers import Crew, Screener
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "map_region", Path(__file__).with_name("super_twisting_region.py")

@@ -10,11 +10,11 @@ from scipy.optimize import brentq
 from quakedesign.certificates import Verdict
 from quakedesign.controllers import law
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis import questions
-from quakedesign.synthesis.bracket import TOLERANCE
-from quakedesign.synthesis.decision import certify, closed_loop
-from quakedesign.synthesis.lyapunov import find_certificate
-from quakedesign.synthesis.questions import largest_gain_range, largest_lipschitz, necessary_limit
+from quakedesign.synthesis.analysis import margins as questions
+from quakedesign.synthesis.analysis.certify import certify, closed_loop
+from quakedesign.synthesis.analysis.margins import largest_gain_range, largest_lipschitz, necessary_limit
+from quakedesign.synthesis.analysis.root_bracketing import TOLERANCE
+from quakedesign.synthesis.lyapunov.search import find_certificate
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "reach_region", Path(__file__).with_name("super_twisting_region.py")

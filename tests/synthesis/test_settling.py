@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from quakedesign.certificates import Verdict, load_certificate
-from quakedesign.synthesis.decision import certify
-from quakedesign.synthesis.settling import fastest_settling, settling
+from quakedesign.synthesis.analysis.certify import certify
+from quakedesign.synthesis.analysis.settling_time import fastest_settling, settling
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "settling_region", Path(__file__).with_name("super_twisting_region.py")

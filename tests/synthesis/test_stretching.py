@@ -9,8 +9,8 @@ from quakedesign.certificates.claim import sympy_field
 from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic.signed_power import SignedPower
-from quakedesign.synthesis.decision import closed_loop
-from quakedesign.synthesis.stretching import scaled_norm, stretch_exponents
+from quakedesign.synthesis.analysis.certify import closed_loop
+from quakedesign.synthesis.gains.dilation import scaled_norm, stretch_exponents
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import pytest
 
 from quakedesign.certificates import Verdict, loop_of
 from quakedesign.controllers import law
-from quakedesign.synthesis.decision import certify
-from quakedesign.synthesis.lyapunov import candidate_degrees, find_certificate
+from quakedesign.synthesis.analysis.certify import certify
+from quakedesign.synthesis.lyapunov.search import candidate_degrees, find_certificate
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "super_twisting_region", Path(__file__).with_name("super_twisting_region.py")

@@ -9,11 +9,11 @@ import pytest
 from quakedesign.controllers import law
 from quakedesign.errors import CertificateError
 from quakedesign.sos.solve.joint import JointProgram
-from quakedesign.synthesis.decision import closed_loop
-from quakedesign.synthesis.lyapunov import family_of
-from quakedesign.synthesis.scales import balance
-from quakedesign.synthesis.sweep import Frame, Sweep
-from quakedesign.synthesis.sweep_rows import rows_of, values_of
+from quakedesign.synthesis.analysis.certify import closed_loop
+from quakedesign.synthesis.analysis.parametric_program import Frame, Sweep
+from quakedesign.synthesis.lyapunov.balancing import balance
+from quakedesign.synthesis.lyapunov.parametric_forms import rows_of, values_of
+from quakedesign.synthesis.lyapunov.search import family_of
 
 LOOPS = {
     "super-twisting": (("1.5", "1.1"), "0.9", (1, "1.3"), 4),

@@ -8,11 +8,11 @@ import pytest
 
 from quakedesign.certificates.obligations import Obligations
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.synthesis.climbing import short, with_gains
-from quakedesign.synthesis.decision import closed_loop
-from quakedesign.synthesis.lyapunov import find_certificate
-from quakedesign.synthesis.pacing import fastest, on_box, pace_of, rounded
-from quakedesign.synthesis.tangent import neighbourhood
+from quakedesign.synthesis.analysis.certify import closed_loop
+from quakedesign.synthesis.gains.linearised_program import neighbourhood
+from quakedesign.synthesis.gains.path_following import short, with_gains
+from quakedesign.synthesis.lyapunov.decay_rate import fastest, on_box, pace_of, rounded
+from quakedesign.synthesis.lyapunov.search import find_certificate
 
 
 @pytest.fixture(scope="module")

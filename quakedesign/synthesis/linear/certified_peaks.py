@@ -16,7 +16,7 @@ from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.linear.peak import PeakBound
 from quakedesign.synthesis.linear.peak_search import find_peak_bound
-from quakedesign.synthesis.linear.polytope import ErrorLoop, error_loop
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop
 
 CLASSES = ("amplitude", "rate")
 PREMISES = (

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis.linear.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
 
 Corner = tuple[Fraction, Fraction, Fraction]
 _STEPS = 2000

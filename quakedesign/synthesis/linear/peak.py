@@ -9,7 +9,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.claim import require
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.definiteness import full_matrix, positive_definite
-from quakedesign.synthesis.linear.polytope import ERROR_STATES, ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ERROR_STATES, ErrorLoop
 
 ENTERS = {"force": "e2", "drift": "zeta", "drift_rate": "chi", "force_rate": "force"}
 """State whose rate every input adds to."""

@@ -10,7 +10,7 @@ from typing import Any
 from quakedesign.sos.solve.conic import solve
 from quakedesign.synthesis.linear.peak import Ellipsoid, PeakBound
 from quakedesign.synthesis.linear.peak_search import ScaledInputs, short
-from quakedesign.synthesis.linear.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
 
 _GAP = 20.0
 _ROUNDS = 20

@@ -16,7 +16,7 @@ from quakedesign.sos.exact.proofs import Square
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks
 from quakedesign.synthesis.linear.peak import Ellipsoid, PeakBound
-from quakedesign.synthesis.linear.polytope import ERROR_STATES, ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ERROR_STATES, ErrorLoop
 
 
 def peak_certificate(peaks: CertifiedPeaks, controller: Controller) -> Certificate:

@@ -9,7 +9,7 @@ from quakedesign.errors import CertificateError
 from quakedesign.rationals import nearest
 from quakedesign.sos.solve.conic import solve
 from quakedesign.synthesis.linear.peak import ENTERS, Ellipsoid, PeakBound, tightest_bound
-from quakedesign.synthesis.linear.polytope import ERROR_STATES, ErrorLoop, modal_scaling
+from quakedesign.synthesis.linear.plant.polytope import ERROR_STATES, ErrorLoop, modal_scaling
 
 _GRID = (0.03, 0.08, 0.2, 0.4, 0.6, 0.8, 0.93, 0.99)
 _BACK_OFF = (0.002, 0.01, 0.05, 0.2)

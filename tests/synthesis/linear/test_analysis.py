@@ -8,9 +8,9 @@ import numpy as np
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.controllers import published
-from quakedesign.synthesis.linear.analysis import analysis, unstable_vertex, why_undecided
+from quakedesign.synthesis.linear.analysis.robust_stability import analysis, unstable_vertex, why_undecided
 from quakedesign.synthesis.linear.certified_peaks import loop_for
-from quakedesign.synthesis.linear.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
 
 LAB = qd.load_fault("lab-fault")
 GOOD = published("lab-fault")["elqr"]

@@ -10,7 +10,7 @@ import quakedesign as qd
 from quakedesign.certificates.linear_premises import rest_pressure, sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
-from quakedesign.synthesis.linear.bounds import uncertainty_bounds
+from quakedesign.synthesis.linear.plant.uncertainty_bounds import uncertainty_bounds
 
 REAL = qd.load_fault("real-fault")
 

@@ -12,8 +12,8 @@ import pytest
 import sympy as sp
 
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis.linear.care import relative_residual, solve_care
-from quakedesign.synthesis.linear.matrices import product, riccati_residual
+from quakedesign.synthesis.linear.design.algebraic_riccati import relative_residual, solve_care
+from quakedesign.synthesis.linear.plant.rational_matrices import product, riccati_residual
 
 
 def example_1_1():

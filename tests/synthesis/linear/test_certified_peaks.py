@@ -16,8 +16,8 @@ from quakedesign.controllers.elqr import PressureLimits
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
 from quakedesign.fault import Disturbance
 from quakedesign.synthesis.linear.certified_peaks import certified_peaks, loop_for
+from quakedesign.synthesis.linear.design.riccati import riccati_design
 from quakedesign.synthesis.linear.disturbance_search import bang_bang, rate_limited, switched
-from quakedesign.synthesis.linear.riccati import riccati_design
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ import pytest
 import quakedesign as qd
 from quakedesign.controllers import published
 from quakedesign.sos.exact.files import load, text
-from quakedesign.synthesis.linear.definite_files import definite_files, held_files, inverse_optimality_files
-from quakedesign.synthesis.linear.hold_lyapunov import varying_verdict
-from quakedesign.synthesis.linear.inverse_optimality import inverse_optimality
-from quakedesign.synthesis.linear.problem import LinearProblem
+from quakedesign.synthesis.linear.analysis.definite_files import definite_files, held_files, inverse_optimality_files
+from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.sampled.input_delay import varying_verdict
 
 GOOD, BAD = ((F(2), F(-1)), (F(-1), F(1))), ((F(1), F(1)), (F(1), F(1)))
 

@@ -10,7 +10,7 @@ from mpmath import mp, quad
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.disturbance_search import bang_bang, rate_limited, response, switched
 from quakedesign.synthesis.linear.peak_search import find_peak_bound
-from quakedesign.synthesis.linear.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
 
 LOOP = ErrorLoop(
     gains=(F(104), F(14), F(150), F(78)),

@@ -11,11 +11,11 @@ import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.synthesis.design import assess
-from quakedesign.synthesis.linear.lmi import finished_exactly, robust_stability, sector_loop
-from quakedesign.synthesis.linear.matrices import diagonal
-from quakedesign.synthesis.linear.problem import LinearProblem
-from quakedesign.synthesis.linear.riccati import riccati_design
-from quakedesign.synthesis.linear.verdict import judge
+from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
+from quakedesign.synthesis.linear.analysis.verdict import judge
+from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.plant.rational_matrices import diagonal
 
 REAL = qd.load_fault("real-fault")
 

@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import quakedesign as qd
-from quakedesign.synthesis.linear.facts import linear_facts
+from quakedesign.synthesis.linear.analysis.facts import linear_facts
 
 LAB = qd.load_fault("lab-fault")
 

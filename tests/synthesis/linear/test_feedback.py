@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
-from quakedesign.synthesis.linear.feedback import (
+from quakedesign.synthesis.linear.plant.feedback import (
     compare_feedback,
     error_transfer,
     feedback_table,
     lag_coefficient,
     largest_reference_acceleration,
 )
-from quakedesign.synthesis.linear.problem import LinearProblem
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
 
 REAL = qd.load_fault("real-fault")
 GAINS = tuple(qd.published("real-fault")["elqr"].gains.values())

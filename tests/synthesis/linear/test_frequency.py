@@ -7,14 +7,14 @@ import control
 import numpy as np
 import pytest
 
-from quakedesign.synthesis.linear.frequency import (
+from quakedesign.synthesis.linear.analysis.frequency import (
     characteristic,
     circle_limit,
     frequency_facts,
     slip_limit,
     stable_quartic,
 )
-from quakedesign.synthesis.linear.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
 
 LOOP = ErrorLoop(
     gains=(F(104), F(14), F(150), F(78)),

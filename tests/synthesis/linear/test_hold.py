@@ -9,7 +9,7 @@ import pytest
 from flint import arb
 
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis.linear.hold import (
+from quakedesign.synthesis.linear.sampled.zero_order_hold import (
     ball,
     coefficients,
     conditions,

@@ -8,12 +8,12 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.certificates import Verdict
-from quakedesign.synthesis.linear import matrices as m
-from quakedesign.synthesis.linear.inverse_optimality import inverse_optimality
-from quakedesign.synthesis.linear.inverse_question import Question, moment_matrix, refutes
-from quakedesign.synthesis.linear.problem import LinearProblem
-from quakedesign.synthesis.linear.riccati import riccati_design
-from quakedesign.synthesis.linear.theorem import printed_design, printed_row_example
+from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
+from quakedesign.synthesis.linear.analysis.inverse_optimality_problem import Question, moment_matrix, refutes
+from quakedesign.synthesis.linear.analysis.printed_theorem import printed_design, printed_row_example
+from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.linear.plant import rational_matrices as m
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
 
 RNG = np.random.default_rng(64)
 

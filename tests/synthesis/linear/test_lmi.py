@@ -14,10 +14,15 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis.linear.lmi import CommonQuadratic, robust_stability, sector_loop, synthesise
-from quakedesign.synthesis.linear.polytope import Polytope, polytope_of
-from quakedesign.synthesis.linear.riccati import riccati_design
-from quakedesign.synthesis.linear.scaled_design import vertex_poles
+from quakedesign.synthesis.linear.analysis.common_quadratic import (
+    CommonQuadratic,
+    robust_stability,
+    sector_loop,
+    synthesise,
+)
+from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
+from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.linear.plant.polytope import Polytope, polytope_of
 
 CHECKER = Path(__file__).parents[3] / "proofs" / "check.py"
 

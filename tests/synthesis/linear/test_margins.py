@@ -10,18 +10,18 @@ import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.controllers import published
-from quakedesign.synthesis.linear.analysis import analysis
-from quakedesign.synthesis.linear.frequency import slip_limit, stable_quartic
-from quakedesign.synthesis.linear.lmi import sector_loop
-from quakedesign.synthesis.linear.margins import (
+from quakedesign.synthesis.linear.analysis.common_quadratic import sector_loop
+from quakedesign.synthesis.linear.analysis.frequency import slip_limit, stable_quartic
+from quakedesign.synthesis.linear.analysis.margins import (
     decay_rate,
     friction_slope_margin,
     gain_range,
     nominal_slope,
     supremum,
 )
-from quakedesign.synthesis.linear.polytope import error_loop
-from quakedesign.synthesis.linear.riccati import riccati_design
+from quakedesign.synthesis.linear.analysis.robust_stability import analysis
+from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.linear.plant.polytope import error_loop
 
 
 @pytest.fixture(scope="module", params=["real-fault", "lab-fault"])
@@ -69,7 +69,7 @@ def test_at_the_limit_the_constant_loop_is_not_stable(case):
     margin = friction_slope_margin(fault, controller)
     needed, spring = sectors(fault), F(str(fault.specific_stiffness))
     loop = error_loop(tuple(controller.gains.values()), needed)
-    from quakedesign.synthesis.linear.frequency import characteristic
+    from quakedesign.synthesis.linear.analysis.frequency import characteristic
 
     at = margin.limit * margin.slope - spring
     assert not stable_quartic(*characteristic(loop, margin.limit_beta, at, needed.rate[0]))

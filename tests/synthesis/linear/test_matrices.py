@@ -5,7 +5,7 @@ from fractions import Fraction as F
 import numpy as np
 import pytest
 
-from quakedesign.synthesis.linear import matrices as m
+from quakedesign.synthesis.linear.plant import rational_matrices as m
 
 RNG = np.random.default_rng(3)
 

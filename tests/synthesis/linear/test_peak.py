@@ -10,7 +10,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.errors import CertificateError
 from quakedesign.synthesis.linear.peak import Ellipsoid, PeakBound, tightest_bound
 from quakedesign.synthesis.linear.peak_search import find_peak_bound
-from quakedesign.synthesis.linear.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
 
 # time in 1/omega_n, slip in metres: the real fault's designed gains, rounded
 LOOP = ErrorLoop(

@@ -14,9 +14,9 @@ from quakedesign.controllers import published
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.definiteness import full_matrix
 from quakedesign.synthesis.linear.certified_peaks import loop_for
+from quakedesign.synthesis.linear.design.riccati import riccati_design
 from quakedesign.synthesis.linear.disturbance_search import bang_bang, rate_limited, switched
 from quakedesign.synthesis.linear.peak_cascade import cascade, separated
-from quakedesign.synthesis.linear.riccati import riccati_design
 
 
 @pytest.fixture(scope="module")

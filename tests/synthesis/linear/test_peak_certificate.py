@@ -17,8 +17,8 @@ from quakedesign.controllers import published
 from quakedesign.errors import CertificateError
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.linear.certified_peaks import certified_peaks
+from quakedesign.synthesis.linear.design.riccati import riccati_design
 from quakedesign.synthesis.linear.peak_certificate import peak_certificate
-from quakedesign.synthesis.linear.riccati import riccati_design
 
 REAL = qd.load_fault("real-fault")
 CHECKER = Path(__file__).parents[3] / "proofs" / "check.py"

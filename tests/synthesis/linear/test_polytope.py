@@ -13,7 +13,7 @@ from quakedesign.controllers import Signals, published
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic import plant
 from quakedesign.synthesis.design import linear_loop
-from quakedesign.synthesis.linear.polytope import ErrorLoop, Polytope, error_loop, modal_scaling, polytope_of
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, Polytope, error_loop, modal_scaling, polytope_of
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,11 @@ import pytest
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, Reference
-from quakedesign.synthesis.linear.inverse_optimality import inverse_optimality
-from quakedesign.synthesis.linear.problem import LinearProblem
-from quakedesign.synthesis.linear.riccati import riccati_design
-from quakedesign.synthesis.linear.sampled import hold_verdict, largest_radius
-from quakedesign.synthesis.linear.wishes import Specifications
+from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
+from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.linear.design.specifications import Specifications
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.sampled.stability import hold_verdict, largest_radius
 
 YEAR = 31557600.0
 UNITS = {

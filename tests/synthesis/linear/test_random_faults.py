@@ -11,9 +11,9 @@ from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, Reference, UncertaintyBox
 from quakedesign.fault.friction import friction_law
-from quakedesign.synthesis.linear.inverse_optimality import inverse_optimality
-from quakedesign.synthesis.linear.problem import LinearProblem
-from quakedesign.synthesis.linear.riccati import riccati_design
+from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
+from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
 
 BASE = qd.load_fault("real-fault")
 LAWS = ("exponential-slip-weakening", "linear-slip-weakening", "slip-rate-weakening")

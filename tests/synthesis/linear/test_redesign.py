@@ -6,9 +6,9 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis.linear.problem import LinearProblem
-from quakedesign.synthesis.linear.redesign import discrete_design, open_loop_growth, sampled_design
-from quakedesign.synthesis.linear.sampled import hold_verdict, largest_radius
+from quakedesign.synthesis.linear.design.discrete_riccati import discrete_design, open_loop_growth, sampled_design
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.sampled.stability import hold_verdict, largest_radius
 
 LAB = qd.load_fault("lab-fault")
 

@@ -8,11 +8,16 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis.linear import matrices as m
-from quakedesign.synthesis.linear.problem import LinearProblem
-from quakedesign.synthesis.linear.region import guaranteed, limiting_gains, riccati_bounds, smallest_gain
-from quakedesign.synthesis.linear.scaled_design import sound_bound
-from quakedesign.synthesis.linear.theorem import printed_row_example
+from quakedesign.synthesis.linear.analysis.printed_theorem import printed_row_example
+from quakedesign.synthesis.linear.design.admissible_weights import (
+    guaranteed,
+    limiting_gains,
+    riccati_bounds,
+    smallest_gain,
+)
+from quakedesign.synthesis.linear.design.nondimensional import sound_bound
+from quakedesign.synthesis.linear.plant import rational_matrices as m
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
 
 PROBLEM = printed_row_example().problem
 RNG = np.random.default_rng(12)

@@ -10,12 +10,12 @@ import pytest
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
-from quakedesign.synthesis.linear import matrices as m
-from quakedesign.synthesis.linear.problem import LinearProblem
-from quakedesign.synthesis.linear.riccati import riccati_design
-from quakedesign.synthesis.linear.scaled_design import sound_bound, vertex_poles
-from quakedesign.synthesis.linear.theorem import decreases
-from quakedesign.synthesis.linear.wishes import Specifications, Weights
+from quakedesign.synthesis.linear.analysis.printed_theorem import decreases
+from quakedesign.synthesis.linear.design.nondimensional import sound_bound, vertex_poles
+from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.linear.design.specifications import Specifications, Weights
+from quakedesign.synthesis.linear.plant import rational_matrices as m
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
 
 REAL = qd.load_fault("real-fault")
 BOTH = qd.load_fault("real-fault", box="ten-percent").with_disturbance(Disturbance(slip_growth=1e-3, rate_growth=0.05))

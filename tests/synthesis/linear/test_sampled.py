@@ -12,11 +12,11 @@ import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
-from quakedesign.synthesis.linear import matrices as m
-from quakedesign.synthesis.linear.hold_lyapunov import largest_varying_step, varying_proof, varying_verdict
-from quakedesign.synthesis.linear.problem import LinearProblem
-from quakedesign.synthesis.linear.riccati import riccati_design
-from quakedesign.synthesis.linear.sampled import hold_verdict, largest_radius, largest_step
+from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.linear.plant import rational_matrices as m
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.sampled.input_delay import largest_varying_step, varying_proof, varying_verdict
+from quakedesign.synthesis.linear.sampled.stability import hold_verdict, largest_radius, largest_step
 
 CASES = {"lab-fault": (("1e-3", False), ("0.5e-3", True)), "real-fault": (("0.184", False), ("0.092", True))}
 

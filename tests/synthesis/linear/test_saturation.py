@@ -13,14 +13,14 @@ from quakedesign.certificates.linear_premises import linear_premises, rest_press
 from quakedesign.controllers import Signals
 from quakedesign.controllers.elqr import PressureLimits
 from quakedesign.errors import ParameterError
-from quakedesign.synthesis.linear.problem import LinearProblem
-from quakedesign.synthesis.linear.riccati import riccati_design
-from quakedesign.synthesis.linear.saturation import (
+from quakedesign.synthesis.linear.analysis.saturation import (
     bumpless_start,
     pressure_limits,
     unsaturated_region,
     with_limits,
 )
+from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
 
 REAL = qd.load_fault("real-fault")
 DESIGN = riccati_design(REAL, bandwidth=3.0)

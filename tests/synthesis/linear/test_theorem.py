@@ -10,8 +10,7 @@ from scipy.linalg import expm
 import quakedesign as qd
 from quakedesign.certificates import Verdict, loop_of
 from quakedesign.controllers import control_law
-from quakedesign.synthesis.linear import matrices as m
-from quakedesign.synthesis.linear.theorem import (
+from quakedesign.synthesis.linear.analysis.printed_theorem import (
     Switching,
     both_tests,
     corrected_design,
@@ -22,7 +21,8 @@ from quakedesign.synthesis.linear.theorem import (
     printed_row_example,
     switched_growth,
 )
-from quakedesign.synthesis.lyapunov import find_certificate
+from quakedesign.synthesis.linear.plant import rational_matrices as m
+from quakedesign.synthesis.lyapunov.search import find_certificate
 
 EXAMPLES = {6: printed_bound_example(), 7: printed_row_example()}
 

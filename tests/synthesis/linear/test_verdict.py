@@ -8,7 +8,7 @@ import quakedesign as qd
 from quakedesign.certificates.command import check_files
 from quakedesign.controllers import published
 from quakedesign.errors import OutputError, UnknownNameError
-from quakedesign.synthesis.linear.verdict import judge
+from quakedesign.synthesis.linear.analysis.verdict import judge
 
 LAB = qd.load_fault("lab-fault")
 

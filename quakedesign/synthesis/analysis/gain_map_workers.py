@@ -1,0 +1,196 @@
+"""Who computes the points of a map: what is asked at each, and processes that keep their compiled sweeps."""
+
+import os
+import signal
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from multiprocessing import get_context
+from typing import Any, Self
+
+from quakedesign.certificates import Loop, certificate_text
+from quakedesign.certificates.claim import root_enclosure
+from quakedesign.controllers import Subject
+from quakedesign.errors import CertificateError, SimulationError
+from quakedesign.synthesis.analysis.margins import necessary_limit, prove
+from quakedesign.synthesis.analysis.parametric_program import SURE, Sweep
+
+Place = tuple[int, int]
+_FAST = 1e-8
+_DOUBTFUL = 1e-6
+_LIVES = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """What a map is about.
+
+    Attributes
+    ----------
+    subject : str, type of Law or LoopField
+    loop : Loop
+        With the base gains.
+    over : tuple of two str
+        Gains that vary.
+    axes : tuple of two tuples of Fraction
+        Their values.
+    levels : tuple of Fraction
+        L̄, rising.
+    degree : int
+        Of V.
+    """
+
+    subject: Subject
+    loop: Loop
+    over: tuple[str, str]
+    axes: tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
+    levels: tuple[Fraction, ...]
+    degree: int
+
+    def at(self, place: Place, level: int) -> Loop:
+        """Loop at a point, for the bound of a level (from 1)."""
+        gains = {**self.loop.gains, **{n: axis[i] for n, axis, i in zip(self.over, self.axes, place, strict=True)}}
+        roots = {name: (of, root_enclosure(gains[of])) for name, (of, _) in self.loop.roots.items()}
+        bound = self.levels[level - 1]
+        return replace(self.loop, gains=gains, roots=roots, uncertain={**self.loop.uncertain, "d": (-bound, bound)})
+
+    @property
+    def rows(self) -> list[list[Place]]:
+        """All points in rows along a gain that keeps the structure of the loop, if one does."""
+        nested = {name for terms in self.loop.lifts.values() for term in terms for name in term.parameters}
+        first, second = (range(len(axis)) for axis in self.axes)
+        if self.over[0] in nested:
+            return [[(i, j) for j in second] for i in first]
+        return [[(i, j) for i in first] for j in second]
+
+
+class Screener:
+    """Compiled sweeps of one sheet, one for every structure that its points have."""
+
+    def __init__(self, sheet: Sheet) -> None:
+        self.sheet = sheet
+        self._sweeps: list[Sweep] = []
+
+    def row(self, places: Sequence[Place]) -> tuple[list[tuple[Place, Fraction | None, int]], int]:
+        """Limit and number of levels found at every point, beginning each at the level of its neighbour; and solves."""
+        found, start, before = [], len(self.sheet.levels), self._solves()
+        for place in places:
+            limit, start = self._reached(place, max(start, 1))
+            found.append((place, limit, start))
+        return found, self._solves() - before
+
+    def _reached(self, place: Place, start: int) -> tuple[Fraction | None, int]:
+        limit = necessary_limit(self.sheet.at(place, 1), self.sheet.subject)
+        possible = [k for k, bound in enumerate(self.sheet.levels, 1) if limit is None or bound < limit]
+        low, high = 0, len(possible)
+        level = min(start, high)
+        while low < high:
+            if self._found(place, level):
+                low = level
+            else:
+                high = level - 1
+            level = low + 1 if low >= start else high
+        return limit, low
+
+    def _found(self, place: Place, level: int) -> bool:
+        loop = self.sheet.at(place, level)
+        sweep = self._sweep(loop)
+        answer = None if sweep is None else sweep.solve(loop, accuracy=_FAST)
+        if sweep is not None and answer is not None and abs(answer.margin) < _DOUBTFUL:
+            answer = sweep.solve(loop)
+        return answer is not None and answer.margin > SURE
+
+    def proof(self, place: Place, level: int) -> tuple[Place, int, str | None, int]:
+        """Text of a certificate of a point at a level, or None; and solves."""
+        before, loop = self._solves(), self.sheet.at(place, level)
+        sweep = self._sweep(loop)
+        answer = None if sweep is None else sweep.solve(loop)
+        certificate = None
+        if sweep is not None and answer is not None and answer.found:
+            certificate = prove(sweep, loop, answer, self.sheet.subject)
+        return place, level, certificate_text(certificate) if certificate else None, self._solves() - before
+
+    def _sweep(self, loop: Loop) -> Sweep | None:
+        known = next((s for s in self._sweeps if s.covers(loop)), None)
+        if known is None:
+            try:
+                known = Sweep(loop, self.sheet.degree)
+            except CertificateError:
+                return None
+            self._sweeps.append(known)
+        return known
+
+    def _solves(self) -> int:
+        return sum(s.solves for s in self._sweeps)
+
+
+class Crew:
+    """Processes, or this one, that answer questions about a sheet.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    workers : int
+        1 stands for this process.
+    """
+
+    def __init__(self, sheet: Sheet, workers: int) -> None:
+        self._sheet, self._workers = sheet, workers
+        self._own = Screener(sheet) if workers == 1 else None
+        self._pool = None if workers == 1 else self._filled()
+
+    def _filled(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(self._workers, get_context("spawn"), _begin, (self._sheet,))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def answers(self, question: str, arguments: Iterable[tuple]) -> Iterator[Any]:
+        """Answers of one method of `Screener` to many arguments, in any order.
+
+        Raises
+        ------
+        SimulationError
+            When processes die again and again; one that was killed from outside is replaced.
+        """
+        if self._own is not None:
+            yield from (getattr(self._own, question)(*one) for one in arguments)
+            return
+        waiting = list(arguments)
+        for _ in range(_LIVES):
+            try:
+                for one, answer in self._done(question, waiting):
+                    waiting.remove(one)
+                    yield answer
+                return
+            except BrokenProcessPool:
+                self._pool = self._filled()
+        raise SimulationError(
+            f"the processes of the map died {_LIVES} times, with {len(waiting)} tasks left. Ask for fewer workers."
+        )
+
+    def _done(self, question: str, waiting: Sequence[tuple]) -> Iterator[tuple[tuple, Any]]:
+        assert self._pool is not None
+        futures = {self._pool.submit(_answer, question, one): one for one in waiting}
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+
+
+_screener: list[Screener] = []
+
+
+def _begin(sheet: Sheet) -> None:
+    """Start a worker: one thread, and interruptions left to the process that asks."""
+    os.environ["OMP_NUM_THREADS"] = "1"
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _screener.append(Screener(sheet))
+
+
+def _answer(question: str, arguments: tuple) -> Any:
+    return getattr(_screener[0], question)(*arguments)

@@ -1,0 +1,232 @@
+"""One law compiled for many gains: V and −V̇ as functions of gains and ranges, one structure for all points.
+
+V = Σ a_j V_j with the monomials of one degree. At every point the programme is
+
+    maximise t  subject to  V − t·N_m  and  −V̇ − t·N_n  in the cone on every cell and vertex,  mean of V = 1,
+
+so that t goes on below zero beyond the largest disturbance, and its derivatives in gains and bounds follow from the
+multipliers. All numbers are floating point: a sweep screens, it proves nothing.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.certificates import Loop
+from quakedesign.errors import CertificateError
+from quakedesign.sos.exact.polynomial import monomial
+from quakedesign.symbolic.candidates import signed_monomials
+from quakedesign.synthesis.analysis.parametric_matrix import Matrix, scales_of
+from quakedesign.synthesis.lyapunov.balancing import balance, exponents_of
+from quakedesign.synthesis.lyapunov.parametric_forms import ends_of, rows_of, values_of
+from quakedesign.synthesis.lyapunov.search import Family
+
+SURE = 5e-10
+"""Margins above this count as found; the solver's answers are about as accurate as that."""
+ACCURACY = 1e-10
+"""What the solver is asked for unless told."""
+_TOO_FAR = "the gains are too far apart for a search in floating point."
+_KEPT = 64  # scales whose numbers are kept
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """Units in which a point is solved, so that its numbers are about one.
+
+    Attributes
+    ----------
+    scale : tuple of Fraction
+        Powers of two, u_i = scale_i·ũ_i.
+    pace : float
+        What −V̇ is divided by.
+    """
+
+    scale: tuple[Fraction, ...]
+    pace: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Screened:
+    """Floating-point answer at one point; proves nothing.
+
+    Attributes
+    ----------
+    margin : float
+        Largest t.
+    decision : list of float
+        a_j, in the units of the frame.
+    frame : Frame
+    slopes : mapping of str to float
+        Derivative of the margin in every number that V̇ depends on, by the names of `sweep_rows`.
+    """
+
+    margin: float
+    decision: list[float]
+    frame: Frame
+    slopes: Mapping[str, float]
+
+    @property
+    def found(self) -> bool:
+        """Whether the search finds a Lyapunov function of the family."""
+        return self.margin > SURE
+
+
+class Sweep:
+    """Screening of one law and one degree of V at many gains and ranges.
+
+    Parameters
+    ----------
+    loop : Loop
+        Any point of the sweep. Which ranges are points, and the parameters inside nested powers, are the same at all.
+    degree : int
+        Of V.
+
+    Raises
+    ------
+    CertificateError
+        When there are no candidates of this degree, or the law has parts that certificates do not know.
+    """
+
+    def __init__(self, loop: Loop, degree: int) -> None:
+        self.loop, self.degree = loop, degree
+        self.monomials = signed_monomials(loop.states, degree, loop.domain)
+        self.rows = rows_of(loop, self.monomials) if self.monomials else ()
+        if not any(row.rate for row in self.rows):
+            raise CertificateError(f"there are no Lyapunov functions of degree {degree} to try for {loop.law}.")
+        self.products = sorted({names for row in self.rows for _, _, names, _ in row.parts})
+        self.solves = 0
+        self.solver_seconds = 0.0
+        self._numbers: dict[tuple[Fraction, ...], _Numbers] = {}
+
+    def covers(self, loop: Loop) -> bool:
+        """Whether a point has the structure of this sweep."""
+        return ends_of(loop) == ends_of(self.loop) and _nested(loop) == _nested(self.loop)
+
+    def frame(self, loop: Loop) -> Frame:
+        """Units that suit one point."""
+        scale = balance(loop)
+        return Frame(scale=scale, pace=self._in_units(scale).pace(self._features(values_of(loop))))
+
+    def solve(self, loop: Loop, frame: Frame | None = None, accuracy: float = ACCURACY) -> Screened | None:
+        """Largest margin at one point; None if the solver fails.
+
+        Parameters
+        ----------
+        loop : Loop
+        frame : Frame, optional
+            Units; those of the point unless given. Margins in different units share their sign only.
+        accuracy : float
+            That the solver is asked for.
+
+        Raises
+        ------
+        ValueError
+            When the point has another structure.
+        CertificateError
+            When its numbers are too far apart for floating point.
+        """
+        if not self.covers(loop):
+            raise ValueError("the point has another structure. Compile a sweep for it.")
+        values, units = values_of(loop), frame or self.frame(loop)
+        found = self._in_units(units.scale).solve(self._features(values), units.pace, accuracy)
+        self.solves += 1
+        if found is None:
+            return None
+        margin, decision, per_product, seconds = found
+        self.solver_seconds += seconds
+        slopes = self._slopes(values, per_product)
+        return Screened(margin=margin, decision=decision, frame=units, slopes=slopes)
+
+    def family(self, frame: Frame) -> Family:
+        """Lyapunov functions in the units of a frame."""
+        return Family(
+            monomials=self.monomials,
+            sizes=self._in_units(frame.scale).sizes,
+            demands=(),
+            pace=Fraction(frame.pace),
+            fallen=max(sum(e) for row in self.rows if row.rate for e in row.margin),
+        )
+
+    def _in_units(self, scale: tuple[Fraction, ...]) -> "_Numbers":
+        if scale not in self._numbers:
+            free = self._numbers and not any(row.equalities or row.inequalities for row in self.rows)
+            known = next(iter(self._numbers.values())).matrix if free else None
+            if len(self._numbers) >= _KEPT:
+                self._numbers.pop(next(iter(self._numbers)))
+            try:
+                self._numbers[scale] = _Numbers(self, scale, known)
+            except OverflowError:
+                raise CertificateError(_TOO_FAR) from None
+        return self._numbers[scale]
+
+    def _features(self, values: Mapping[str, float]) -> Any:
+        """Value of every product of names."""
+        import numpy as np
+
+        return np.array([_product(values, names) for names in self.products])
+
+    def _slopes(self, values: Mapping[str, float], per_product: Any) -> dict[str, float]:
+        """Derivative of the margin in every name, from that in every product."""
+        found = {name: 0.0 for names in self.products for name in names}
+        for names, slope in zip(self.products, per_product.tolist(), strict=True):
+            for i, name in enumerate(names):
+                found[name] += slope * _product(values, (*names[:i], *names[i + 1 :]))
+        return found
+
+
+class _Numbers:
+    """The coefficients of a sweep in the units of one scale; without conditions all scales share a matrix."""
+
+    def __init__(self, sweep: Sweep, scale: tuple[Fraction, ...], matrix: Matrix | None) -> None:
+        import numpy as np
+
+        self.matrix = matrix or Matrix(sweep.rows, sweep.loop, sweep.monomials, scale)
+        self.sizes = tuple(monomial(scale, exponents_of(t, sweep.loop.states)) for t in sweep.monomials)
+        order = {names: i for i, names in enumerate(sweep.products)}
+        parts = [(row, *part) for row in sweep.rows for part in row.parts]
+        wholes = {id(row): scales_of(row, scale) for row in sweep.rows}
+        self.coefficients = np.array(
+            [float(c * monomial(wholes[id(row)], e) / self.sizes[j]) for row, j, e, _, c in parts]
+        )
+        self.products = np.array([order[names] for _, _, _, names, _ in parts])
+        self.rate = np.array([row.rate for row, *_ in parts])
+
+    def pace(self, features: Any) -> float:
+        """Largest coefficient of all −V̇_j."""
+        import numpy as np
+
+        with np.errstate(over="ignore", invalid="ignore"):
+            merged = np.bincount(self.matrix.slots[self.rate], (self.coefficients * features[self.products])[self.rate])
+        if not np.isfinite(merged).all():
+            raise CertificateError(_TOO_FAR)
+        return float(np.abs(merged).max(initial=0.0)) or 1.0
+
+    def solve(self, features: Any, pace: float, accuracy: float) -> tuple[float, list[float], Any, float] | None:
+        """Margin, decision, derivative of the margin in every product, and seconds; None if the solver fails."""
+        import numpy as np
+
+        weights = np.where(self.rate, self.coefficients / pace, self.coefficients)
+        answer = self.matrix.solve(weights * features[self.products], accuracy)
+        if answer is None:
+            return None
+        x, z = np.array(answer.x), np.array(answer.z)
+        shares = weights * z[self.matrix.part_rows] * x[self.matrix.part_columns]
+        per_product = np.bincount(self.products, shares, minlength=len(features))
+        decision = z[1 : 1 + len(self.sizes)].tolist()
+        return float(-z[0]), decision, per_product, float(answer.solve_time)
+
+
+def _product(values: Mapping[str, float], names: tuple[str, ...]) -> float:
+    found = 1.0
+    for name in names:
+        found *= values[name]
+    return found
+
+
+def _nested(loop: Loop) -> list[tuple[Fraction, ...]]:
+    """Gains and constants inside nested powers, which shape the cells; those of terms that vanish do not."""
+    known = loop.parameters | {name: loop.parameters[of] for name, (of, _) in loop.roots.items()}
+    terms = [term for terms in loop.lifts.values() for term in terms]
+    values = [tuple(known[name] for name in term.parameters) for term in terms]
+    return [v if all(v) else (Fraction(0),) for v in values]

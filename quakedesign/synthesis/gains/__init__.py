@@ -1,0 +1,1 @@
+"""Gains found together with their Lyapunov function, for an objective."""

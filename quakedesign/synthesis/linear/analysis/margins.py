@@ -1,0 +1,258 @@
+"""How much of the box a given K tolerates: friction slope, range of β, decay rate. Each proved, beside its limit."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.certificates import Certificate, Loop
+from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.premises import plant_ranges
+from quakedesign.controllers import Controller
+from quakedesign.fault import Fault
+from quakedesign.rationals import nearest, rational
+from quakedesign.symbolic import plant
+from quakedesign.synthesis.linear.analysis.common_quadratic import CommonQuadratic, robust_stability, sector_loop
+from quakedesign.synthesis.linear.analysis.frequency import characteristic, circle_limit, slip_limit, stable_quartic
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop, polytope_of
+
+_SHARES = (Fraction(9995, 10000), Fraction(999, 1000), Fraction(997, 1000), Fraction(992, 1000))
+_STEPS = 10
+_BETA_STEPS = 7
+_LARGEST_BETA = 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlopeMargin:
+    """Friction-slope margin: h = s(t)·x1 with 0 ≤ s ≤ margin·s_max at any time, for all β of the box ``paper``.
+
+    Attributes
+    ----------
+    certified : Fraction
+        The common quadratic V proves it up to here; 0 when nothing was proved.
+    limit : Fraction
+        A constant s of limit·s_max, with β = `limit_beta`, is not asymptotically stable (Routh–Hurwitz, exact).
+    limit_beta : Fraction
+    circle : float
+        What the circle criterion allows for time-varying s at `limit_beta`, measured.
+    slope : Fraction
+        s_max = N̂σ'_n·|Δμ|/d_c [1/s²].
+    working_slope : Fraction
+        The same with the largest effective stress on the way to the target slip (ERRATA 8) [1/s²].
+    certificate : Certificate or None
+    """
+
+    certified: Fraction
+    limit: Fraction
+    limit_beta: Fraction
+    circle: float
+    slope: Fraction
+    working_slope: Fraction
+    certificate: Certificate | None
+
+    @property
+    def certified_over_limit(self) -> float:
+        """Share of the limit that is proved [-]."""
+        return float(self.certified / self.limit)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts, measured ones as numbers."""
+        return {
+            "friction_slope_margin": str(self.certified),
+            "linear_limit": str(self.limit),
+            "linear_limit_beta": str(self.limit_beta),
+            "circle_limit": self.circle,
+            "slope": str(self.slope),
+            "working_slope": str(self.working_slope),
+            "working_margin": float(self.certified * self.slope / self.working_slope),
+        }
+
+
+def friction_slope_margin(fault: Fault, controller: Controller) -> SlopeMargin | None:
+    """Certify the friction-slope margin to within a thousandth of its supremum for this family of V.
+
+    Parameters
+    ----------
+    fault : Fault
+        Its box is replaced by ``paper``; its disturbance does not count.
+    controller : Controller
+        e-LQR.
+
+    Returns
+    -------
+    SlopeMargin or None
+        None for friction without slope, or when the loop without friction slope is unstable for a β of the range.
+    """
+    fault = fault.with_box("paper")
+    needed, slope = sectors(fault), nominal_slope(fault)
+    spring, damping = (plant_ranges(fault)[symbol][0] for symbol in (plant.k_hat, plant.eta_hat))
+    loop = error_loop(
+        tuple(controller.gains.values()), replace(needed, slip=(-spring, -spring), rate=(damping, damping))
+    )
+    found = slip_limit(loop, damping)
+    if slope == 0 or found is None or found[0] <= -spring:
+        return None
+    limit, beta = (found[0] + spring) / slope, found[1]
+
+    def prove(margin: Fraction) -> Certificate | None:
+        widened = replace(needed, slip=(-spring, margin * slope - spring), rate=(damping, damping))
+        return robust_stability(sector_loop(controller, widened))
+
+    certified, certificate = _largest(prove, limit)
+    stress = needed.largest_effective_stress / rational(fault.effective_normal_stress)
+    return SlopeMargin(
+        certified=certified,
+        limit=limit,
+        limit_beta=beta,
+        circle=circle_limit(loop, beta, damping, -spring) / float(slope),
+        slope=slope,
+        working_slope=slope * stress,
+        certificate=certificate,
+    )
+
+
+def nominal_slope(fault: Fault) -> Fraction:
+    """s_max = N̂σ'_n·(largest chord slope of friction in slip) at zero pressure [1/s²]."""
+    values = plant.plant_values(fault)
+    exact = values[plant.N_hat] * values[plant.sigma] * fault.friction.exact().slip_slope
+    return rational(exact)
+
+
+def _largest(prove: Callable[[Fraction], Certificate | None], limit: Fraction) -> tuple[Fraction, Certificate | None]:
+    """Largest number below a limit that is proved: shares of the limit first, bisection below them."""
+    for share in _SHARES:
+        value = _decimal(limit * share)
+        certificate = prove(value)
+        if certificate is not None:
+            return value, certificate
+    low, high, best = Fraction(0), limit * _SHARES[-1], None
+    for _ in range(_STEPS):
+        middle = _decimal((low + high) / 2)
+        found = prove(middle)
+        low, high, best = (middle, high, found) if found is not None else (low, middle, best)
+    return low, best
+
+
+def _decimal(value: Fraction) -> Fraction:
+    """Value rounded down to six significant decimals."""
+    digits = f"{float(value) * (1 - 1e-6):.5e}"
+    return Fraction(digits)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainRange:
+    """Range of β = μN̂/b over which one V proves stability with everything else anywhere in the box.
+
+    Attributes
+    ----------
+    low, high : Fraction
+        Each with the other end as the box has it. `high` is at most 1024 times the box's: no upper limit was looked for
+        above.
+    low_limit : Fraction
+        A constant β of this, with a constant vertex of the rest, is not asymptotically stable (exact).
+    certificates : tuple of Certificate
+    """
+
+    low: Fraction
+    high: Fraction
+    low_limit: Fraction
+    certificates: tuple[Certificate, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts."""
+        return {"beta_low": str(self.low), "beta_high": str(self.high), "beta_low_limit": str(self.low_limit)}
+
+
+def gain_range(fault: Fault, controller: Controller) -> GainRange | None:
+    """Certify how far β may leave the box at either end, by bisection; None when the box itself is not proved."""
+    needed = sectors(fault)
+
+    def prove(low: Fraction, high: Fraction) -> Certificate | None:
+        return robust_stability(sector_loop(controller, replace(needed, beta=(low, high))))
+
+    least, most = needed.beta
+    inside = prove(least, most)
+    if inside is None:
+        return None
+    limit = _least_stable(error_loop(tuple(controller.gains.values()), needed))
+    found = {"low": (least, inside), "high": (most, inside)}
+    low, certified = limit, least
+    for _ in range(_BETA_STEPS):
+        middle = nearest(float((low + certified) / 2), 1 << 24)
+        proof = prove(middle, most)
+        if proof is None:
+            low = middle
+        else:
+            certified, found["low"] = middle, (middle, proof)
+    factor, failed = Fraction(4), False
+    while factor <= _LARGEST_BETA and not failed:
+        proof = prove(least, most * factor)
+        failed = proof is None
+        if proof is not None:
+            found["high"] = (most * factor, proof)
+        factor *= 4
+    return GainRange(
+        low=found["low"][0],
+        high=found["high"][0],
+        low_limit=limit,
+        certificates=(found["low"][1], found["high"][1]),
+    )
+
+
+def _least_stable(loop: ErrorLoop) -> Fraction:
+    """Largest β below the range, to 2⁻²⁰ of its end, at which a constant vertex of s and w is not stable, or 0."""
+    corners = {(s, w) for _, s, w in loop.corners()}
+
+    def stable(beta: Fraction) -> bool:
+        return all(stable_quartic(*characteristic(loop, beta, s, w)) for s, w in corners)
+
+    low, high = Fraction(0), loop.beta[0]
+    for _ in range(20):
+        middle = (low + high) / 2
+        low, high = (low, middle) if stable(middle) else (middle, high)
+    return low
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecayRate:
+    """Exponential decay for all measurable courses of the parameters in the box.
+
+    Attributes
+    ----------
+    certified : Fraction
+        a with |x(t)| ≤ C·e^{−at} [1/s].
+    limit : float
+        The slowest pole of a constant vertex [1/s], measured; nothing decays faster.
+    certificate : Certificate
+    """
+
+    certified: Fraction
+    limit: float
+    certificate: Certificate
+
+
+def decay_rate(loop: Loop) -> DecayRate | None:
+    """Certify the largest decay rate that a common quadratic V finds; None when stability is not proved."""
+    certificate = robust_stability(loop, fastest=True)
+    if certificate is None:
+        return None
+    limit = -polytope_of(loop).slowest()
+    return DecayRate(certified=certificate.claims["rate"], limit=limit, certificate=certificate)
+
+
+def supremum(loop_at: Callable[[Fraction], Loop], limit: Fraction, steps: int = 14) -> float:
+    """Largest number for which the solver finds a common V, by bisection in floating point; proves nothing.
+
+    Parameters
+    ----------
+    loop_at : callable
+        Loop for a number between 0 and `limit`.
+    limit : Fraction
+    steps : int
+    """
+    low, high = Fraction(0), limit
+    for _ in range(steps):
+        middle = (low + high) / 2
+        found = CommonQuadratic(polytope_of(loop_at(middle)))()
+        low, high = (middle, high) if found is not None and found.rate > 0 else (low, middle)
+    return float(low)

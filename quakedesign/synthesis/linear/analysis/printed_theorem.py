@@ -1,0 +1,277 @@
+"""The premise of Theorem 2 as printed and as it must be, side by side, and the plants on which the print fails.
+
+The printed test asks whether K is optimal for a Q ≥ Q0 + R·GᵀG with the printed row G, the sound one whether it is for
+a Q ≥ Q0 + R·W (ERRATA 6, 7). Neither looks at a pole: a K that the printed test accepts may leave an unstable plant in
+the box.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.certificates.linear_premises import Sectors
+from quakedesign.certificates.premises import least_authority, plant_ranges
+from quakedesign.fault import Fault, load_fault
+from quakedesign.rationals import fraction_of, rational
+from quakedesign.symbolic import plant
+from quakedesign.synthesis.linear.analysis.inverse_optimality import InverseOptimality, inverse_optimality
+from quakedesign.synthesis.linear.design.algebraic_riccati import solve_care
+from quakedesign.synthesis.linear.design.nondimensional import sound_bound
+from quakedesign.synthesis.linear.plant.problem import LinearProblem, Scales, Vertex, loop_matrix
+from quakedesign.synthesis.linear.plant.rational_matrices import (
+    Matrix,
+    characteristic,
+    definite,
+    diagonal,
+    hurwitz,
+    lyapunov,
+    outer,
+    rounded,
+    times,
+    total,
+)
+
+Range = tuple[Fraction, Fraction]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BothTests:
+    """What the printed and the sound test say about one K.
+
+    Attributes
+    ----------
+    printed, sound : InverseOptimality
+    unstable_at : (Fraction, Fraction, Fraction) or None
+        A vertex (β, s [1/s²], w [1/s]) of the box at which the loop is not asymptotically stable, exactly (Routh).
+    growth : Fraction or None
+        Rigorous lower bound on the factor by which a switched plant of the box grows a period; above 1 a refutation.
+    """
+
+    printed: InverseOptimality
+    sound: InverseOptimality
+    unstable_at: Vertex | None
+    growth: Fraction | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "printed": self.printed.to_dict(),
+            "sound": self.sound.to_dict(),
+            "unstable_at": [float(v) for v in self.unstable_at] if self.unstable_at else None,
+            "growth": float(self.growth) if self.growth else None,
+        }
+
+    def table(self) -> str:
+        """Markdown table of both tests and of what the plant does."""
+        fate = "stable at every constant vertex"
+        if self.unstable_at:
+            fate = "unstable at β = {:.4g}, s = {:.4g}, w = {:.4g}".format(*map(float, self.unstable_at))
+        elif self.growth and self.growth > 1:
+            fate += f", but a switched plant grows {float(self.growth):.4g}-fold a period"
+        return (
+            "| test | verdict |\n|---|---|\n"
+            f"| printed, Q ≥ Q0 + R·GᵀG | {self.printed.verdict} |\n"
+            f"| sound, Q ≥ Q0 + R·W | {self.sound.verdict} |\n"
+            f"| the loop itself | {fate} |\n"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Switching:
+    """A periodic plant of a box: vertices and how long each lasts [s]."""
+
+    vertices: tuple[Vertex, ...]
+    durations: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Example:
+    """A plant, its printed row G, and the weights with which Theorem 2 as printed is applied to it.
+
+    Attributes
+    ----------
+    name : str
+    problem : LinearProblem
+    printed : (Fraction, Fraction)
+    Q0 : Matrix
+    R : Fraction
+    switching : Switching or None
+    """
+
+    name: str
+    problem: LinearProblem
+    printed: Range
+    Q0: Matrix
+    R: Fraction
+    switching: Switching | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExactDesign:
+    """K and V = xᵀΘx in rationals.
+
+    Attributes
+    ----------
+    gains : tuple of Fraction
+        In the units of the problem.
+    theta : Matrix
+    proved : bool
+        Whether V > 0 and V̇ < 0 at every vertex, exactly; then for every plant of the box, switched ones included.
+    """
+
+    gains: tuple[Fraction, ...]
+    theta: Matrix
+    proved: bool
+
+
+def printed_row(fault: Fault) -> Range:
+    """G of eq. lipschitz2 as printed: μ_x1σ'ΔN̂ in place of μ_x1(σ'N̂)_max, no friction in the second entry."""
+    ranges, values = plant_ranges(fault), plant.plant_values(fault)
+
+    def spread(symbol: Any) -> Fraction:
+        nominal = fraction_of(values[symbol])
+        return max(ranges[symbol][1] - nominal, nominal - ranges[symbol][0])
+
+    slope: Any = fault.friction.exact().slip_slope
+    stress = ranges[plant.sigma][1]
+    weakening = fraction_of(slope) if slope else Fraction(0)
+    b, growth = least_authority(fault), fault.disturbance
+    first = spread(plant.k_hat) + weakening * stress * spread(plant.N_hat) + abs(rational(growth.slip_growth))
+    return first / b, (spread(plant.eta_hat) + abs(rational(growth.rate_growth))) / b
+
+
+def both_tests(
+    problem: LinearProblem, gains: Sequence[Fraction], printed: Range, switching: Switching | None = None
+) -> BothTests:
+    """Judge one K by the printed and by the sound test, and look at the loop itself.
+
+    Parameters
+    ----------
+    problem : LinearProblem
+    gains : sequence of 4 Fraction
+        K, in the units of the problem.
+    printed : (Fraction, Fraction)
+        G as printed, see `printed_row`.
+    switching : Switching, optional
+        A plant of the box that changes in time.
+    """
+    unstable = (v for v in problem.vertices() if not hurwitz(characteristic(problem.loop(v, gains))))
+    return BothTests(
+        printed=inverse_optimality(problem, gains, printed=printed),
+        sound=inverse_optimality(problem, gains),
+        unstable_at=next(unstable, None),
+        growth=switched_growth(problem, gains, switching) if switching else None,
+    )
+
+
+def switched_growth(problem: LinearProblem, gains: Sequence[Fraction], switching: Switching) -> Fraction:
+    """Rigorous lower bound on the spectral radius of one period, in ball arithmetic.
+
+    |trace Mⁿ| ≤ 4ϱⁿ bounds the spectral radius ϱ of the 4 × 4 period M from below.
+    """
+    from flint import arb, arb_mat, fmpq
+
+    def ball(v: Fraction) -> Any:
+        return arb(fmpq(v.numerator, v.denominator))
+
+    period = arb_mat([[arb(int(i == j)) for j in range(4)] for i in range(4)])
+    for vertex, duration in zip(switching.vertices, switching.durations, strict=True):
+        loop = loop_matrix(vertex, problem.sectors.authority, gains)
+        period = (arb_mat([[ball(v) for v in row] for row in loop]) * ball(duration)).exp() * period
+    power, best, n = period, Fraction(0), 1
+    for _ in range(7):
+        power, n = power * power, 2 * n
+        end = ((abs(power.trace()) / 4) ** (arb(1) / n)).lower().fmpq()
+        best = max(best, fraction_of(end))
+    return best
+
+
+def printed_design(example: Example) -> ExactDesign:
+    """K and Θ of Theorem 2 as printed, Q = Q0 + R·GᵀG; the theorem takes this for a proof."""
+    g = (*example.printed, Fraction(0), Fraction(0))
+    return _designed(example, times(example.R, outer(g, g)))
+
+
+def corrected_design(example: Example) -> ExactDesign:
+    """K and Θ with the sound bound, Q = Q0 + R·W, the split of W chosen for the smallest trace of Θ."""
+    from scipy.optimize import minimize_scalar
+
+    bounds = example.problem.bounds
+
+    def design(split: float) -> ExactDesign:
+        return _designed(example, times(example.R, sound_bound(bounds, Fraction(round(split * 1000), 1000))))
+
+    if not min(bounds):
+        return design(0.5)
+    best = minimize_scalar(
+        lambda w: float(sum(design(w).theta[i][i] for i in range(4))), bounds=(0.05, 0.95), method="bounded",
+        options={"xatol": 1e-2},
+    )  # fmt: skip
+    return design(float(best.x))
+
+
+def _designed(example: Example, bound: Matrix) -> ExactDesign:
+    problem, Q = example.problem, total(example.Q0, bound)
+    unit = (Fraction(0), problem.sectors.authority, Fraction(0), Fraction(0))
+    found = solve_care(problem.nominal(), times(1 / example.R, outer(unit, unit)), Q)
+    theta = rounded(found.X, 60)
+    gains = tuple(problem.sectors.authority * row[1] / example.R for row in theta)
+    return ExactDesign(gains=gains, theta=theta, proved=decreases(problem, gains, theta))
+
+
+def decreases(
+    problem: LinearProblem, gains: Sequence[Fraction], theta: Matrix, *, rate: Fraction = Fraction(0)
+) -> bool:
+    """Whether V = xᵀΘx is positive and V̇ < −2aV at every vertex, hence over the whole box; exact.
+
+    V̇ is affine in β, s and w each, so that the vertices suffice, for parameters that vary in time as well.
+
+    Parameters
+    ----------
+    problem : LinearProblem
+    gains : sequence of 4 Fraction
+    theta : matrix (4 × 4)
+    rate : Fraction
+        a [1/s].
+    """
+    held = times(-2 * rate, theta)
+    return definite(theta) and all(
+        definite(total(times(-1, lyapunov(problem.loop(v, gains), theta)), held)) for v in problem.vertices()
+    )
+
+
+def printed_bound_example() -> Example:
+    """ERRATA 6: the real fault, N̂ known, so that the printed bound has no friction; Q0 = 1e-6·I, R = 1, p in MPa."""
+    fault = load_fault("real-fault")
+    mega = Scales(time=Fraction(1), slip=Fraction(1), pressure=Fraction(10**6))
+    g1, g2 = printed_row(fault)
+    return Example(
+        name="friction missing in G",
+        problem=LinearProblem.of(fault).nondimensional(mega),
+        printed=(g1 / mega.pressure, g2 / mega.pressure),
+        Q0=diagonal((Fraction(1, 10**6),) * 4),
+        R=Fraction(1),
+    )
+
+
+def printed_row_example() -> Example:
+    """ERRATA 7: k̂ = 1 ± 1, η̂ = 0.1 ± 1, b = 1: g1 = g2 = 1; Q0 = 1e-4·I, R = 1."""
+    one, damping = Fraction(1), Fraction(1, 10)
+    problem = LinearProblem(
+        stiffness=one,
+        damping=damping,
+        sectors=Sectors(
+            authority=one, beta=(one, one), slip=(Fraction(-2), Fraction(0)), rate=(damping - 1, damping + 1),
+            row_bounds=(one, one), largest_effective_stress=Fraction(0),
+        ),
+    )  # fmt: skip
+    soft, stiff = (one, Fraction(0), damping - 1), (one, Fraction(-2), damping - 1)
+    return Example(
+        name="one row for two bounds",
+        problem=problem,
+        printed=(one, one),
+        Q0=diagonal((Fraction(1, 10**4),) * 4),
+        R=one,
+        switching=Switching(vertices=(soft, stiff), durations=(Fraction("1.861"), Fraction("1.025"))),
+    )

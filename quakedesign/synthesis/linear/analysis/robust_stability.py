@@ -1,0 +1,130 @@
+"""The verdict on a given K over a whole box, with every certified margin beside its limit."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from quakedesign.certificates import Certificate, Verdict
+from quakedesign.certificates.linear_premises import sectors
+from quakedesign.controllers import Controller
+from quakedesign.fault import Fault
+from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, sector_loop
+from quakedesign.synthesis.linear.analysis.frequency import (
+    FrequencyFacts,
+    characteristic,
+    frequency_facts,
+    stable_quartic,
+)
+from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
+from quakedesign.synthesis.linear.analysis.margins import (
+    DecayRate,
+    GainRange,
+    SlopeMargin,
+    decay_rate,
+    friction_slope_margin,
+    gain_range,
+)
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop, polytope_of
+from quakedesign.synthesis.linear.plant.problem import LinearProblem, Vertex
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Analysis:
+    """What is proved of a K about any constant reference, and how much more than the box it tolerates.
+
+    Attributes
+    ----------
+    decay : DecayRate or None
+        None when no V was found for the whole box.
+    unstable_at : (Fraction, Fraction, Fraction) or None
+        β, s [1/s²] and w [1/s] of a vertex at which the loop is not asymptotically stable (Routh–Hurwitz, exact).
+    slope : SlopeMargin or None
+    span : GainRange or None
+    frequency : tuple of FrequencyFacts
+        Measured, one for every vertex.
+    """
+
+    decay: DecayRate | None
+    unstable_at: Vertex | None
+    slope: SlopeMargin | None
+    span: GainRange | None
+    frequency: tuple[FrequencyFacts, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """PROVED with a V for the whole box, REFUTED by a vertex, else UNDECIDED."""
+        if self.decay is not None:
+            return Verdict.PROVED
+        return Verdict.UNDECIDED if self.unstable_at is None else Verdict.REFUTED
+
+    @property
+    def certificates(self) -> dict[str, Certificate]:
+        """What was proved, by name: ``stability``, ``friction-slope``, ``low-beta`` and ``high-beta``."""
+        found: dict[str, Certificate | None] = {"stability": self.decay.certificate if self.decay else None}
+        found["friction-slope"] = self.slope.certificate if self.slope else None
+        if self.span is not None:
+            found["low-beta"], found["high-beta"] = self.span.certificates
+        return {name: certificate for name, certificate in found.items() if certificate is not None}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts, measured ones as numbers, SI."""
+        return {
+            "verdict": str(self.verdict),
+            "unstable_at": [float(v) for v in self.unstable_at] if self.unstable_at else None,
+            "decay_rate": str(self.decay.certified) if self.decay else None,
+            "decay_limit": self.decay.limit if self.decay else None,
+            **(self.slope.to_dict() if self.slope else {"friction_slope_margin": None}),
+            **(self.span.to_dict() if self.span else {}),
+            "frequency": [{name: getattr(f, name) for name in f.__slots__} for f in self.frequency],
+        }
+
+
+def analysis(fault: Fault, controller: Controller) -> Analysis:
+    """Judge a given K on a fault, over its uncertainty box.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : Controller
+        e-LQR.
+    """
+    needed = sectors(fault)
+    loop = error_loop(tuple(controller.gains.values()), needed)
+    return Analysis(
+        decay=decay_rate(sector_loop(controller, needed)) or _decay_of_optimal_gains(fault, controller),
+        unstable_at=unstable_vertex(loop),
+        slope=friction_slope_margin(fault, controller),
+        span=gain_range(fault, controller),
+        frequency=tuple(frequency_facts(loop, corner) for corner in loop.corners()),
+    )
+
+
+def _decay_of_optimal_gains(fault: Fault, controller: Controller) -> DecayRate | None:
+    """What the Riccati equation that K solves proves, where it covers the uncertainty; None where it does not."""
+    found = inverse_optimality(LinearProblem.of(fault), tuple(controller.gains.values()))
+    if found.P is None:
+        return None
+    loop = sector_loop(controller, sectors(fault))
+    certificate = finished_exactly(loop, found.scales.form_outside(found.P))
+    if certificate is None:
+        return None
+    return DecayRate(certified=certificate.claims["rate"], limit=-polytope_of(loop).slowest(), certificate=certificate)
+
+
+def unstable_vertex(loop: ErrorLoop) -> Vertex | None:
+    """Vertex whose constant loop is not asymptotically stable, exactly; None when all are stable."""
+    return next((c for c in loop.corners() if not stable_quartic(*characteristic(loop, *c))), None)
+
+
+def why_undecided(loop: ErrorLoop) -> str:
+    """What is known about gains for which no V was found: an unstable vertex, or nothing."""
+    vertex = unstable_vertex(loop)
+    if vertex is None:
+        return (
+            "every constant vertex of the box is stable, but no common quadratic V was found for parameters that vary; "
+            "a narrower box or more bandwidth may help"
+        )
+    beta, s, w = map(float, vertex)
+    return (
+        f"the loop is not stable at beta = {beta:.4g}, s = {s:.4g} 1/s^2, w = {w:.4g} 1/s of the box, so no V exists; "
+        "a narrower box or a shorter sampling time (more bandwidth) may help"
+    )

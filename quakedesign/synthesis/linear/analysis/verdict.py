@@ -1,0 +1,132 @@
+"""Everything that is decided of a given K on a fault, with the files that prove it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from quakedesign.certificates import Certificate
+from quakedesign.controllers.elqr import ExtendedLQR
+from quakedesign.errors import OutputError
+from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.sos import Answer
+from quakedesign.synthesis.linear.analysis.definite_files import held_files, inverse_optimality_files
+from quakedesign.synthesis.linear.analysis.facts import linear_facts
+from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
+from quakedesign.synthesis.linear.analysis.robust_stability import Analysis, analysis
+from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks, certified_peaks
+from quakedesign.synthesis.linear.peak_certificate import peak_certificate
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.sampled.input_delay import varying_verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearVerdict:
+    """Verdict on a K.
+
+    Attributes
+    ----------
+    fault : Fault
+    controller : ExtendedLQR
+    analysis : Analysis
+    facts : mapping
+        See `linear_facts`.
+    step : Fraction
+        Sampling period [s] that the facts are about.
+    peaks : CertifiedPeaks or None
+        None when they were not asked for or not found.
+    asked : str or None
+        Class of the disturbance for which peaks were asked for.
+    """
+
+    fault: Fault
+    controller: ExtendedLQR
+    analysis: Analysis
+    facts: Mapping[str, Any]
+    step: Fraction
+    peaks: CertifiedPeaks | None
+    asked: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values: exact numbers as texts, measured ones as numbers, SI."""
+        return {
+            **self.analysis.to_dict(),
+            **self.facts,
+            "peaks": self.peaks.to_dict() if self.peaks else None,
+        }
+
+    def proofs(self) -> dict[str, Certificate | Answer]:
+        """Every proof that has a file format, by name."""
+        found: dict[str, Certificate | Answer] = dict(self.analysis.certificates)
+        if self.peaks is not None:
+            found["peaks"] = peak_certificate(self.peaks, self.controller)
+        problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
+        several = {"inverse-optimal": inverse_optimality_files(inverse_optimality(problem, gains))}
+        several["held"] = held_files(problem, gains, varying_verdict(problem, gains, self.step))
+        for name, answers in several.items():
+            found |= {f"{name}{f'-{n}' if n else ''}": answer for n, answer in enumerate(answers)}
+        return found
+
+    def save(self, out: Path, *, force: bool = False) -> dict[str, str]:
+        """Write every proof: the one of stability to `out`, the others beside it with their names added.
+
+        Returns
+        -------
+        dict of str to str
+            Path of every proof, by name.
+
+        Raises
+        ------
+        OutputError
+            When one of the files exists and `force` is not given, or the folder cannot be written.
+        """
+        proofs = self.proofs()
+        paths = {
+            name: out if name == "stability" else out.with_name(f"{out.stem}-{name}{out.suffix}") for name in proofs
+        }
+        known = [str(path) for path in paths.values() if path.exists()]
+        if known and not force:
+            raise OutputError(
+                f"certificate files must be new. Received {', '.join(known)}, which exist. "
+                "Give --force to replace them."
+            )
+        for name, proof in proofs.items():
+            proof.save(paths[name])
+        return {name: str(path) for name, path in paths.items()}
+
+
+def judge(
+    fault: Fault, controller: ExtendedLQR, *, step: float | str | None = None, peaks: str | None = None
+) -> LinearVerdict:
+    """Decide what holds for a given K on a fault over its uncertainty box.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : ExtendedLQR
+    step : number or text, optional
+        Sampling period [s]; the fault's without.
+    peaks : str, optional
+        Class of the disturbance, ``"amplitude"`` or ``"rate"``, for which peaks are certified.
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown class.
+    ParameterError
+        For friction with a state, or a period that is not positive.
+    """
+    fault.require_memoryless("a verdict on gains")
+    period = rational(fault.sampling_time if step is None else step, "step")
+    bounded = certified_peaks(fault, controller, disturbance_class=peaks) if peaks is not None else None
+    return LinearVerdict(
+        fault=fault,
+        controller=controller,
+        facts=linear_facts(fault, controller, step=period),
+        analysis=analysis(fault, controller),
+        step=period,
+        peaks=bounded,
+        asked=peaks,
+    )

@@ -1,0 +1,1 @@
+"""Gains of the e-LQR from Riccati equations, in continuous time and sampled."""

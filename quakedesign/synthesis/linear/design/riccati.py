@@ -1,0 +1,193 @@
+"""e-LQR from the Riccati equation with a bound on the uncertainty that the plant can meet (ERRATA 6, 7, 9, 10)."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.controllers import control_law
+from quakedesign.controllers.elqr import ExtendedLQR
+from quakedesign.fault import Fault
+from quakedesign.symbolic.terms import Term
+from quakedesign.synthesis.linear.analysis.printed_theorem import decreases
+from quakedesign.synthesis.linear.design.algebraic_riccati import solve_care
+from quakedesign.synthesis.linear.design.nondimensional import Choice, ScaledDesign, floats, sound_bound
+from quakedesign.synthesis.linear.design.specifications import Specifications, Weights
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, outer, times, total
+
+BANDWIDTH_TIMES_STEP = 1.5
+_STATES = ("x1", "x2", "xi1", "xi2")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RiccatiDesign:
+    """u = −Kx with K, S, E in python-control's order, and the weights that gave them.
+
+    Attributes
+    ----------
+    controller : ExtendedLQR
+        K in SI, with exact decimals.
+    lyapunov : tuple of Term
+        xᵀSx in SI, exact.
+    K : ndarray, shape (4,)
+        In SI, before it is rounded to decimals.
+    Q, S : ndarray, shape (4, 4)
+        Nondimensional: time in 1/ω_n, slip in the target slip, p in target·ω_n²/b. Q holds Q0 + R·W.
+    R : float
+        Nondimensional.
+    split : float
+        w of W = diag(g1²/w, g2²/(1−w), 0, 0) [-].
+    rate : float
+        a [1/s] with V̇ ≤ −2aV − xᵀQ0x over the whole uncertainty; 0 unless a settling time was asked for.
+    residual : float
+        Rigorous relative residual of the Riccati equation that S solves.
+    E : ndarray, shape (4,)
+        Nominal closed-loop poles [1/s].
+    fastest_pole : float
+        Largest modulus of a pole over the vertices of the uncertainty [rad/s].
+    """
+
+    controller: ExtendedLQR
+    lyapunov: tuple[Term, ...]
+    K: Any
+    Q: Any
+    R: float
+    S: Any
+    E: Any
+    split: float
+    rate: float
+    residual: float
+    fastest_pole: float
+
+    @property
+    def theta(self) -> Matrix:
+        """Matrix (4 × 4) of V in SI, exact."""
+        return _matrix(self.lyapunov)
+
+
+def riccati_design(
+    fault: Fault,
+    *,
+    bandwidth: float | None = None,
+    weights: Weights | None = None,
+    specifications: Specifications | None = None,
+    feedback: str = "error",
+) -> RiccatiDesign:
+    """Solve the Riccati equation with Q = Q0 + R·W, so that the guarantee holds over the whole uncertainty.
+
+    W = diag(g1²/w, g2²/(1−w), 0, 0) bounds h² for |h| ≤ g1|x1| + g2|x2| (ERRATA 7), its split w chosen for the smallest
+    trace of S. Without weights Q0 is 1 for slip, 1/100 for slip rate and 1 for the integrals in nondimensional
+    variables, and R is such that the fastest pole meets a bandwidth or the gain its largest value.
+
+    Parameters
+    ----------
+    fault : Fault
+    bandwidth : float, optional
+        Largest modulus of a closed-loop pole over the uncertainty [rad/s]; 1.5/T_s without.
+    weights : Weights, optional
+        The user's Q0 and R, which then decide alone.
+    specifications : Specifications, optional
+        Settling time, largest gain, speed of the integral action; with a largest gain the bandwidth is not used unless
+        it is given too.
+    feedback : str
+        ``"error"`` or ``"state"`` (ERRATA 29).
+
+    Returns
+    -------
+    RiccatiDesign
+        With the nearest bandwidth that weights R from 1e-14 to 1 reach, where the wanted one is out of reach.
+
+    Raises
+    ------
+    ParameterError
+        When no weight meets the largest gain together with the other specifications.
+    """
+    problem = LinearProblem.of(fault)
+    wanted = specifications or Specifications()
+    task = ScaledDesign(problem, problem.scales(fault.reference.target_slip), wanted, weights)
+    if weights is not None:
+        given = float(weights.inside(task.scales)[1])
+        return _finished(task, (given, task.best_split(given)), feedback)
+    target = bandwidth
+    if target is None and wanted.largest_gain is None:
+        target = BANDWIDTH_TIMES_STEP / fault.sampling_time
+    choices = []
+    if target is not None:
+        choices.append(task.weight_for_pole(target))
+    if wanted.largest_gain is not None:
+        choices.append(task.weight_for_gain(float(wanted.largest_gain)))
+    return _finished(task, max(choices), feedback)
+
+
+def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesign:
+    """Design in SI with exact gains and an exact V, from a Riccati equation solved to the end."""
+    R, split = choice
+    weight = Fraction(R)
+    Q = total(task.exact_Q0, times(weight, sound_bound(task.inside.bounds, Fraction(split))))
+    unit = (Fraction(0), Fraction(1), Fraction(0), Fraction(0))
+    found = solve_care(task.shifted(), times(1 / weight, outer(unit, unit)), Q)
+    inner = [row[1] / weight for row in found.X]
+    gains = task.scales.gains_outside(inner)
+    lyapunov = _quadratic(task.scales.form_outside(found.X))
+    exact = _rounded_gains(task.outside, gains, _matrix(lyapunov))
+    loop = task.inside.loop((Fraction(1), -task.inside.stiffness, task.inside.damping), inner)
+    return RiccatiDesign(
+        controller=control_law("elqr").from_values(exact, feedback=feedback),  # type: ignore[arg-type]
+        lyapunov=lyapunov,
+        K=floats([gains])[0],
+        Q=floats(Q),
+        R=R,
+        S=floats(found.X),
+        E=_eigenvalues(loop) / float(task.scales.time),
+        split=split,
+        rate=float(task.rate / task.scales.time),
+        residual=float(found.residual),
+        fastest_pole=task.fastest_pole([inner]),
+    )
+
+
+def _eigenvalues(matrix: Any) -> Any:
+    import numpy as np
+
+    return np.linalg.eigvals(floats(matrix))
+
+
+def _rounded_gains(problem: LinearProblem, gains: Sequence[Fraction], theta: Matrix) -> tuple[Fraction, ...]:
+    """Gains to ten significant digits, or to as many more as V needs to decrease over the whole box."""
+    for digits in (10, 17):
+        found = tuple(_decimal(g, digits) for g in gains)
+        if decreases(problem, found, theta):
+            return found
+    return tuple(_decimal(g, 10) for g in gains)
+
+
+def _matrix(lyapunov: Sequence[Term]) -> Matrix:
+    """Matrix (4 × 4) of a quadratic form."""
+    rows = [[Fraction(0)] * 4 for _ in range(4)]
+    for term in lyapunov:
+        places = [_STATES.index(name) for name, *_ in term.factors]
+        i, j = places[0], places[-1]
+        rows[i][j] = rows[j][i] = term.coefficient if i == j else term.coefficient / 2
+    return tuple(tuple(row) for row in rows)
+
+
+def _decimal(value: Fraction, digits: int = 17) -> Fraction:
+    """Value to some significant digits, as a decimal."""
+    if not value:
+        return value
+    unit = Fraction(10) ** (math.floor(math.log10(abs(float(value)))) - digits + 1)
+    return round(value / unit) * unit
+
+
+def _quadratic(matrix: Matrix) -> tuple[Term, ...]:
+    """xᵀMx as terms with exact decimals."""
+    terms = []
+    for i, left in enumerate(_STATES):
+        terms.append(Term(_decimal(matrix[i][i]), (), ((left, Fraction(2), "a"),)))
+        for j in range(i + 1, 4):
+            value = _decimal(2 * matrix[i][j])
+            if value:
+                terms.append(Term(value, (), ((left, Fraction(1), "s"), (_STATES[j], Fraction(1), "s"))))
+    return tuple(terms)

@@ -1,0 +1,1 @@
+"""A given K with its pressure held over the sampling time."""
