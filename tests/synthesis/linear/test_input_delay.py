@@ -5,8 +5,8 @@ from fractions import Fraction as F
 import pytest
 
 import quakedesign as qd
-from quakedesign.synthesis.linear.hold_lyapunov import FOUR_OVER_PI_SQUARED, decrease_form
-from quakedesign.synthesis.linear.problem import LinearProblem
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.sampled.input_delay import FOUR_OVER_PI_SQUARED, decrease_form
 
 PROBLEM = LinearProblem.of(qd.load_fault("real-fault"))
 AUTHORITY = PROBLEM.sectors.authority
