@@ -167,7 +167,8 @@ def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
         return {}
     run = done.trajectory(int(index) if index.isdecimal() else index)
     path = run.save(folder / f"sample-{index}.nc")
-    return {"rerun": {"index": index, "file": str(path), "metrics": run.metrics.to_dict(), "events": dict(run.events)}}
+    told = {"outcome": run.outcome.to_dict(), "metrics": run.metrics.to_dict(), "events": dict(run.events)}
+    return {"rerun": {"index": index, "file": str(path), **told}}
 
 
 def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], folder: Path) -> None:
@@ -179,6 +180,8 @@ def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], folder:
     happened = ", ".join(f"{len(found)} {name.replace('_', ' ')}" for name, found in done.events.items() if found)
     law = problem.controller.title if problem.controller else "no control"
     out.print(f"{problem.fault.name}, {law}: {answer['samples']} samples, {answer['resumed']} of them from files")
+    came_to = ", ".join(f"{len(found)} {kind}" for kind, found in done.kinds.items() if found)
+    out.print(f"outcomes (samples): {came_to or 'none'}")
     out.print(f"events (samples): {happened or 'none'}")
     levels = ("0.05", "0.5", "0.95", "1")
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))

@@ -25,7 +25,8 @@ def design(
 ) -> int:
     """Derive, synthesise, prove, simulate, compare with the published gains, and write a report.
 
-    Exit code 0 if every designed controller is proved and its premise along the reference holds, 1 otherwise.
+    Exit code 0 if every designed controller is proved, its premise along the reference holds, and its run is neither an
+    earthquake nor diverges nor opens the fault; 1 otherwise.
 
     Parameters
     ----------
@@ -91,11 +92,11 @@ def controllers(name: str) -> list[str]:
 
 
 def positive(comparison: Any) -> bool:
-    """Whether every design is proved and its premises hold but for those on run and start; no run diverges or opens."""
+    """Whether every design is proved and its premises hold but for those on run and start, and its run is harmless."""
     needed = {"along_reference", "control_coefficient", "friction_slope"}
     return all(
         str(entry.design.verdict) == "proved"
         and all(p.holds for p in entry.design.premises if p.name in needed)
-        and not (entry.run is not None and {"diverged", "opening"} & set(entry.run.events))
+        and (entry.run is None or entry.run.outcome.harmless)
         for entry in comparison.of("designed")
     )

@@ -19,7 +19,8 @@ def compare(
 ) -> int:
     """Design, prove, simulate and compare with the published gains as `design` does, and write nothing.
 
-    Exit code as `design`: 0 if every designed controller is proved and its premise along the reference holds.
+    Exit code as `design`: 0 if every designed controller is proved, its premise along the reference holds, and its run
+    is neither an earthquake nor diverges nor opens the fault.
 
     Parameters
     ----------
@@ -101,6 +102,7 @@ def figures(
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.numbers import printed_lines
+    from quakedesign.report.outcomes import run_sentences
     from quakedesign.report.paper_study import paper_study
 
     with progress() as tell:
@@ -110,6 +112,8 @@ def figures(
     if json:
         print_json(results)
         return 0
+    told = ((e.label, "; ".join(run_sentences(e.run))) for e in comparison.entries if e.run)
+    print_lines(f"{label}: {said}" for label, said in told)
     files = [(drawn["file"], drawn["paper"]) for drawn in results["figures"].values()]
     print_lines(f"{folder}/{file}" + (f": {paper} of the paper" if paper else "") for file, paper in files)
     print_lines(printed_lines(results["printed"]))

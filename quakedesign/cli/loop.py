@@ -128,6 +128,7 @@ def simulate(
 def _answer(trajectory: Any, premises: Any) -> dict[str, Any]:
     metrics, energy = trajectory.metrics.to_dict(), trajectory.energy
     return {
+        "outcome": trajectory.outcome.to_dict(),
         "metrics": metrics,
         "units": {name: trajectory.metrics.unit(name) for name in metrics},
         "premises": [p.to_dict() for p in premises],

@@ -39,3 +39,8 @@ class Reference:
 
         d_max, t_op = (sp.Rational(str(rational(v))) for v in (self.target_slip, self.operation_time))
         return d_max * self.shape(time / t_op)
+
+    @property
+    def largest_rate(self) -> float:
+        """Largest r' [m/s]: 15/8 of the mean, at half of the operation time."""
+        return 15 / 8 * self.target_slip / self.operation_time

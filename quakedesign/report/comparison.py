@@ -61,6 +61,7 @@ class Entry:
         """Keys of DESIGN.md; exact quantities as texts, measured ones as numbers, SI."""
         found = self.design
         return {
+            "outcome": self.run.outcome.to_dict() if self.run else None,
             "gains": {name: str(v) for name, v in found.gains.items()},
             "verdict": str(found.verdict),
             "certificate": None,
@@ -106,6 +107,7 @@ class Comparison:
             "controllers": by_origin["designed"],
             "published": by_origin["published"],
             "uncontrolled": {
+                "outcome": self.uncontrolled.outcome.to_dict(),
                 "metrics": self.uncontrolled.metrics.to_dict(),
                 "events": dict(self.uncontrolled.events),
                 "run": dict(self.uncontrolled.provenance),

@@ -60,7 +60,12 @@ def study_results(study: "PaperStudy") -> dict[str, Any]:
     from quakedesign.report.paper_figures import PAPER
 
     induced = study.induced
-    told = {"metrics": induced.metrics.to_dict(), "events": dict(induced.events), "run": dict(induced.provenance)}
+    told = {
+        "outcome": induced.outcome.to_dict(),
+        "metrics": induced.metrics.to_dict(),
+        "events": dict(induced.events),
+        "run": dict(induced.provenance),
+    }
     drawn = {name: {"file": f"figures/{name}.png", "paper": PAPER.get(name)} for name in study.figures()}
     compared = study.comparison
     return {

@@ -1,4 +1,4 @@
-"""What is said of a comparison: the verdict of every controller with what breaks it, domains, schemes."""
+"""What is said of a comparison: outcome and verdict of every controller with what breaks it, domains, schemes."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premises import Domain, Variant
 from quakedesign.report.linear import held_sentence, peaks_sentence
+from quakedesign.report.outcomes import run_sentences
 from quakedesign.simulation import Trajectory
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ AS_IN_THE_PAPER = "continuous"
 
 
 def headline(entry: "Entry") -> str:
-    """One sentence with the verdict and every premise that fails."""
+    """One sentence: outcome and pressure of the run, the verdict, and every premise that fails."""
     design = entry.design
     if design.controller is None:
         return f"undecided: {design.details.get('reason', 'no gains with a proof were found')}"
@@ -25,7 +26,7 @@ def headline(entry: "Entry") -> str:
         Verdict.REFUTED: f"refuted: {design.details.get('reason', 'a counterexample checks in exact arithmetic')}",
         Verdict.UNDECIDED: f"undecided: {design.details.get('reason', 'no certificate')}",
     }[design.verdict]
-    parts = [verdict, *_broken(design.premises), *_held(entry.run)]
+    parts = [*(run_sentences(entry.run) if entry.run else ()), verdict, *_broken(design.premises), *_held(entry.run)]
     if design.verdict is Verdict.PROVED and all(p.holds for p in design.premises):
         parts.append("every premise holds")
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
@@ -38,7 +39,7 @@ def headline(entry: "Entry") -> str:
     if entry.held is not None:
         own = entry.run is None or entry.run.provenance["scheme"] in (AS_IN_THE_PAPER, "explicit")
         parts.append(held_sentence(entry.held) if own else f"with scheme explicit {held_sentence(entry.held)}")
-    return "; ".join([*parts, *_happened(entry.run)])
+    return "; ".join([*parts, *_reversed(entry.run)])
 
 
 def domain_sentence(domain: Domain) -> str:
@@ -88,17 +89,10 @@ def _held(run: Trajectory | None) -> list[str]:
     return [] if scheme == AS_IN_THE_PAPER else [f"in this run p is held over every step, scheme {scheme}"]
 
 
-def _happened(run: Trajectory | None) -> list[str]:
-    """Events of a run that leave the model."""
-    found = []
-    if run is not None and "diverged" in run.events:
-        found.append(f"the run diverges at {run.events['diverged']:.4g} s")
-    if run is not None and "opening" in run.events:
-        found.append(f"the fault opens (p >= σ') at {run.events['opening']:.4g} s")
-    if run is not None and run.metrics.reverse_slip_fraction:
-        share = run.metrics.reverse_slip_fraction
-        found.append(f"the slip rate is negative, outside the model, in {100 * share:.3g} % of the steps")
-    return found
+def _reversed(run: Trajectory | None) -> list[str]:
+    """Slip against the direction of the model."""
+    share = run.metrics.reverse_slip_fraction if run else None
+    return [f"the slip rate is negative, outside the model, in {100 * share:.3g} % of the steps"] if share else []
 
 
 def _holds(premises: Iterable[Any], name: str) -> bool:

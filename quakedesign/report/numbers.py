@@ -58,11 +58,16 @@ def table(comparison: "Comparison", more: "dict[str, Trajectory] | None" = None)
     basis = baseline(comparison)
     return [
         {"run": label, "law": law, "origin": origin}
-        | (run.metrics.to_dict() if run else {})
+        | (_outcome(run) | run.metrics.to_dict() if run else {})
         | {f"{name}_over_{BASIS}": ratio for name, ratio in relative(run, basis.run if basis else None).items()}
         | ({name: run.provenance[name] for name in _MADE} if run else {})
         for label, law, origin, run in runs
     ]
+
+
+def _outcome(run: "Trajectory") -> dict[str, Any]:
+    found = run.outcome
+    return {"outcome": found.kind, "share_of_natural": found.share_of_natural}
 
 
 def csv_text(rows: list[dict[str, Any]]) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+from quakedesign.report.grade import GRADES
 from quakedesign.report.headlines import (
     FEEDFORWARD_COLUMNS,
     domain_sentence,
@@ -10,7 +11,7 @@ from quakedesign.report.headlines import (
     headline,
     scheme_sentence,
 )
-from quakedesign.report.tables import COLUMNS, FOOTNOTE, rows
+from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.text import visible
 
 if TYPE_CHECKING:
@@ -20,18 +21,21 @@ _TABLE = """<table><thead><tr>{% for c in columns %}<th>{{ c }}</th>{% endfor %}
 {% for row in rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
 {% endfor %}</tbody></table>"""
 
+_TABLES = f"""<div class="outcomes">{{% set columns, rows = outcomes %}}{_TABLE}</div>
+{{% set columns, rows = numbers %}}{_TABLE}"""
+
 _PAGE = (
     """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>quakedesign: {{ fault.name }}</title><style>
 body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:1rem 0;font-size:.85rem}
 th,td{border-bottom:1px solid #ccc;padding:.3rem .6rem;text-align:right}
-th:first-child,td:first-child,th:nth-child(2),td:nth-child(2){text-align:left}
+th:first-child,td:first-child,.outcomes :is(th,td):is(:nth-child(2),:last-child){text-align:left}
 img{max-width:100%}code{background:#f3f3f3;padding:0 .2rem}</style></head><body>
 <h1>{{ fault.name }}</h1><p>{{ fault.source }}. Uncertainty box: {{ fault.box.name }}.</p>
 <h2>The fault</h2><ul>{% for line in facts %}<li>{{ line }}</li>{% endfor %}</ul>
 <h2>Comparison</h2>"""
-    + _TABLE
-    + """<p>{{ footnote }}. Errors count after a quarter of the task. {{ schemes }}.</p>
+    + _TABLES
+    + """<p>{{ grades }}. Errors count after a quarter of the task; p &lt; 0 is withdrawal. {{ schemes }}.</p>
 <h2>What is proved, and under which premises</h2>
 {% for e in entries %}<h3>{{ e.label }}</h3><p>{{ headline(e) }}.</p>
 <p>Gains: {% for n, v in e.design.gains.items() %}<code>{{ n }} = {{ number(v) }}</code> {% endfor %}</p>
@@ -64,8 +68,13 @@ def _shown(value: Any) -> Any:
 
 
 def table_html(comparison: "Comparison") -> str:
-    """Table of a comparison as HTML."""
-    return _environment().from_string(_TABLE).render(columns=COLUMNS, rows=rows(comparison))
+    """Tables of a comparison as HTML."""
+    return _environment().from_string(_TABLES).render(**_tables(comparison))
+
+
+def _tables(comparison: "Comparison") -> dict[str, Any]:
+    """Columns and rows of both tables."""
+    return {"outcomes": (OUTCOMES, outcome_rows(comparison)), "numbers": (COLUMNS, rows(comparison))}
 
 
 def page_html(comparison: "Comparison", facts: Iterable[str], figures: Iterable[str]) -> str:
@@ -76,14 +85,13 @@ def page_html(comparison: "Comparison", facts: Iterable[str], figures: Iterable[
         .render(
             fault=comparison.fault,
             facts=list(facts),
-            columns=COLUMNS,
-            rows=rows(comparison),
+            **_tables(comparison),
             entries=comparison.entries,
             headline=headline,
             domain=domain_sentence,
             known_columns=FEEDFORWARD_COLUMNS,
             known_rows=feedforward_rows,
-            footnote=FOOTNOTE,
+            grades=GRADES,
             schemes=scheme_sentence(comparison),
             number=lambda v: f"{float(v):.6g}",
             figures=list(figures),

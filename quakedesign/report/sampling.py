@@ -11,6 +11,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.report.on_trajectory import certified_bound, trajectory_premise
+from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells, pressure_extremes
 from quakedesign.simulation import Study, Trajectory, accuracy, gain_sensitivity, noise_sensitivity, simulate
 from quakedesign.simulation.sampling_study import QUANTITIES, SCHEMES
 from quakedesign.synthesis import Design
@@ -23,10 +24,11 @@ UNCERTAIN = "ten-percent"
 _CELLS = {
     "max_slip_error": (1, ".2e"),
     "max_slip_rate_error": (1, ".2e"),
-    "rms_pressure": (1e6, ".2f"),
+    "rms_pressure": (1e6, ".3g"),
     "pressure_total_variation": (1e9, ".3g"),
     "reverse_slip_fraction": (1, ".2f"),
 }
+OUTCOMES = ("law", "scheme", *OUTCOME_COLUMNS, "least p [MPa]", "largest p [MPa]")
 COLUMNS = (
     "law",
     "scheme",
@@ -80,12 +82,19 @@ class Row:
             "gains": {name: str(v) for name, v in law.gains.items()},
             "scale": str(law.scale) if isinstance(law, SlidingMode) else None,
             "scheme": self.scheme,
+            "outcome": self.run.outcome.to_dict(),
             "metrics": self.run.metrics.to_dict(),
             "events": dict(self.run.events),
             "on_trajectory": self.premise.to_dict() if self.premise else None,
             "energy_residual": energy.relative_residual if energy else None,
             "run": dict(self.run.provenance),
         }
+
+    def outcome_cells(self) -> tuple[str, ...]:
+        """Texts under `OUTCOMES`; a dash means diverged."""
+        extremes = pressure_extremes(self.run)
+        pressures = (f"{p / 1e6 + 0.0:.3g}" for p in extremes) if extremes else ("–", "–")
+        return (self.label, self.scheme, *outcome_cells(self.run), *pressures)
 
     def cells(self) -> tuple[str, ...]:
         """Texts under `COLUMNS`; a dash means not applicable or diverged."""

@@ -7,9 +7,10 @@ from typing import Any
 from rich.table import Table
 
 from quakedesign.output import whole_folder, write_whole
-from quakedesign.report.sampling import COLUMNS, FOOTNOTE, SamplingReport, order_rows, study_rows
+from quakedesign.report.sampling import COLUMNS, FOOTNOTE, OUTCOMES, SamplingReport, order_rows, study_rows
 
-WIDTHS = (16, 13, 8, 8, 6, 6, 5, 8)
+OUTCOME_WIDTHS = (13, 13, 10, 8, 10, 8, 8)
+WIDTHS = (13, 13, 8, 8, 8, 8, 5, 8)
 
 
 def write_sampling(report: SamplingReport, folder: Path) -> dict[str, Any]:
@@ -32,9 +33,11 @@ def print_sampling(report: SamplingReport, console: Any) -> None:
     """Table of the schemes, and one of every study."""
     console.print(report.fault.name, style="bold", end=", ")
     console.print(f"T_s = {report.fault.sampling_time:g} s")
+    console.print(_table(OUTCOMES, [row.outcome_cells() for row in report.rows], OUTCOME_WIDTHS), soft_wrap=False)
+    console.print()
     console.print(_table(COLUMNS, [row.cells() for row in report.rows], WIDTHS), soft_wrap=False)
     for row in report.rows:
-        if {"diverged", "opening"} & set(row.run.events):
+        if not row.run.outcome.harmless:
             console.print(f"{row.label}, {row.scheme}: {dict(row.run.events)}")
     console.print(FOOTNOTE)
     for name, study in report.studies.items():

@@ -1,12 +1,13 @@
 """Comparisons and runs on a terminal."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
 from quakedesign.report.comparison import Comparison
 from quakedesign.report.facts import fault_sentences
+from quakedesign.report.grade import GRADES
 from quakedesign.report.headlines import (
     FEEDFORWARD_COLUMNS,
     domain_sentence,
@@ -14,7 +15,8 @@ from quakedesign.report.headlines import (
     headline,
     scheme_sentence,
 )
-from quakedesign.report.tables import COLUMNS, FOOTNOTE, rows
+from quakedesign.report.outcomes import run_sentences
+from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 
 if TYPE_CHECKING:
     from quakedesign.certificates.premises import Premise
@@ -40,27 +42,38 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
             console.print(f"  {domain_sentence(entry.design.domain)}")
         if entry.variants:
             _print_feedforward(entry, console)
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
-    for i, (column, width) in enumerate(zip(COLUMNS, (17, 9, 8, 8, 8, 8, 8, 4), strict=True)):
-        table.add_column(column, justify="left" if i < 2 else "right", width=width)
-    for row in rows(comparison):
-        table.add_row(*row)
+    console.print()
+    console.print("outcome", style="bold", end=", ")
+    console.print("peak slip rate of the whole run, and its share of the natural earthquake's")
+    outcomes = zip(OUTCOMES, (17, 10, 8, 10, 31), "llrrl", strict=True)
+    console.print(table(outcomes, outcome_rows(comparison)), soft_wrap=False)
+    console.print(f"{GRADES}.")
     console.print()
     console.print("closed loop", style="bold", end=", ")
-    console.print("errors after a quarter of the task")
-    console.print(table, soft_wrap=False)
-    console.print(FOOTNOTE)
+    console.print("errors after a quarter of the task; p < 0 is withdrawal")
+    numbers = zip(COLUMNS, (17, 8, 8, 9, 9, 8, 8, 4), "lrrrrrrr", strict=True)
+    console.print(table(numbers, rows(comparison)), soft_wrap=False)
     console.print(f"{scheme_sentence(comparison)}.")
+
+
+def table(columns: Iterable[tuple[str, int, str]], rows: Iterable[Sequence[str]]) -> Table:
+    """Table of columns with heading, width and side (l or r); within 80 places no number is cut or broken."""
+    made = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    for heading, width, side in columns:
+        made.add_column(heading, justify="left" if side == "l" else "right", width=width)
+    for row in rows:
+        made.add_row(*row)
+    return made
 
 
 def _print_feedforward(entry: "Entry", console: Any) -> None:
     """What the same gains are certified for with every named feed-forward."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 2))
+    found = Table(box=None, pad_edge=False, padding=(0, 1, 0, 2))
     for i, column in enumerate(FEEDFORWARD_COLUMNS):
-        table.add_column(column, justify="left" if i < 1 else "right")
+        found.add_column(column, justify="left" if i < 1 else "right")
     for row in feedforward_rows(entry.variants):
-        table.add_row(*row)
-    console.print(table)
+        found.add_row(*row)
+    console.print(found)
 
 
 def _line(premise: "Premise") -> str:
@@ -74,8 +87,10 @@ def _line(premise: "Premise") -> str:
 
 
 def print_run(run: "Trajectory", premises: "Sequence[Premise]", console: Any) -> None:
-    """Metrics with units, events and premises of one run."""
+    """Outcome, pressure, metrics with units, events and premises of one run."""
     console.print(run.name, style="bold")
+    for sentence in run_sentences(run):
+        console.print(f"  {sentence}")
     for name, number in run.metrics.to_dict().items():
         if number is not None:
             console.print(f"  {name} = {number + 0.0:.6g} {run.metrics.unit(name)}".rstrip())

@@ -21,8 +21,8 @@ from quakedesign.simulation.interop import to_casadi, to_iosystem
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.measurement import Measurement
 from quakedesign.simulation.metrics import ActuatorMetrics, Metrics, StickMetrics
+from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
 from quakedesign.simulation.perturbation import perturbation
-from quakedesign.simulation.run import simulate
 from quakedesign.simulation.sampled_trajectory import SampledTrajectory
 from quakedesign.simulation.sampling_study import Study, accuracy, gain_sensitivity, noise_sensitivity, weight_study
 from quakedesign.simulation.schemes import Scheme, schemes, simulation_scheme
@@ -36,6 +36,7 @@ from quakedesign.simulation.sensing import (
     joint_condition,
     smallest_bound,
 )
+from quakedesign.simulation.simulate import simulate
 from quakedesign.simulation.state_plants import SpringSlider
 from quakedesign.simulation.state_run import simulate_state, velocity_step
 from quakedesign.simulation.state_trajectory import StateTrajectory
@@ -57,6 +58,8 @@ __all__ = [
     "Load",
     "Measurement",
     "Metrics",
+    "Outcome",
+    "OutcomeCriterion",
     "OutputFeedback",
     "Quantisation",
     "RateLimit",

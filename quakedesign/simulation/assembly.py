@@ -7,6 +7,7 @@ from typing import Any
 from quakedesign.controllers import Controller
 from quakedesign.errors import SimulationError
 from quakedesign.simulation.metrics import events, metrics
+from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.sampled_trajectory import SampledTrajectory
 from quakedesign.simulation.setting import Setting
@@ -14,7 +15,12 @@ from quakedesign.simulation.trajectory import Trajectory
 
 
 def trajectory(
-    recorder: Recorder, setting: Setting, kept: Any, provenance: dict[str, Any], began: tuple[float, float]
+    recorder: Recorder,
+    setting: Setting,
+    kept: Any,
+    criterion: OutcomeCriterion,
+    provenance: dict[str, Any],
+    began: tuple[float, float],
 ) -> Trajectory:
     """Trajectory from the kept vectors, of which those before a divergence are shown.
 
@@ -24,6 +30,7 @@ def trajectory(
     setting : Setting
     kept : ndarray
         Vectors of the recorder, shape (their length, number of instants).
+    criterion : OutcomeCriterion
     provenance : dict
     began : tuple of float
         Readings of the clock when the work and when the stepping began [s].
@@ -64,6 +71,7 @@ def trajectory(
         metrics=found,
         energy=None if watched["diverged"] >= 0 else recorder.energy(end),
         events=events(watched),
+        criterion=criterion,
         provenance=provenance | took,
         integral_units=loop.controller.integral_units if loop.controller else (),
         name=f"{loop.fault.name}, {_law_title(loop.controller)}{loop.plant_title}",

@@ -1,14 +1,18 @@
 """What happens without control."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, Fault
 from quakedesign.simulation.integrators import integrator
+from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import Setting, loop_class, run
 from quakedesign.simulation.schemes import simulation_scheme
 from quakedesign.simulation.trajectory import Trajectory
+from quakedesign.symbolic import derive
 
 NUDGE = 3.2e-15
 FOLDINGS = 90
@@ -56,14 +60,27 @@ def natural_earthquake(
     step = min(fault.sampling_time, FINENESS / fault.natural_frequency)
     setting = Setting.of(nudged, step, _duration(fault), 2000, 0.0)
     recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
-    return run(recorder, setting, integrator("dormand-prince"), progress=progress, compiled=compiled)
+    criterion = OutcomeCriterion.of(fault, natural_peak(fault) if pressure else None)
+    found = run(recorder, setting, integrator("dormand-prince"), criterion, progress=progress, compiled=compiled)
+    own = found.metrics.peak_slip_rate
+    return (
+        found if pressure or not derive(fault).unstable else replace(found, criterion=OutcomeCriterion.of(fault, own))
+    )
+
+
+def natural_peak(fault: Fault) -> float | None:
+    """Largest slip rate [m/s] of a fault without control; None for a stable one. Computed once for every fault."""
+    return _peak(fault.with_disturbance(Disturbance()).with_box("paper"))
+
+
+@lru_cache(maxsize=64)
+def _peak(fault: Fault) -> float | None:
+    return natural_earthquake(fault, compiled=False).criterion.natural_peak
 
 
 def _duration(fault: Fault) -> float:
     """Time [s] in which an instability has grown from nothing and ended."""
     from math import pi
-
-    from quakedesign.symbolic import derive
 
     growth = derive(fault).eigenvalues[0].real
     return FOLDINGS / growth if growth > 0 else PERIODS * 2 * pi / fault.natural_frequency

@@ -9,8 +9,8 @@ from quakedesign.controllers import Controller, SlidingMode
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Fault
 from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.run import simulate
 from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.simulation.simulate import simulate
 from quakedesign.simulation.variation import Variation
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.simulation.energy import EnergyBudget
 from quakedesign.simulation.metrics import Metrics
+from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
 from quakedesign.simulation.recording import Recording
 
 if TYPE_CHECKING:
@@ -53,6 +54,8 @@ class Trajectory(Recording):
     events : mapping of str to float
         Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'_n), ``reverse_slip`` (x2 < 0), ``stick``
         (friction holds the fault at rest after the start; not watched on the smooth plant).
+    criterion : OutcomeCriterion
+        What `outcome` is decided by.
     provenance : mapping
         Method, step, scheme, backend and versions.
     """
@@ -73,7 +76,14 @@ class Trajectory(Recording):
     metrics: Metrics
     energy: EnergyBudget | None = field(repr=False)
     events: Mapping[str, float]
+    criterion: OutcomeCriterion = field(repr=False)
     provenance: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def outcome(self) -> Outcome:
+        """What the run comes to: tracked, slow slip, earthquake, diverged or opened."""
+        figures, followed = self.metrics, self.reference is not None
+        return self.criterion.outcome(figures.peak_slip_rate, figures.max_slip_error, self.events, followed=followed)
 
     @property
     def slip_error(self) -> "np.ndarray | None":
@@ -102,9 +112,13 @@ class Trajectory(Recording):
         return found
 
     def attributes(self) -> dict[str, Any]:
-        """Provenance, and metrics, events and energy as JSON text."""
-        energy = self.energy and self.energy.to_dict()
-        told = {"metrics": self.metrics.to_dict(), "events": dict(self.events), "energy": energy}
+        """Provenance, and outcome, metrics, events and energy as JSON text."""
+        told = {
+            "outcome": self.outcome.to_dict(),
+            "metrics": self.metrics.to_dict(),
+            "events": dict(self.events),
+            "energy": self.energy and self.energy.to_dict(),
+        }
         return dict(self.provenance) | {name: json.dumps(value, allow_nan=False) for name, value in told.items()}
 
     @property

@@ -56,7 +56,7 @@ def test_one_line_says_what_is_wrong(capsys, tmp_path, monkeypatch, arguments, s
 )
 def test_a_place_that_cannot_be_written_is_refused_before_the_work(capsys, tmp_path, monkeypatch, arguments):
     search = "quakedesign.synthesis.lyapunov.search"
-    for module in ("quakedesign.simulation.run", search, "quakedesign.synthesis.analysis.gain_map"):
+    for module in ("quakedesign.simulation.simulate", search, "quakedesign.synthesis.analysis.gain_map"):
         __import__(module)
     monkeypatch.setattr(f"{search}.find_certificate", lambda *_, **__: pytest.fail("searched"))
     code, out, err = run(capsys, *arguments, tmp_path / "none" / "there")

@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -14,7 +15,7 @@ from quakedesign.fault import Reference, load_fault
 from quakedesign.report import compare, comparison, headline
 from quakedesign.report.folder import write_folder
 from quakedesign.report.paper_study import paper_study
-from quakedesign.report.tables import rows
+from quakedesign.report.tables import outcome_rows, rows
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate
 from quakedesign.synthesis import Design
@@ -47,7 +48,8 @@ def test_every_row_says_its_scheme_and_is_the_run_of_it(compared):
         "2-CTA (designed, compensated)",
         "e-LQR (designed, compensated)",
     ]
-    assert [row[0] for row in rows(compared)[1:]] == labels
+    assert [row[0] for row in rows(compared)] == labels
+    assert [row[0] for row in outcome_rows(compared)] == ["uncontrolled", *labels]
     assert [e.to_dict()["run"]["scheme"] for e in compared.entries] == ["explicit"] * 2 + ["compensated"] * 2
     alone = simulate(SHORT, compared.entries[2].design.controller, scheme="compensated")
     assert replace(alone.metrics, seconds=0) == replace(compared.entries[2].run.metrics, seconds=0)
@@ -76,8 +78,8 @@ def test_a_divergence_among_them_is_told_and_leaves_no_number_that_is_none(compa
 
     found = json.loads((tmp_path / "out" / "results.json").read_text(), parse_constant=refuse)
     assert found["published"]["elqr"]["events"]["diverged"] > found["published"]["elqr"]["events"]["opening"] > 0
-    assert "the run diverges at" in found["published"]["elqr"]["headline"]
-    assert "the fault opens" in found["published"]["elqr"]["headline"]
+    assert found["published"]["elqr"]["headline"].startswith("diverged at 0.042 s; ")
+    assert found["published"]["elqr"]["outcome"]["kind"] == "diverged"
     assert found["numbers"][-1]["max_slip_error_over_elqr"] == 1
     text = (tmp_path / "out" / "numbers.csv").read_text().lower()
     assert "nan" not in text
@@ -87,11 +89,18 @@ def test_a_divergence_among_them_is_told_and_leaves_no_number_that_is_none(compa
     assert {run.provenance["scheme"] for run in study.close_ups.values()} == {"explicit", "compensated"}
 
 
-def test_the_terminal_says_it_within_eighty_columns(compared):
+def test_the_terminal_says_it_and_no_table_is_wider_than_eighty_columns_or_breaks_a_number(compared):
     out = io.StringIO()
     print_comparison(compared, console(file=out, width=80))
-    assert max(map(len, out.getvalue().splitlines())) <= 80
-    assert "compensated for designed gains and explicit for published gains" in " ".join(out.getvalue().split())
+    said = out.getvalue()
+    assert "compensated for designed gains and explicit for published gains" in said
+    first = said.split("\n\noutcome, ")[1].split("\n\n")[0].splitlines()[1:]
+    second = said.split("\n\nclosed loop, ")[1].splitlines()[1:]
+    shown = [line for line in (*first, *second) if not line.startswith(("proved for", "Scheme"))]
+    assert max(map(len, shown)) <= 80
+    cells = {cell for row in (*rows(compared), *outcome_rows(compared)) for cell in row[1:] if re.match(r"-?\d", cell)}
+    assert len(cells) > 10
+    assert all(cell in "\n".join(shown) for cell in cells)
 
 
 def test_one_scheme_for_all_stays_out_of_the_labels(compared, monkeypatch):

@@ -11,7 +11,7 @@ from quakedesign.errors import OutputError
 from quakedesign.fault import Reference
 from quakedesign.report import Entry, headline
 from quakedesign.report.folder import write_folder
-from quakedesign.report.tables import COLUMNS, rows
+from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.synthesis import Design
 
 
@@ -35,10 +35,12 @@ def test_all_controllers_of_the_paper_and_all_designs_are_compared(comparison):
 
 
 def test_every_row_of_the_table_fits_its_columns(comparison):
-    found = rows(comparison)
-    assert len(found) == 6
+    found, outcomes = rows(comparison), outcome_rows(comparison)
+    assert (len(found), len(outcomes)) == (5, 6)
     assert {len(row) for row in found} == {len(COLUMNS)}
-    assert found[0][0] == "uncontrolled"
+    assert {len(row) for row in outcomes} == {len(OUTCOMES)}
+    assert outcomes[0] == ("uncontrolled", "earthquake", "1.24e-01", "100 %", "")
+    assert [row[-1] for row in outcomes if row[0] == "e-LQR (designed)"] == ["proved for this loop and task"]
 
 
 def test_every_axis_of_every_figure_has_a_label_with_a_unit(comparison):

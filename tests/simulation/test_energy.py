@@ -72,6 +72,7 @@ def test_a_dashpot_takes_what_a_closed_form_says():
 def test_a_held_pressure_relieves_friction_of_its_share():
     """Constant friction under p: ∫μAp dx1 = μApx1, which the push of the pressure gives to the spring."""
     from quakedesign.simulation.integrators import integrator
+    from quakedesign.simulation.outcome import OutcomeCriterion
     from quakedesign.simulation.recorder import Recorder
     from quakedesign.simulation.run import Setting, loop_class, run
     from quakedesign.simulation.schemes import simulation_scheme
@@ -79,7 +80,8 @@ def test_a_held_pressure_relieves_friction_of_its_share():
     pressure, half = 2e6, math.pi / FREQUENCY
     setting = Setting.of(BLOCK, half / 400, half, 10, 0.0)
     loop = loop_class("coulomb")(pushed(BLOCK), None, pressure)
-    found = run(Recorder(loop, simulation_scheme("continuous"), setting.step), setting, integrator("dormand-prince"))
+    recorder = Recorder(loop, simulation_scheme("continuous"), setting.step)
+    found = run(recorder, setting, integrator("dormand-prince"), OutcomeCriterion.of(BLOCK, None))
     slip = 2 * BLOCK.friction.residual * BLOCK.area * pressure / STIFFNESS
     relieved = BLOCK.friction.residual * BLOCK.area * pressure * slip
     assert found.slip[-1] == pytest.approx(slip, rel=1e-9)

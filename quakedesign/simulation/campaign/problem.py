@@ -12,10 +12,12 @@ from quakedesign.simulation.campaign.ledger import plain
 from quakedesign.simulation.campaign.program import STEP, Program
 from quakedesign.simulation.campaign.reseeding import reseeded
 from quakedesign.simulation.campaign.space import MOST_SAMPLES, Sample, Space, noise_seed, point
+from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.energy import WORKS, EnergyBudget, budget
 from quakedesign.simulation.integrators import Integrator
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.metrics import events, metrics
+from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import Setting, library_versions, loop_class, run
 from quakedesign.simulation.schemes import Scheme
@@ -144,6 +146,16 @@ class Problem:
         return self.recorder(self.sample(0))
 
     @cached_property
+    def criterion(self) -> OutcomeCriterion:
+        """What the outcome of every sample is decided by: the natural earthquake of the nominal fault."""
+        return OutcomeCriterion.of(self.fault, natural_peak(self.fault))
+
+    def outcome(self, result: SampleResult) -> Outcome:
+        """What a sample comes to."""
+        peak, error = (result.figures.get(name) for name in ("peak_slip_rate", "max_slip_error"))
+        return self.criterion.outcome(peak, error, result.events, followed=self.controller is not None)
+
+    @cached_property
     def program(self) -> Program:
         """One step for all samples."""
         import casadi as ca
@@ -196,4 +208,4 @@ class Problem:
 
     def trajectory(self, sample: Sample, samples: int) -> Trajectory:
         """Run of a sample with about that many instants, with the digits that it has in the campaign."""
-        return run(self.recorder(sample), replace(self.setting, samples=samples), self.method)
+        return run(self.recorder(sample), replace(self.setting, samples=samples), self.method, self.criterion)

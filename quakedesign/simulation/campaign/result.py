@@ -15,6 +15,7 @@ from quakedesign.simulation.campaign.problem import Problem, SampleResult
 from quakedesign.simulation.campaign.search import Worst
 from quakedesign.simulation.campaign.space import UNITS
 from quakedesign.simulation.metrics import EVENTS, StickMetrics
+from quakedesign.simulation.outcome import KINDS, Outcome
 from quakedesign.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -110,6 +111,17 @@ class Campaign:
         pairs = [(i, result) for i, result in enumerate(self.results) if result]
         return {name: [i for i, result in pairs if name in result.events] for name in EVENTS}
 
+    @cached_property
+    def outcomes(self) -> tuple[Outcome | None, ...]:
+        """What every sample comes to, by index; None for a sample of a batch that failed."""
+        return tuple(self.problem.outcome(result) if result else None for result in self.results)
+
+    @cached_property
+    def kinds(self) -> dict[str, list[int]]:
+        """Indices of the samples by the kind of their outcome."""
+        pairs = [(i, outcome.kind) for i, outcome in enumerate(self.outcomes) if outcome]
+        return {kind: [i for i, own in pairs if own == kind] for kind in KINDS}
+
     def trajectory(self, index: int | str, samples: int = 2000) -> Trajectory:
         """Run one sample again, with about that many instants and the digits that it has in the campaign.
 
@@ -135,9 +147,10 @@ class Campaign:
         return self.problem.trajectory(looked_at[int(number)], samples)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what JSON can hold: samples, worst, quantiles, events, failures, search, resumed."""
+        """Return what JSON can hold: samples, outcomes, worst, quantiles, events, failures, search, resumed."""
         return {
             "samples": len(self.results),
+            "outcomes": {kind: {"count": len(found), "first": found[:SHOWN]} for kind, found in self.kinds.items()},
             "worst": {metric: [self._told(i, metric) for i in self.worst(metric)] for metric in self.metrics},
             "quantiles": self.quantiles(),
             "events": {name: {"count": len(found), "first": found[:SHOWN]} for name, found in self.events.items()},
@@ -169,6 +182,7 @@ class Campaign:
         columns: dict[str, Any] = {
             f"{name} [{UNITS.get(name, '-')}]": [n[name] for n in numbers] for name in numbers[0]
         }
+        columns["outcome [-]"] = [outcome.kind if outcome else None for outcome in self.outcomes]
         columns |= {f"{m} [{StickMetrics.unit(m) or '-'}]": self.values(m) for m in self.metrics}
         return pd.DataFrame(columns, index=pd.Index(range(len(numbers)), name="sample"))
 

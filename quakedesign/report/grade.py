@@ -1,0 +1,56 @@
+"""How far a proof reaches: to the loop that ran and its task, or to which premise, and how far that fails."""
+
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from quakedesign.bounds import UpperBound
+from quakedesign.certificates import Verdict
+from quakedesign.certificates.premise import Premise
+
+if TYPE_CHECKING:
+    from quakedesign.report.comparison import Entry
+
+BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
+"""Premises of a linear law's stability that its certified peaks do without."""
+GRADES = (
+    "proved for this loop and task: every premise holds in the run that is shown; proved, but …: what the proof does "
+    "not cover, and how many times over"
+)
+
+
+def grade(entry: "Entry") -> str:
+    """Verdict on one controller, and what of its loop and task the proof leaves out."""
+    if entry.design.verdict is not Verdict.PROVED:
+        return str(entry.design.verdict)
+    missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _held(entry)
+    return f"proved, but {'; '.join(missing)}" if missing else "proved for this loop and task"
+
+
+def _bounded(entry: "Entry", premise: Premise) -> bool:
+    return bool(entry.peaks) and premise.name in BOUNDED_BY_PEAKS
+
+
+def _failing(premise: Premise) -> str:
+    if premise.ratio is None or not premise.proved:
+        return f"{premise.name} fails (nothing is certified)"
+    return f"{premise.name} fails {UpperBound(Fraction(premise.ratio)):.3g}-fold"
+
+
+def _held(entry: "Entry") -> list[str]:
+    """What the way in which the run carries out the law takes from the proof."""
+    if entry.run is None:
+        return []
+    scheme, step = entry.run.provenance["scheme"], entry.run.provenance["step"]
+    if scheme == "continuous":
+        unstable = entry.growth_per_step is not None and entry.growth_per_step >= 1
+        return ["UNSTABLE at the step used"] if unstable else []
+    if entry.held is None or scheme != "explicit":
+        return [f"p is held ({scheme}), which is not covered"]
+    verdicts, longest = {entry.held["verdict"], entry.held["summed"]}, entry.held["largest_step"]
+    if "refuted" in verdicts:
+        return ["UNSTABLE with p held"]
+    if not longest:
+        return ["p is held, and no T_s is proved"]
+    if step > longest:
+        return [f"T_s is {UpperBound(Fraction(step / longest)):.3g} times the largest proved"]
+    return [f"p is held: stability {'proved' if verdicts == {'proved'} else 'undecided'}, errors without a bound"]

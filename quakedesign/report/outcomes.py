@@ -1,0 +1,55 @@
+"""What is said of a run first: what it came to, and the pressure that it took."""
+
+from quakedesign.simulation import Trajectory
+
+OUTCOME_COLUMNS = ("outcome", "peak rate [m/s]", "of natural")
+
+
+def run_sentences(run: Trajectory) -> list[str]:
+    """Outcome of a run, and the least and the largest pressure where it has a controller."""
+    return [outcome_sentence(run), *([pressure_sentence(*extremes)] if (extremes := pressure_extremes(run)) else [])]
+
+
+def outcome_sentence(run: Trajectory) -> str:
+    """Outcome of a run with its peak slip rate."""
+    found = run.outcome
+    if found.peak_slip_rate is None:
+        return f"{found.kind} at {run.events['diverged']:.4g} s"
+    opened = f" at {run.events['opening']:.4g} s (p >= σ')" if found.kind == "opened" else ""
+    return f"{found.kind}{opened}: peak slip rate {found.peak_slip_rate:.3g} m/s, {_beside_natural(run)}"
+
+
+def outcome_cells(run: Trajectory | None) -> tuple[str, ...]:
+    """Texts under `OUTCOME_COLUMNS`; a dash means not applicable or not known."""
+    if run is None:
+        return ("–", "–", "–")
+    found = run.outcome
+    peak = "–" if found.peak_slip_rate is None else f"{found.peak_slip_rate:.2e}"
+    return found.kind, peak, "–" if found.share_of_natural is None else _percent(found.share_of_natural)
+
+
+def pressure_extremes(run: Trajectory) -> tuple[float, float] | None:
+    """Least and largest pressure [Pa] of a run; None without a controller, and for one that diverged."""
+    least, largest = run.metrics.min_pressure, run.metrics.max_pressure
+    return None if least is None or largest is None else (least, largest)
+
+
+def pressure_sentence(least: float, largest: float) -> str:
+    """Range of a pressure [Pa], and whether it is withdrawal or injection."""
+    parts = [f"{value / 1e6 + 0.0:.3g} MPa{_way(value)}" for value in (least, largest)]
+    return f"pressure from {parts[0]} to {parts[1]}"
+
+
+def _way(pressure: float) -> str:
+    return " (withdrawal)" if pressure < 0 else " (injection)" if pressure > 0 else ""
+
+
+def _beside_natural(run: Trajectory) -> str:
+    share, natural = run.outcome.share_of_natural, run.criterion.natural_peak
+    if share is None or natural is None:
+        return "and the fault has no natural earthquake"
+    return f"{_percent(share)} of the natural earthquake's {natural:.3g} m/s"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"

@@ -1,0 +1,118 @@
+"""One closed loop from rest over the whole task."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from quakedesign.controllers import Controller
+from quakedesign.fault import Fault, require_fault
+from quakedesign.simulation.actuators import Actuator
+from quakedesign.simulation.earthquake import natural_peak
+from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator
+from quakedesign.simulation.loading import Load
+from quakedesign.simulation.measurement import Measurement
+from quakedesign.simulation.outcome import OutcomeCriterion
+from quakedesign.simulation.recorder import Recorder
+from quakedesign.simulation.run import loop_class, run, run_adaptive, sampled_scheme
+from quakedesign.simulation.schemes import Scheme
+from quakedesign.simulation.sensing import Sensor
+from quakedesign.simulation.setting import Setting
+from quakedesign.simulation.trajectory import Trajectory
+from quakedesign.simulation.variation import Variation
+
+
+def simulate(
+    fault: Fault,
+    controller: Controller | None = None,
+    *,
+    step: float | None = None,
+    scheme: str | Scheme = "continuous",
+    method: str = "dormand-prince",
+    duration: float | None = None,
+    samples: int = 2000,
+    settled_from: float | None = None,
+    progress: Callable[[float], None] | None = None,
+    compiled: bool | None = None,
+    plant: str = "smooth",
+    load: Load | None = None,
+    variation: Variation | None = None,
+    rtol: float = 1e-9,
+    checkpoint: str | Path | None = None,
+    substeps: int = 1,
+    actuator: Actuator | None = None,
+    measurement: Measurement | Sensor | None = None,
+) -> Trajectory:
+    """Simulate a fault under a controller, from rest, with the fault's own disturbance and reference.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : Controller, optional
+        None: no fluid is injected.
+    step : float, optional
+        Length of one step [s]; the fault's sampling time unless given.
+    scheme : str or Scheme
+        How the law is carried out over a step, by name, or set as wanted; see `quakedesign.simulation.schemes`. All but
+        ``"continuous"`` measure and decide once per step and hold the pressure in between.
+    method : str
+        Integrator with a fixed step, or, for smooth loops, ``"cvodes"`` or ``"idas"`` with a step of its own choice;
+        see `quakedesign.simulation.integrators`. The latter answer at every multiple of `step`, where the run is
+        watched.
+    duration : float, optional
+        [s]; the operation time unless given. Whole steps are taken, as many as fit.
+    samples : int
+        The trajectory keeps about this many instants; metrics are taken from every step.
+    settled_from : float, optional
+        Time [s] from which errors count; a quarter of the operation time, or of a shorter run.
+    progress : callable, optional
+        Called with the fraction done [-].
+    compiled : bool, optional
+        True: machine code or an error. False: CasADi's virtual machine. None: machine code if a C compiler
+        works. The digits are the same.
+    plant : str
+        ``"smooth"``: eq. shift, which holds for slip rates that are not negative. ``"coulomb"``: friction opposes slip
+        in both directions and holds the fault at rest (ERRATA 14).
+    load : Load, optional
+        Drift of the far end and a perturbation, beside the fault's own disturbance.
+    variation : Variation, optional
+        True parameters other than the nominal ones, within the fault's box. One machine code serves all variations.
+    rtol : float
+        Tolerance of ``"cvodes"`` and ``"idas"``, 1e-13 … 1e-3; a fixed step has none.
+    checkpoint : str or Path, optional
+        File that keeps the progress of a long run with a fixed step: an interrupted run goes on from it and ends with
+        the digits of an uninterrupted one, which removes it.
+    substeps : int
+        Steps of the integrator per `step`, for a named scheme that samples.
+    actuator : Actuator, optional
+        What lies between the pressure that is asked for and that in the fault, for a named scheme that samples.
+    measurement : Measurement or Sensor, optional
+        Noise of what the controller sees, or a sensor that tells it estimates from the slip alone, for a named scheme
+        that samples.
+
+    Returns
+    -------
+    Trajectory
+        A `SampledTrajectory`, which has the signals of the actuator too, where there is one.
+        One that diverges ends there, says so in `events`, and has no metrics.
+
+    Raises
+    ------
+    ParameterError
+        For a step, duration or number of samples that is not positive and finite, an unknown scheme, method or plant,
+        a variation outside the box, a sensor made for another step, or a loop that is not smooth with a method that
+        needs one.
+    SimulationError
+        When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
+        cannot go on, or when the checkpoint is that of another run.
+    """
+    require_fault(fault).require_memoryless("a controlled run")
+    setting = Setting.of(fault, step, duration, samples, settled_from)
+    if variation:
+        variation.require_within(fault)
+    factors = variation.values if variation else ()
+    criterion = OutcomeCriterion.of(fault, natural_peak(fault))
+    loop = loop_class(plant)(fault, controller, load=load or Load(), factors=factors)
+    recorder = Recorder(loop, sampled_scheme(scheme, substeps, actuator, measurement), setting.step)
+    chosen = any_integrator(method)
+    if issubclass(chosen, AdaptiveIntegrator):
+        return run_adaptive(recorder, setting, chosen, criterion, rtol=rtol, progress=progress, checkpoint=checkpoint)
+    return run(recorder, setting, chosen, criterion, progress=progress, compiled=compiled, checkpoint=checkpoint)

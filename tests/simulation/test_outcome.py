@@ -1,0 +1,144 @@
+"""What a run comes to: closed forms at every threshold, and runs whose end is known."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quakedesign.controllers import control_law, published
+from quakedesign.fault import Disturbance, load_fault
+from quakedesign.simulation import Outcome, OutcomeCriterion, natural_earthquake, simulate
+from quakedesign.simulation.campaign import SampleResult, campaign_problem
+from quakedesign.simulation.campaign.result import Campaign
+from quakedesign.simulation.earthquake import _peak, natural_peak
+from quakedesign.simulation.outcome import KINDS
+
+REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
+UNDERSAMPLED = load_fault(Path(__file__).parent.parent / "data" / "undersampled_fault.toml")
+STABLE = replace(REAL, friction=replace(REAL.friction, drop=0.0))
+CRITERION = OutcomeCriterion(natural_peak=0.5, inertial_rate=1.0, reference_rate=0.125, target_slip=2.0)
+
+
+@pytest.mark.parametrize(
+    ("peak", "error", "events", "kind"),
+    [
+        (0.125, 0.0, {}, "tracked"),
+        (0.125 + 0.00499, 0.04, {}, "tracked"),
+        (0.125 + 0.00501, 0.04, {}, "slow slip"),
+        (0.125 + 0.00499, 0.040001, {}, "slow slip"),
+        (0.125 + 0.0499, 0.0, {}, "slow slip"),
+        (0.125 + 0.0501, 0.0, {}, "earthquake"),
+        (0.126, None, {}, "tracked"),
+        (0.126, 0.0, {"reverse_slip": 1.0, "stick": 2.0}, "tracked"),
+        (0.126, 0.0, {"opening": 1.0}, "opened"),
+        (0.9, 0.0, {"opening": 1.0}, "opened"),
+        (None, None, {"opening": 1.0, "diverged": 2.0}, "diverged"),
+    ],
+)
+def test_a_tenth_of_the_natural_peak_beyond_the_reference_is_an_earthquake_a_hundredth_is_not_tracked(
+    peak, error, events, kind
+):
+    found = CRITERION.outcome(peak, error, events, followed=True)
+    assert found.kind == kind
+    assert found.peak_slip_rate == peak
+    assert found.share_of_natural == (None if peak is None else peak / 0.5)
+    assert found.harmless == (kind in ("tracked", "slow slip"))
+
+
+def test_what_follows_nothing_is_never_tracked_and_has_no_reference_to_be_as_fast_as():
+    assert CRITERION.outcome(0.0, None, {}, followed=False).kind == "slow slip"
+    assert CRITERION.outcome(0.051, None, {}, followed=False).kind == "earthquake"
+
+
+def test_a_stable_fault_is_compared_with_its_own_swing_through_the_target():
+    """ω_n·d_max = √(0.48)·0.785 m/s for the real fault."""
+    criterion = OutcomeCriterion.of(STABLE, natural_peak(STABLE))
+    assert criterion.natural_peak is None
+    assert criterion.inertial_rate == pytest.approx(np.sqrt(30e9 / 2500 / 5000**2) * 0.785, rel=1e-12)
+    tenth = criterion.inertial_rate / 10
+    assert criterion.outcome(0.99 * tenth, 0.0, {}, followed=True).kind == "slow slip"
+    assert criterion.outcome(1.01 * tenth, 0.0, {}, followed=True) == Outcome(
+        kind="earthquake", peak_slip_rate=1.01 * tenth, share_of_natural=None
+    )
+    assert natural_earthquake(STABLE).outcome.kind == "slow slip"
+
+
+def test_the_largest_reference_rate_is_that_of_a_fine_grid():
+    stage = np.linspace(0, 1, 100_001)
+    slip = REAL.reference.target_slip * REAL.reference.shape(stage)
+    steepest = np.max(np.diff(slip)) / (REAL.reference.operation_time / 100_000)
+    assert REAL.reference.largest_rate == pytest.approx(steepest, rel=1e-8)
+
+
+def test_the_natural_earthquake_is_all_of_itself_and_an_induced_one_more():
+    natural, induced = natural_earthquake(LAB), natural_earthquake(LAB, 1e4)
+    assert (natural.outcome.kind, natural.outcome.share_of_natural) == ("earthquake", 1.0)
+    assert induced.outcome.kind == "earthquake"
+    ratio = induced.metrics.peak_slip_rate / natural.metrics.peak_slip_rate
+    assert induced.outcome.share_of_natural == ratio > 1
+
+
+def test_the_natural_peak_is_computed_once_for_a_fault_whatever_disturbs_it():
+    natural_peak(LAB)
+    before = _peak.cache_info().misses
+    shaken = LAB.with_disturbance(Disturbance(amplitude=1e-3, frequency=1.0)).with_box("ten-percent")
+    for fault in (LAB, shaken):
+        simulate(fault, published("lab-fault")["elqr"], duration=0.1)
+    assert _peak.cache_info().misses == before
+
+
+def test_a_loop_that_is_sampled_too_slowly_for_its_instability_is_an_earthquake():
+    """Certified gains, T_s = 0.1 s, unstable pole at 13 1/s; at a tenth of this T_s the same gains track."""
+    law = control_law("cta").from_values(("7", "5", "2.3", "1.1"), divisor="27/260000000").scaled("0.000136822")
+    slow, fine = (simulate(UNDERSAMPLED, law, duration=100.0, step=step) for step in (0.1, 0.01))
+    assert slow.outcome.kind == "earthquake"
+    assert slow.outcome.share_of_natural == slow.metrics.peak_slip_rate / natural_peak(UNDERSAMPLED) > 0.5
+    assert fine.outcome.kind == "tracked"
+
+
+def test_a_loop_that_diverges_or_opens_says_so():
+    law = published("real-fault")["elqr"]
+    run = simulate(REAL, law, scheme="explicit", duration=400.0)
+    assert run.outcome == Outcome(kind="diverged", peak_slip_rate=None, share_of_natural=None)
+    sooner = simulate(REAL, law, scheme="explicit", duration=run.events["opening"] + 1)
+    assert "diverged" not in sooner.events
+    assert sooner.outcome.kind == "opened"
+
+
+def test_every_file_of_a_run_holds_its_outcome():
+    run = simulate(LAB, published("lab-fault")["elqr"], duration=0.1)
+    assert json.loads(run.to_xarray().attrs["outcome"]) == run.outcome.to_dict()
+    assert set(run.outcome.to_dict()) == {"kind", "peak_slip_rate", "share_of_natural"}
+
+
+def test_a_campaign_counts_the_outcomes_of_its_samples():
+    problem = campaign_problem(LAB, published("lab-fault")["elqr"], duration=0.1)
+    natural, target = natural_peak(LAB), LAB.reference.target_slip
+    figures = [
+        {"peak_slip_rate": 1e-6, "max_slip_error": 0.01 * target},
+        {"peak_slip_rate": natural / 2, "max_slip_error": 0.0},
+        {"peak_slip_rate": 1e-6, "max_slip_error": 0.03 * target},
+    ]
+    results = [SampleResult(figures=found, events={}) for found in figures]
+    results += [SampleResult(figures={}, events={"diverged": 0.1}), None]
+    done = Campaign(problem=problem, results=tuple(results))
+    assert [outcome and outcome.kind for outcome in done.outcomes] == [
+        "tracked",
+        "earthquake",
+        "slow slip",
+        "diverged",
+        None,
+    ]
+    told = done.to_dict()["outcomes"]
+    assert list(told) == list(KINDS)
+    assert {kind: found["count"] for kind, found in told.items()} == {**dict.fromkeys(KINDS, 1), "opened": 0}
+    assert done.to_pandas()["outcome [-]"].tolist()[:2] == ["tracked", "earthquake"]
+
+
+def test_a_sample_of_a_campaign_comes_to_what_its_trajectory_comes_to():
+    problem = campaign_problem(LAB, published("lab-fault")["elqr"], duration=0.05)
+    run = problem.trajectory(problem.sample(0), 10)
+    figures = {name: v for name, v in run.metrics.to_dict().items() if v is not None}
+    assert problem.outcome(SampleResult(figures=figures, events=run.events)) == run.outcome
