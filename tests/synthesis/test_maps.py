@@ -10,8 +10,10 @@ import pytest
 from quakedesign.certificates import Verdict, parse_certificate
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.analysis import gain_map as maps
+from quakedesign.synthesis.analysis.certify import closed_loop
 from quakedesign.synthesis.analysis.gain_map import SHARES, axis, gain_map
 from quakedesign.synthesis.analysis.gain_map_workers import Crew, Screener
+from quakedesign.synthesis.lyapunov.search import find_certificate
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "map_region", Path(__file__).with_name("super_twisting_region.py")
@@ -96,8 +98,10 @@ def test_levels_and_degree_follow_from_the_gains_unless_given():
     chosen = gain_map("super-twisting", ("1.5", "1.1"), ("k1", "k2"), **asked)
     assert chosen.sheet.levels == tuple(s * F("1.1") for s in SHARES)
     assert chosen.sheet.degree == 3
-    high = gain_map("super-twisting", ("0.7", "2"), ("k1", "k2"), levels=("1",), **asked)
-    assert high.sheet.degree > 3
+    high = gain_map("super-twisting", ("1.5", "1.1"), ("k1", "k2"), levels=("1",), **asked)
+    assert high.sheet.degree == 6
+    loop = closed_loop("super-twisting", ("1.5", "1.1"), lipschitz=1)
+    assert [bool(find_certificate(loop, degree)) for degree in (3, 4, 6)] == [False, False, True]
     quarter = gain_map("super-twisting", ("1.5", "1.1"), ("k2", "k1"), points=3, levels=("1",), interior=0, workers=1)
     assert quarter.sheet.axes[0] == (F("0.275"), F("1.1"), F("4.4"))
 

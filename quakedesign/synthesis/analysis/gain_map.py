@@ -14,7 +14,7 @@ from quakedesign.rationals import rational
 from quakedesign.synthesis.analysis.certify import Number, closed_loop
 from quakedesign.synthesis.analysis.gain_map_workers import Crew, Place, Sheet
 from quakedesign.synthesis.analysis.margins import necessary_limit
-from quakedesign.synthesis.analysis.parametric_program import Sweep
+from quakedesign.synthesis.analysis.parametric_program import CLEAR, Sweep
 from quakedesign.synthesis.lyapunov.search import candidate_degrees
 
 SHARES = tuple(Fraction(s, 100) for s in (25, 50, 75, 90, 99))
@@ -106,7 +106,7 @@ def gain_map(
     gain_range : tuple of two
         b_m and b_M [-].
     degree : int, optional
-        Of V; the lowest that finds the base gains at the lowest level unless given.
+        Of V; the lowest that clearly finds the base gains at the lowest level unless given.
     interior : int
         Number of points inside to prove.
     seed : int
@@ -204,11 +204,11 @@ def _levels(subject: Subject, loop: Loop, levels: Sequence[Number] | None) -> tu
 
 
 def _lowest_degree(loop: Loop, bound: Fraction) -> int:
-    """First degree that finds the base gains, or the first of all."""
+    """First degree that finds the base gains with a clear margin, or the first of all."""
     asked, degrees = replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), candidate_degrees(loop)
     for degree in degrees:
         answer = Sweep(asked, degree).solve(asked)
-        if answer is not None and answer.found:
+        if answer is not None and answer.margin > CLEAR:
             return degree
     return degrees[0]
 

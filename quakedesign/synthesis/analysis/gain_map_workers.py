@@ -15,11 +15,10 @@ from quakedesign.certificates.claim import root_enclosure
 from quakedesign.controllers import Subject
 from quakedesign.errors import CertificateError, SimulationError
 from quakedesign.synthesis.analysis.margins import necessary_limit, prove
-from quakedesign.synthesis.analysis.parametric_program import SURE, Sweep
+from quakedesign.synthesis.analysis.parametric_program import CLEAR, Sweep
 
 Place = tuple[int, int]
 _FAST = 1e-8
-_DOUBTFUL = 1e-6
 _LIVES = 3
 
 
@@ -98,9 +97,9 @@ class Screener:
         loop = self.sheet.at(place, level)
         sweep = self._sweep(loop)
         answer = None if sweep is None else sweep.solve(loop, accuracy=_FAST)
-        if sweep is not None and answer is not None and abs(answer.margin) < _DOUBTFUL:
+        if sweep is not None and answer is not None and abs(answer.margin) < CLEAR:
             answer = sweep.solve(loop)
-        return answer is not None and answer.margin > SURE
+        return answer is not None and answer.found
 
     def proof(self, place: Place, level: int) -> tuple[Place, int, str | None, int]:
         """Text of a certificate of a point at a level, or None; and solves."""

@@ -20,12 +20,12 @@ from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.synthesis.analysis.parametric_matrix import Matrix, scales_of
 from quakedesign.synthesis.lyapunov.balancing import balance, exponents_of
 from quakedesign.synthesis.lyapunov.parametric_forms import ends_of, rows_of, values_of
-from quakedesign.synthesis.lyapunov.search import Family
+from quakedesign.synthesis.lyapunov.search import SURE, Family
 
-SURE = 5e-10
-"""Margins above this count as found; the solver's answers are about as accurate as that."""
 ACCURACY = 1e-10
 """What the solver is asked for unless told."""
+CLEAR = 100 * SURE
+"""Margins above this decide what is chosen once for many points, such as a degree."""
 _TOO_FAR = "the gains are too far apart for a search in floating point."
 _KEPT = 64  # scales whose numbers are kept
 

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from quakedesign.synthesis.analysis.parametric_program import SURE, Screened
+from quakedesign.synthesis.analysis.parametric_program import Screened
+from quakedesign.synthesis.lyapunov.search import SURE
 
 TOLERANCE = Fraction(1, 10_000)
 """Relative width of a bracket: the search succeeds at x and not at x(1 + TOLERANCE)."""
