@@ -17,7 +17,7 @@ import quakedesign
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "quakedesign"
 EVERYWHERE = {f"quakedesign.{name}" for name in ("errors", "rationals", "output", "text", "bounds")}
-BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "certificates", "simulation")
+BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "loop", "certificates", "simulation")
 MAY_IMPORT = {
     "fault": (),
     "symbolic": ("fault",),
@@ -25,8 +25,9 @@ MAY_IMPORT = {
     "sos.solve": ("sos.exact",),
     "sos": ("sos.exact",),  # the package itself hands on the deciding part only
     "controllers": ("fault", "symbolic"),
-    "certificates": ("fault", "symbolic", "controllers", "sos", "sos.exact"),
-    "simulation": ("fault", "symbolic", "controllers"),
+    "loop": ("fault", "symbolic", "controllers"),
+    "certificates": ("fault", "symbolic", "controllers", "loop", "sos", "sos.exact"),
+    "simulation": ("fault", "symbolic", "controllers", "loop"),
     "synthesis": BELOW,
     "report": (*BELOW, "synthesis"),
     "cli": (*BELOW, "synthesis", "report"),
@@ -100,6 +101,8 @@ def test_rooms_import_only_what_the_design_allows(path):
         ("synthesis/x.py: from quakedesign.sos.solve import search", True),
         ("synthesis/x.py: from quakedesign.report import compare", False),
         ("simulation/x.py: import quakedesign.certificates.claim", False),
+        ("certificates/guarantee/x.py: from quakedesign.loop import held_loop", True),
+        ("loop/x.py: from quakedesign.simulation import simulate", False),
     ],
 )
 def test_the_rule_itself_tells_good_from_bad(source, ok, tmp_path, monkeypatch):
@@ -116,7 +119,7 @@ def test_the_rule_itself_tells_good_from_bad(source, ok, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "path", [*sorted((PACKAGE / "certificates").glob("*.py")), *sorted((PACKAGE / "sos/exact").glob("*.py"))],
+    "path", [*sorted((PACKAGE / "certificates").rglob("*.py")), *sorted((PACKAGE / "sos/exact").glob("*.py"))],
     ids=module_name,
 )  # fmt: skip
 def test_what_decides_knows_no_solver_and_no_floating_point_library(path):
@@ -154,7 +157,7 @@ def test_help_and_import_load_no_heavy_library():
 
 
 def test_loading_all_that_decides_loads_no_solver():
-    modules = [module_name(p) for p in (PACKAGE / "certificates").glob("*.py")]
+    modules = [module_name(p) for p in (PACKAGE / "certificates").rglob("*.py")]
     loaded, _ = loaded_by("-c", "import re, " + ", ".join(m.removesuffix(".__init__") for m in modules))
     assert not loaded & SOLVERS
 

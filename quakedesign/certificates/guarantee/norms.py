@@ -1,0 +1,238 @@
+"""L1 norms of a periodic loop: how large an output can get under an input that is bounded by 1, in ball arithmetic.
+
+**Statement.** Let x′ = Ax + b·w between jumps, x(0) = 0, and w be measurable with |w| ≤ W on [0, t]. Then |cx(t)| ≤
+g·W with the g that `norms` returns for the part of the period in which t lies.
+
+**Proof.** x(t) = ∫₀ᵗ Φ(t, τ)b·w(τ)dτ, so |cx(t)| ≤ W·∫|cΦ(t, τ)b|dτ over [0, t], which grows when the loop is
+continued periodically to the past and the integral taken over (−∞, t]. That integral is bounded from above in parts:
+
+- *A piece of length h of a flow.* y(σ) = row·e^{Aσ}b is within (σ − α)(β − σ)/2·max|y″| of its chord on [α, β], so
+  ∫|y| ≤ h(|y(α)| + |y(β)|)/2 + h³/12·max|y″|, and |y″| ≤ |row|·|A²e^{Aσ}b| with absolute values entry by entry.
+- *All periods before.* With Ψ the map of one period, N(c) = Σ_k ‖cΨᵏU‖₁; the columns U are the ends of the pieces of
+  one period, weighted, and one column for every entry of the remainders. Terms up to k < K = 2^J are summed. Let y_j
+  be that sum for the unit row e_j, z_j the whole one and D = |Ψᴷ|. Then z ≤ y + Dz, and Dy ≤ q·y with q < 1 gives z ≤
+  y/(1 − q): sums over blocks of K periods are at most y, Dy, D²y … . So N(c) ≤ partial sum + |cΨᴷ|·y/(1 − q).
+- *Between two phases α < β of the output.* ce^{Aθ} is within (β − α)²/8·max|cA²e^{Aσ}| of the chord of its ends, and N
+  is convex: at most the larger end and N of the remainder. The flow since the last jump adds ∫₀^θ|ce^{Aσ}b|dσ, whose
+  derivative has the Lipschitz constant max|cAe^{Aσ}b|: it is within (β − α)²/8 times that of its chord. Both together
+  are below a chord plus remainders, hence at most the larger of the two ends plus remainders. ∎
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import reduce
+from itertools import accumulate, chain, pairwise
+from operator import mul
+from typing import Any
+
+from flint import arb, arb_mat, ctx, fmpq
+
+from quakedesign.errors import ParameterError
+from quakedesign.loop import PeriodicLoop
+from quakedesign.rationals import fraction_of
+
+_BITS = 128
+_PIECES = 8
+_SMALL = Fraction(1, 1 << 8)  # share of the sums that the tail may be
+_MOST_DOUBLINGS = 13
+
+
+def norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
+    """Gains of every (output, input), rounded up, one for each part of the period; the same parts for all.
+
+    Raises
+    ------
+    ParameterError
+        When the nominal loop is not found to be stable within 8192 periods.
+    """
+    with ctx.workprec(_BITS):
+        flow = _matrix(loop.flow)
+        rows = _matrix(tuple(loop.outputs.values()))
+        found: dict[tuple[str, str], tuple[Fraction, ...]] = {}
+        for name, entry in loop.inputs.items():
+            flows = [_Flow.of(flow, _matrix(s.jump), s.duration / _PIECES, _column(entry)) for s in loop.segments]
+            gains = _gains(flows, _Past.of(flows), rows)
+            found |= {
+                (output, name): tuple(map(_upper, parts)) for output, parts in zip(loop.outputs, gains, strict=True)
+            }
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Flow:
+    """One segment in balls.
+
+    Attributes
+    ----------
+    jump, step, whole : arb_mat
+        J, e^{Ah} of one piece, and e^{Aτ}J of the segment.
+    piece : arb
+        h.
+    response : list of arb_mat
+        e^{Ahi}b at the ends of the pieces.
+    curvature, slope : list of arb_mat
+        Enclosures of A²e^{Aσ}b and Ae^{Aσ}b on every piece.
+    bend : arb_mat
+        Enclosure of A²e^{Aσ} on the first piece.
+    """
+
+    jump: Any
+    step: Any
+    whole: Any
+    piece: Any
+    response: list[Any]
+    curvature: list[Any]
+    slope: list[Any]
+    bend: Any
+
+    @classmethod
+    def of(cls, flow: Any, jump: Any, piece: Fraction, entry: Any) -> "_Flow":
+        h = _ball(piece)
+        step, within = (flow * h).exp(), (flow * arb(0).union(h)).exp()
+        response = list(accumulate([step] * _PIECES, lambda now, e: e * now, initial=entry))
+        near = [within * now for now in response[:-1]]
+        return cls(
+            jump=jump,
+            step=step,
+            whole=reduce(mul, [step] * _PIECES) * jump,
+            piece=h,
+            response=response,
+            curvature=[flow * (flow * now) for now in near],
+            slope=[flow * now for now in near],
+            bend=flow * flow * within,
+        )
+
+    def columns(self, later: Any) -> tuple[list[Any], Any]:
+        """Weighted ends of the pieces, mapped by what comes later, and the remainders' entries."""
+        half = self.piece / 2
+        ends = [later * now * (half if i in (0, _PIECES) else self.piece) for i, now in enumerate(self.response)]
+        rest = reduce(_plus, (_absolute(later * bent) for bent in self.curvature))
+        return ends, rest * (self.piece**3 / 12)
+
+
+@dataclass(frozen=True, slots=True)
+class _Past:
+    """Everything before the first jump of a period: columns of K periods, and what bounds the rest."""
+
+    columns: Any
+    far: Any
+    bound: Any
+
+    @classmethod
+    def of(cls, flows: list[_Flow]) -> "_Past":
+        size = flows[0].jump.nrows()
+        later, ends, rest = _identity(size), list[Any](), arb_mat(size, 1)
+        for flow in reversed(flows):
+            own, remainder = flow.columns(later)
+            ends, rest, later = [*own, *ends], rest + remainder, later * flow.whole
+        return cls._summed(later, _beside([*ends, _diagonal(rest)]))
+
+    @classmethod
+    def _summed(cls, period: Any, columns: Any) -> "_Past":
+        sums = _row_sums(columns)
+        for _ in range(_MOST_DOUBLINGS):
+            following = period * columns
+            sums = [a + b for a, b in zip(sums, _row_sums(following), strict=True)]
+            columns, period = _beside([columns, following]), period * period
+            far = _absolute(period) * _as_column(sums)
+            shares = [a / b for a, b in zip(far.entries(), sums, strict=True) if not a == 0]
+            if all(share < _ball(_SMALL) for share in shares):
+                return cls(columns, period, _as_column(sums) / (1 - _ball(_SMALL)))
+        raise ParameterError(
+            f"the nominal loop must be stable. Received one that is not within {2**_MOST_DOUBLINGS} periods. "
+            "Change the gains, or shorten T_s."
+        )
+
+    def of_rows(self, rows: Any) -> list[Any]:
+        """N of every row."""
+        near, far = _row_sums(rows * self.columns), _absolute(rows * self.far) * self.bound
+        return [a + b for a, b in zip(near, far.entries(), strict=True)]
+
+
+def _gains(flows: list[_Flow], past: _Past, outputs: Any) -> list[list[Any]]:
+    """Bounds for every output, on every piece of every segment."""
+    size, count = outputs.ncols(), outputs.nrows()
+    found: list[list[Any]] = [[] for _ in range(count)]
+    for number, flow in enumerate(flows):
+        phases = list(accumulate([flow.step] * _PIECES, mul, initial=outputs))
+        rows = _above([*phases, _identity(size)]) * flow.jump
+        before = _before(flows[:number], past, rows)
+        units = _as_column(before[-size:])
+        for k in range(count):
+            own = _since_jump(flow, outputs, k)
+            total = [before[i * count + k] + own[i] for i in range(_PIECES + 1)]
+            for i, (start, end) in enumerate(pairwise(total)):
+                bent = (_absolute(phases[i] * flow.bend) * units)[k, 0] + abs((outputs * flow.slope[i])[k, 0])
+                found[k].append(start.max(end) + bent * flow.piece**2 / 8)
+    return found
+
+
+def _before(flows: list[_Flow], past: _Past, rows: Any) -> list[Any]:
+    """Bounds for rows that act just before a segment: the segments before it in this period, and the past."""
+    if not flows:
+        return past.of_rows(rows)
+    ends, rest = flows[-1].columns(_identity(rows.ncols()))
+    own = _row_sums(rows * _beside([*ends, _diagonal(rest)]))
+    return [a + b for a, b in zip(own, _before(flows[:-1], past, rows * flows[-1].whole), strict=True)]
+
+
+def _since_jump(flow: _Flow, outputs: Any, k: int) -> list[Any]:
+    """∫|ce^{Aσ}b|dσ from the jump to the end of every piece, from 0 on."""
+    values = [abs((outputs * now)[k, 0]) for now in flow.response]
+    bent = [abs((outputs * now)[k, 0]) for now in flow.curvature]
+    pieces = [
+        (a + b) * flow.piece / 2 + c * flow.piece**3 / 12 for (a, b), c in zip(pairwise(values), bent, strict=True)
+    ]
+    return list(accumulate(pieces, initial=arb(0)))
+
+
+def _ball(value: Fraction) -> Any:
+    return arb(fmpq(value.numerator, value.denominator))
+
+
+def _matrix(rows: tuple[tuple[Fraction, ...], ...]) -> Any:
+    return arb_mat([[_ball(v) for v in row] for row in rows])
+
+
+def _column(values: tuple[Fraction, ...]) -> Any:
+    return arb_mat([[_ball(v)] for v in values])
+
+
+def _as_column(values: list[Any]) -> Any:
+    return arb_mat([[v] for v in values])
+
+
+def _identity(size: int) -> Any:
+    return arb_mat(size, size, [int(i == j) for i in range(size) for j in range(size)])
+
+
+def _diagonal(column: Any) -> Any:
+    """One column for every entry that is not zero."""
+    kept = [i for i, v in enumerate(column.entries()) if not v == 0]
+    return arb_mat([[column[i, 0] if i == j else arb(0) for j in kept] for i in range(column.nrows())])
+
+
+def _beside(parts: list[Any]) -> Any:
+    return arb_mat([list(chain(*rows)) for rows in zip(*(part.tolist() for part in parts), strict=True)])
+
+
+def _above(parts: list[Any]) -> Any:
+    return arb_mat([list(row) for part in parts for row in part.tolist()])
+
+
+def _absolute(matrix: Any) -> Any:
+    """Upper bounds of the absolute values, exact numbers."""
+    return arb_mat([[v.abs_upper() for v in row] for row in matrix.tolist()])
+
+
+def _plus(a: Any, b: Any) -> Any:
+    return a + b
+
+
+def _row_sums(matrix: Any) -> list[Any]:
+    return [sum(map(abs, row), arb(0)) for row in matrix.tolist()]
+
+
+def _upper(value: Any) -> Fraction:
+    return fraction_of(value.upper().fmpq())

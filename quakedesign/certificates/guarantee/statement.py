@@ -1,0 +1,172 @@
+"""A guarantee: a fault, the loop that runs, and what its outputs never exceed."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, floor, log10
+
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee.task import Task
+from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
+from quakedesign.errors import ParameterError
+from quakedesign.loop import LinearLaw, PeriodicLoop, held_loop
+
+_DIGITS = 4
+_MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Held:
+    """A law as it runs: once every T_s, its pressure held, after a delay, through a lag.
+
+    Attributes
+    ----------
+    law : LinearLaw
+    step, delay, lag : Fraction
+        [s].
+    """
+
+    law: LinearLaw
+    step: Fraction
+    delay: Fraction = Fraction(0)
+    lag: Fraction = Fraction(0)
+
+    def loop(self, task: Task) -> PeriodicLoop:
+        """Nominal error loop on a task."""
+        return held_loop(self.law, task.model, task.authority, self.step, delay=self.delay, lag=self.lag)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claims:
+    """What is never exceeded.
+
+    Attributes
+    ----------
+    slip_error : UpperBound
+        Slip less reference, absolute value [m].
+    slip_rate_error : UpperBound
+        [m/s].
+    peak_slip_rate : UpperBound
+        Slip rate, absolute value [m/s].
+    least_pressure : LowerBound
+        [Pa].
+    largest_pressure : UpperBound
+        [Pa].
+    """
+
+    slip_error: UpperBound
+    slip_rate_error: UpperBound
+    peak_slip_rate: UpperBound
+    least_pressure: LowerBound
+    largest_pressure: UpperBound
+
+    @classmethod
+    def of(cls, task: Task, bounds: Bounds) -> "Claims":
+        """Tightest claims that bounds support."""
+        low, high = task.rest_pressure
+        push = bounds.push / task.authority
+        return cls(
+            slip_error=UpperBound(bounds.slip_error),
+            slip_rate_error=UpperBound(bounds.slip_rate_error),
+            peak_slip_rate=UpperBound(bounds.slip_rate_error + task.reference_rates[0]),
+            least_pressure=LowerBound(low - push),
+            largest_pressure=UpperBound(high + push),
+        )
+
+    def rounded(self) -> "Claims":
+        """The same, a little weaker and with few digits."""
+        low, high = self.least_pressure, self.largest_pressure
+        room = (high - low) * (_MARGIN - 1)
+        return Claims(
+            slip_error=UpperBound(_above(self.slip_error * _MARGIN)),
+            slip_rate_error=UpperBound(_above(self.slip_rate_error * _MARGIN)),
+            peak_slip_rate=UpperBound(_above(self.peak_slip_rate * _MARGIN)),
+            least_pressure=LowerBound(-_above(room - low)),
+            largest_pressure=UpperBound(_above(high + room)),
+        )
+
+    def covers(self, other: "Claims") -> bool:
+        """Whether these claims follow from others."""
+        return (
+            self.slip_error >= other.slip_error
+            and self.slip_rate_error >= other.slip_rate_error
+            and self.peak_slip_rate >= other.peak_slip_rate
+            and self.least_pressure <= other.least_pressure
+            and self.largest_pressure >= other.largest_pressure
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guarantee:
+    """Claims about one loop on one task; `check` decides them.
+
+    Attributes
+    ----------
+    task : Task
+    held : Held
+    claims : Claims
+    """
+
+    task: Task
+    held: Held
+    claims: Claims
+
+    def bounds(self) -> Bounds | NoGuarantee:
+        """What the theorem gives, computed anew."""
+        try:
+            return certified_bounds(self.task, self.held.loop(self.task))
+        except ParameterError as error:
+            return NoGuarantee(reason=str(error), small_gain=None)
+
+    def check(self) -> Verdict:
+        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
+        found = self.bounds()
+        if isinstance(found, NoGuarantee):
+            return Verdict.UNDECIDED
+        return Verdict.PROVED if self.claims.covers(Claims.of(self.task, found)) else Verdict.UNDECIDED
+
+    def sentence(self) -> str:
+        """What is guaranteed, for people."""
+        task, claims, held = self.task, self.claims, self.held
+        when = f"held over {_seconds(held.step)}"
+        when += f", {_seconds(held.delay)} late" if held.delay else ""
+        when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
+        kind = f"|phi| <= {UpperBound(task.amplitude):.3g} m/s^2"
+        kind += "" if task.change is None else f" that starts at 0 and changes by {UpperBound(task.change):.3g} m/s^3"
+        pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
+        return (
+            f"from rest, {when}, for every disturbance {kind} at most and all friction and parameters of the box: "
+            f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
+            f"{claims.slip_error:.3g} m of the reference, the pressure between {pressures} "
+            "(for a plant continued to negative slip rates)"
+        )
+
+
+def guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
+    """Tightest rounded claims about a loop, or why there are none.
+
+    Raises
+    ------
+    ParameterError
+        For a loop without a steady state.
+    """
+    loop = held.loop(task)
+    try:
+        found = certified_bounds(task, loop)
+    except ParameterError as error:
+        return NoGuarantee(reason=str(error), small_gain=None)
+    if isinstance(found, NoGuarantee):
+        return found
+    return Guarantee(task=task, held=held, claims=Claims.of(task, found).rounded())
+
+
+def _above(value: Fraction) -> Fraction:
+    """At least a rational, with four digits."""
+    if not value:
+        return value
+    scale = Fraction(10) ** (floor(log10(abs(value))) - _DIGITS + 1)
+    return ceil(value / scale) * scale
+
+
+def _seconds(value: Fraction) -> str:
+    return f"{float(value):.6g} s"

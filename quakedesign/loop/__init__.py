@@ -1,0 +1,15 @@
+"""What stands between law and fault, each element stated once, as exact matrices."""
+
+from quakedesign.loop.held import held_loop
+from quakedesign.loop.laws import LinearLaw, Model, disturbance_estimate, summed_integrals
+from quakedesign.loop.periodic import PeriodicLoop, Segment
+
+__all__ = [
+    "LinearLaw",
+    "Model",
+    "PeriodicLoop",
+    "Segment",
+    "disturbance_estimate",
+    "held_loop",
+    "summed_integrals",
+]

@@ -1,0 +1,6 @@
+"""Laws chosen by what can be guaranteed of them as they run."""
+
+from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
+from quakedesign.synthesis.guaranteed.design import OBJECTIVES, design_held
+
+__all__ = ["OBJECTIVES", "WorstFound", "design_held", "worst_found"]

@@ -1,0 +1,164 @@
+"""The worst that a search finds on the loop of a guarantee: what is seen, beside what is proved."""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+from quakedesign.certificates.guarantee import Guarantee, Task
+from quakedesign.loop import PeriodicLoop
+
+_PERIODS = 64
+_PIECES = 6
+_SWEEPS = 8
+_COURSES = 24  # for each of the two outputs
+_SEED = 7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorstFound:
+    """Largest errors that were reached.
+
+    Attributes
+    ----------
+    slip_error : float
+        [m].
+    slip_rate_error : float
+        [m/s].
+    """
+
+    slip_error: float
+    slip_rate_error: float
+
+
+def worst_found(claim: Guarantee, *, sticks: bool = False) -> WorstFound:
+    """Adversarial courses of disturbance, friction slope, damping and input gain, all at their ends.
+
+    Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64
+    periods long. With `sticks` the fault does not slide backward: friction holds it wherever the loop would, along the
+    reference at its largest rate.
+    """
+    search = _Search(claim.task, claim.held.loop(claim.task), sticks)
+    return WorstFound(slip_error=search.largest[0], slip_rate_error=search.largest[1])
+
+
+@dataclass(frozen=True, slots=True)
+class _Pieces:
+    """One segment: its jump, and for every vertex e^{Ah} and what constant inputs add."""
+
+    jump: np.ndarray
+    steps: np.ndarray
+    added: np.ndarray
+
+
+class _Search:
+    """One run of sweeps; `largest` holds |e1| and |e2|."""
+
+    def __init__(self, task: Task, loop: PeriodicLoop, sticks: bool) -> None:
+        self.back = float(task.reference_rates[0]) if sticks else None
+        self.limit = float(task.amplitude) if task.change is not None else None
+        flow, inputs = _with_disturbance(task, loop)
+        self.size = len(flow)
+        beta = [float(b) for b in task.beta]
+        vertices = [_at(task, flow, *map(float, v)) for v in product(task.beta, task.slip_chord, task.rate_chord)]
+        self.parts = [
+            _pieces(vertices, inputs, _widened(s.jump, self.size), float(s.duration) / _PIECES) for s in loop.segments
+        ]
+        courses = 2 * _COURSES
+        self.allowed = np.ones((courses, len(vertices)), dtype=bool)
+        if self.limit is not None and beta[0] < beta[1]:  # the class rate has friction of the slip alone: β is slow
+            half = len(vertices) // 2
+            self.allowed[::2, :half] = self.allowed[1::2, half:] = False
+        self.aim = np.zeros((courses, self.size))
+        self.aim[:_COURSES, 0] = self.aim[_COURSES:, 1] = 1
+        self.largest = (0.0, 0.0)
+        self._sweep()
+
+    def _sweep(self) -> None:
+        random = np.random.default_rng(_SEED)
+        steps = _PERIODS * len(self.parts) * _PIECES
+        costates = random.standard_normal((steps, *self.aim.shape)) * random.choice([1.0, 1e3], (1, *self.aim.shape))
+        for _ in range(_SWEEPS):
+            chosen, held = self._forward(costates)
+            costates = self._backward(chosen, held)
+
+    def _forward(self, costates: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        state, chosen, held = np.zeros_like(self.aim), [], []
+        for number, costate in enumerate(costates):
+            part = self.parts[number // _PIECES % len(self.parts)]
+            state = state @ part.jump.T if number % _PIECES == 0 else state
+            ahead = np.einsum("vij,cj->cvi", part.steps, state)
+            push = np.einsum("vij,ci->cvj", part.added, costate)
+            gain = np.einsum("cvi,ci->cv", ahead, costate) + np.abs(push).sum(axis=2)
+            best = np.where(self.allowed, gain, -np.inf).argmax(axis=1)
+            row = np.arange(len(best))
+            state = ahead[row, best] + np.einsum("cij,cj->ci", part.added[best], np.sign(push[row, best]))
+            chosen.append(best)
+            held.append(self._held(state))
+            slip, rate = np.abs(state[:, :2]).max(axis=0)
+            self.largest = max(self.largest[0], float(slip)), max(self.largest[1], float(rate))
+        return chosen, held
+
+    def _held(self, state: np.ndarray) -> np.ndarray:
+        """Keep every state where it can be; mask of what is held there."""
+        mask = np.zeros(state.shape, dtype=bool)
+        if self.back is not None:
+            mask[:, 1] = state[:, 1] < -self.back
+            state[mask[:, 1], 1] = -self.back
+        if self.limit is not None:
+            mask[:, -1] = np.abs(state[:, -1]) > self.limit
+            state[:, -1] = np.clip(state[:, -1], -self.limit, self.limit)
+        return mask
+
+    def _backward(self, chosen: list[np.ndarray], held: list[np.ndarray]) -> np.ndarray:
+        costate, found = self.aim.copy(), []
+        for number in reversed(range(len(chosen))):
+            part = self.parts[number // _PIECES % len(self.parts)]
+            costate = np.where(held[number], 0, costate)
+            found.append(costate)
+            costate = np.einsum("cij,ci->cj", part.steps[chosen[number]], costate)
+            costate = costate @ part.jump if number % _PIECES == 0 else costate
+        return np.array(found[::-1])
+
+
+def _with_disturbance(task: Task, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
+    """Flow and columns of all inputs at full size; a disturbance of bounded rate is one more state."""
+    flow = np.array(loop.flow, dtype=float)
+    push, drift = (np.array(loop.inputs[name], dtype=float) for name in ("acceleration", "drift"))
+    force, slow = float(task.reference_force), drift * float(task.drift)
+    if task.change is None:
+        return flow, np.array([push * (force + float(task.amplitude)), slow]).T
+    size = len(flow)
+    wide = np.zeros((size + 1, size + 1))
+    wide[:size, :size], wide[1, size] = flow, 1
+    columns = np.zeros((size + 1, 3))
+    columns[:size, 0], columns[:size, 1], columns[size, 2] = push * force, slow, float(task.change)
+    return wide, columns
+
+
+def _at(task: Task, flow: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
+    """Flow at a vertex: friction acts on the rate error, the push through the last state of the loop."""
+    found = flow.copy()
+    last = len(flow) - (1 if task.change is None else 2)
+    found[1, 0], found[1, 1], found[1, last] = slip, -rate, beta
+    return found
+
+
+def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, jump: np.ndarray, length: float) -> _Pieces:
+    size, count = inputs.shape
+    steps, added = [], []
+    for flow in vertices:
+        whole = np.zeros((size + count, size + count))
+        whole[:size, :size], whole[:size, size:] = flow, inputs
+        found: Any = expm(whole * length)
+        steps.append(found[:size, :size])
+        added.append(found[:size, size:])
+    return _Pieces(jump, np.array(steps), np.array(added))
+
+
+def _widened(jump: Any, size: int) -> np.ndarray:
+    found = np.eye(size)
+    found[: len(jump), : len(jump)] = np.array(jump, dtype=float)
+    return found

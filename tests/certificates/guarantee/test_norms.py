@@ -1,0 +1,70 @@
+"""L1 norms against closed forms; every bound must lie above, and close."""
+
+from fractions import Fraction as F
+from math import exp
+
+import pytest
+
+from quakedesign.certificates.guarantee.norms import norms
+from quakedesign.errors import ParameterError
+from quakedesign.loop import PeriodicLoop, Segment
+
+
+def loop(flow, jumps, durations, entry, row):
+    matrix = lambda rows: tuple(tuple(F(v) for v in r) for r in rows)  # noqa: E731
+    return PeriodicLoop(
+        states=tuple(f"x{i}" for i in range(len(flow))),
+        flow=matrix(flow),
+        segments=tuple(Segment(jump=matrix(j), duration=F(d)) for j, d in zip(jumps, durations, strict=True)),
+        inputs={"w": tuple(map(F, entry))},
+        outputs={"y": tuple(map(F, row))},
+    )
+
+
+def gain(*arguments):
+    return float(max(norms(loop(*arguments))["y", "w"]))
+
+
+def just_above(found, exact, share=2e-3):
+    return exact <= found <= exact * (1 + share)
+
+
+def test_a_lag_without_jumps_has_gain_one():
+    """∫ e^{−t} dt."""
+    assert just_above(gain([[-1]], [[[1]]], ["1/2"], [1], [1]), 1)
+
+
+def test_a_lag_that_is_halved_at_every_sample():
+    """Worst just before a jump: (1 − e^{−T})(1 + q + q² …), q = e^{−T}/2."""
+    assert just_above(gain([[-1]], [[["1/2"]]], ["1/2"], [1], [1]), (1 - exp(-0.5)) / (1 - exp(-0.5) / 2))
+
+
+def test_an_integrator_that_is_reset_counts_one_period_only():
+    found = norms(loop([[0]], [[[0]]], [3], [1], [1]))["y", "w"]
+    assert [round(float(v), 6) for v in found] == [3 * (i + 1) / 8 for i in range(8)]
+
+
+def test_two_jumps_in_a_period():
+    """x → x/2 and x → x/3 after 1 s and 2 s: before the first jump 2 + 1/3·(1 + …), period map 1/6."""
+    before_first = (2 + 1 / 3) / (1 - 1 / 6)
+    before_second = 1 + before_first / 2
+    assert just_above(gain([[0]], [[["1/2"]], [["1/3"]]], [1, 2], [1], [1]), max(before_first, before_second))
+
+
+def test_an_oscillator_that_changes_sign_between_the_ends_of_pieces():
+    """y″ + y′/10 + y = w has the gain coth(πζ/(2√(1 − ζ²))), ζ = 1/20; its impulse response changes sign for ever."""
+    from math import pi, sqrt, tanh
+
+    exact = 1 / tanh(pi / 20 / 2 / sqrt(1 - 1 / 400))
+    assert just_above(gain([[0, 1], [-1, "-1/10"]], [[[1, 0], [0, 1]]], ["1/2"], [0, 1], [1, 0]), exact)
+    coarse = gain([[0, 1], [-1, "-1/10"]], [[[1, 0], [0, 1]]], [20], [0, 1], [1, 0])
+    assert coarse >= exact
+
+
+def test_an_unstable_loop_has_no_gain():
+    with pytest.raises(ParameterError, match="stable"):
+        norms(loop([[1]], [[[1]]], [1], [1], [1]))
+
+
+def test_a_loop_that_is_barely_stable_has_its_large_gain():
+    assert just_above(gain([["-1/100"]], [[[1]]], [1], [1], [1]), 100)

@@ -1,0 +1,106 @@
+"""The loop as matrices, against a schedule written out by hand."""
+
+from fractions import Fraction as F
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from quakedesign.errors import ParameterError
+from quakedesign.loop import LinearLaw, Model, disturbance_estimate, held_loop, summed_integrals
+from quakedesign.loop.laws import Prediction
+
+STEP = F(1, 5)
+MODEL = Model(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
+AUTHORITY = F(2)
+PROPORTIONAL = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(F(-3), F(-2)))
+ESTIMATE = disturbance_estimate(
+    (F(4), F(2)), F(2, 5), Prediction(of_slip=F(1, 12), of_rate=F(3, 4), of_push=F(1, 6)), F(2)
+)
+INTEGRALS = summed_integrals((F(4), F(2), F(1), F(1, 10)), STEP)
+
+
+def run_matrices(loop, periods, push):
+    """e1, e2 at the ends of periods under a constant acceleration, by the loop's matrices."""
+    flow, entry = np.array(loop.flow, float), np.array(loop.inputs["acceleration"], float)
+    whole = np.zeros((len(flow) + 1, len(flow) + 1))
+    whole[:-1, :-1], whole[:-1, -1] = flow, push * entry
+    state, found = np.r_[np.zeros(len(flow)), 1.0], []
+    for _ in range(periods):
+        for segment in loop.segments:
+            state[:-1] = np.array(segment.jump, float) @ state[:-1]
+            state = expm(whole * float(segment.duration)) @ state
+        found.append(state[:2].copy())
+    return np.array(found)
+
+
+def run_by_hand(law, periods, push, delay, lag, step=float(STEP), fine=4000):
+    """The same by small Euler–midpoint steps and a list of times at which pressures arrive."""
+    s, w, gain = float(MODEL.slip), float(MODEL.rate), float(MODEL.gain)
+    c, d = np.array(law.output, float), np.array(law.feedback, float)
+    f, g = np.array(law.update, float).reshape(len(c), len(c)), np.array(law.measured, float).reshape(len(c), 2)
+    e, z, valve, fault, arrivals, found = np.zeros(2), np.zeros(len(c)), 0.0, 0.0, [], []
+    h = step / fine
+    for k in range(periods):
+        asked = c @ z + d @ e
+        z = f @ z + g @ e
+        arrivals.append((k * fine + round(delay / h), asked))
+        for i in range(k * fine, (k + 1) * fine):
+            while arrivals and arrivals[0][0] <= i:
+                valve = arrivals.pop(0)[1]
+            ahead = valve + (fault - valve) * np.exp(-h / lag) if lag else valve
+            middle = (fault + ahead) / 2 if lag else valve
+            fault = ahead
+            half = e + h / 2 * np.array([e[1], s * e[0] - w * e[1] + gain * middle + push])
+            e = e + h * np.array([half[1], s * half[0] - w * half[1] + gain * middle + push])
+        found.append(e)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("law", [PROPORTIONAL, ESTIMATE, INTEGRALS], ids=["proportional", "estimate", "integrals"])
+@pytest.mark.parametrize(("delay", "lag"), [("0", "0"), ("1/5", "0"), ("3/20", "0"), ("27/100", "1/10"), ("0", "1/4")])
+def test_matrices_do_what_the_schedule_says(law, delay, lag):
+    with_integral = law if law.states else INTEGRALS
+    loop = held_loop(with_integral, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag))
+    seen = run_by_hand(with_integral, 6, 0.3, float(F(delay)), float(F(lag)))
+    # the loop's gain is that of b(p − p*), the plant's that of p
+    assert np.allclose(run_matrices(loop, 6, 0.3), seen, rtol=1e-5, atol=1e-8)
+
+
+@pytest.mark.parametrize("law", [ESTIMATE, INTEGRALS], ids=["estimate", "integrals"])
+@pytest.mark.parametrize("delay", ["0", "1/5", "3/20"])
+def test_a_step_of_p_star_is_a_jump_of_the_states_by_their_steady_values(law, delay):
+    """A loop that rests at p* = 0 when p* steps to 1: by hand that is a push of −gain for ever."""
+    loop = held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay))
+    state, found = AUTHORITY * np.array(loop.inputs["drift"], float), []
+    for _ in range(8):
+        for segment in loop.segments:
+            state = expm(np.array(loop.flow, float) * float(segment.duration)) @ np.array(segment.jump, float) @ state
+        found.append(state[:2])
+    assert np.allclose(found, run_by_hand(law, 8, -float(MODEL.gain), float(F(delay)), 0.0), rtol=1e-5, atol=1e-8)
+
+
+def test_a_law_without_integral_action_is_refused():
+    with pytest.raises(ParameterError, match="constant pressure"):
+        held_loop(PROPORTIONAL, MODEL, AUTHORITY, STEP)
+
+
+@pytest.mark.parametrize("wrong", [{"step": F(0)}, {"delay": F(9)}, {"delay": F(-1, 9)}, {"lag": F(-1)}])
+def test_times_that_make_no_loop_are_refused(wrong):
+    given = {"step": STEP} | wrong
+    with pytest.raises(ParameterError, match="held loop"):
+        held_loop(ESTIMATE, MODEL, AUTHORITY, **given)
+
+
+def test_sizes_that_do_not_fit_are_refused():
+    with pytest.raises(ParameterError, match="linear law"):
+        LinearLaw(states=("z",), update=(), measured=(), output=(F(1),), feedback=(F(1), F(0)))
+
+
+def test_the_estimate_rests_on_the_disturbance_that_its_model_has():
+    """With the model's own plant and a constant disturbance the level settles on it: p* = −d/gain, no error."""
+    near = expm(np.array([[0, 1, 0], [0.5, -1.5, 1], [0, 0, 0]]) * 0.2)[1]
+    prediction = Prediction(of_slip=F(near[0]), of_rate=F(near[1]), of_push=F(near[2]))
+    law = disturbance_estimate((F(4), F(2)), F(2, 5), prediction, MODEL.gain)
+    loop = held_loop(law, MODEL, AUTHORITY, STEP)
+    assert np.allclose(run_matrices(loop, 80, 0.3)[-1], 0, atol=1e-9)

@@ -1,0 +1,116 @@
+"""A simulator of a held loop that knows numbers only, and courses made to hurt it. NumPy; nothing of the package.
+
+The plant e1′ = e2, e2′ = s·e1 − w·e2 + β·b·p + φ is integrated by RK4 in small steps, many courses at once. The law is
+p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Held:
+    """Numbers of a loop: matrices of the law, b, ranges of s, w and β, T_s, delay, bound of φ, all in SI."""
+
+    F: np.ndarray
+    G: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    b: float
+    s: tuple
+    w: tuple
+    beta: tuple
+    step: float
+    delay: float
+    force: float
+
+
+def middle(ends):
+    return (ends[0] + ends[1]) / 2
+
+
+def run(held, periods, pieces, choose, courses, kick=None, back=None):
+    """Largest |e1| and |e2| of every course and the errors at the end.
+
+    choose(k, e, v) gives s, w, β and φ for one small step from its number, the errors (2 × courses) and b·p; kick(k) is
+    an amount added to e2 before a step; back is the slip rate of the reference on a plant that never slides backward.
+    """
+    size, h = len(held.C), held.step / pieces
+    late = round(held.delay / h)
+    e, z, v = np.zeros((2, courses)), np.zeros((size, courses)), np.zeros(courses)
+    waiting, largest = [], np.zeros((2, courses))
+    for k in range(periods * pieces):
+        if k % pieces == 0:
+            waiting.append((k + late, held.b * (held.C @ z + held.D @ e)))
+            z = held.F @ z + held.G @ e
+        if waiting and waiting[0][0] == k:
+            v = waiting.pop(0)[1]
+        if kick is not None:
+            e[1] += kick(k)
+        s, w, beta, phi = choose(k, e, v)
+
+        def rate(x, s=s, w=w, beta=beta, phi=phi, v=v):
+            return np.array([x[1], s * x[0] - w * x[1] + beta * v + phi])
+
+        k1 = rate(e)
+        k2 = rate(e + h / 2 * k1)
+        k3 = rate(e + h / 2 * k2)
+        e = e + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(e + h * k3))
+        if back is not None:
+            e[1] = np.maximum(e[1], -back)
+        largest = np.maximum(largest, np.abs(e))
+    return largest, e
+
+
+def nominal(held):
+    """Choice of the middle of all ranges, no disturbance."""
+    return lambda k, e, v: (middle(held.s), middle(held.w), middle(held.beta), 0.0)
+
+
+def responses(held, periods, pieces):
+    """e1 and e2 at the end of the last period after a unit kick at every earlier small step."""
+    count = periods * pieces
+    _, end = run(held, periods, pieces, nominal(held), count, kick=lambda k: np.arange(count) == k)
+    return end
+
+
+def aligned(held, response, sign=1.0, lag=0):
+    """Everything pushes e the way that the nominal response wants: the natural adversary of a small gain."""
+    count = len(response)
+
+    def choose(k, e, v):
+        way = np.sign(response[min(k + lag, count - 1)]) * sign
+        return (
+            np.where(way * e[0] > 0, held.s[1], held.s[0]),
+            np.where(way * e[1] > 0, held.w[0], held.w[1]),
+            np.where(way * v > 0, held.beta[1], held.beta[0]),
+            way * held.force * np.ones(e.shape[1]),
+        )
+
+    return choose
+
+
+def switching(held, courses, count, seed):
+    """Bang-bang courses with random dwell times, many at once."""
+    random = np.random.default_rng(seed)
+
+    def flips(share):
+        changes = random.random((count, courses)) < share
+        return np.where((np.cumsum(changes, axis=0) + random.integers(2, size=courses)) % 2, 1, 0)
+
+    shares = 10.0 ** random.uniform(-2.5, 0, courses)
+    s, w, beta, phi = (flips(shares) for _ in range(4))
+    follow = random.random(courses) < 0.5  # half of the courses choose s and β by the state, against e2
+
+    def choose(k, e, v):
+        way = 2 * phi[k] - 1
+        by_state = np.where(way * e[0] > 0, 1, 0), np.where(way * v > 0, 1, 0)
+        return (
+            np.asarray(held.s)[np.where(follow, by_state[0], s[k])],
+            np.asarray(held.w)[w[k]],
+            np.asarray(held.beta)[np.where(follow, by_state[1], beta[k])],
+            way * held.force,
+        )
+
+    return choose

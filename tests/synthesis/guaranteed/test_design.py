@@ -1,0 +1,151 @@
+"""Designed guarantees against the targets and against a simulator that shares nothing with the package."""
+
+import importlib.util
+from dataclasses import replace
+from fractions import Fraction as F
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.synthesis.guaranteed import design_held, worst_found
+
+SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
+attacker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(attacker)
+
+# loop: fault, T_s, objective, largest certified slip-rate error [m/s], largest certified slip error [m]
+ROWS = {
+    "real peak": ("real-fault", F("0.184"), "peak", 2.0e-4, 8e-5),
+    "real tracking": ("real-fault", F("0.184"), "tracking", 3.0e-4, 6e-5),
+    "lab 1 ms": ("lab-fault", F("0.001"), "tracking", np.inf, np.inf),
+    "lab 2 ms": ("lab-fault", F("0.002"), "peak", np.inf, np.inf),
+}
+
+
+@cache
+def designed(row):
+    name, step, objective, *_ = ROWS[row]
+    return design_held(task_of(load_fault(name)), step, objective=objective)
+
+
+def numbers(claim, force=None):
+    """A guarantee as the attacker reads it."""
+    law, task = claim.held.law, claim.task
+    as_floats = lambda m: np.array([[float(v) for v in row] for row in m])  # noqa: E731
+    total = task.amplitude + task.reference_force if force is None else force
+    return attacker.Held(
+        F=as_floats(law.update),
+        G=as_floats(law.measured),
+        C=np.array([float(v) for v in law.output]),
+        D=np.array([float(v) for v in law.feedback]),
+        b=float(task.authority),
+        s=tuple(map(float, task.slip_chord)),
+        w=tuple(map(float, task.rate_chord)),
+        beta=tuple(map(float, task.beta)),
+        step=float(claim.held.step),
+        delay=float(claim.held.delay),
+        force=float(total),
+    )
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_designs_are_guaranteed_within_the_targets(row):
+    claim, (*_, rate, slip) = designed(row), ROWS[row]
+    assert isinstance(claim, Guarantee)
+    assert claim.check() is Verdict.PROVED
+    assert claim.claims.slip_rate_error <= rate
+    assert claim.claims.slip_error <= slip
+
+
+def test_the_class_rate_is_guaranteed_far_lower():
+    claim = guarantee(task_of(load_fault("real-fault"), rate_limited=True), designed("real tracking").held)
+    assert claim.claims.slip_rate_error <= F(7, 10**5)
+    assert claim.claims.slip_error <= F(5, 10**5)
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_no_course_of_ten_thousand_violates_a_guarantee(row):
+    claim = designed(row)
+    held = numbers(claim)
+    largest, _ = attacker.run(held, 40, 6, attacker.switching(held, 10_000, 240, seed=3), 10_000)
+    assert largest[0].max() <= claim.claims.slip_error
+    assert largest[1].max() <= claim.claims.slip_rate_error
+    assert largest[1].max() > 0.3 * float(claim.claims.slip_rate_error)  # the courses do hurt
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_courses_along_the_nominal_response_come_close_and_stay_below(row):
+    claim = designed(row)
+    held, periods, pieces = numbers(claim), 60, 8
+    ends = attacker.responses(held, periods, pieces)
+    seen = []
+    for k in (0, 1):
+        largest, _ = attacker.run(held, periods, pieces, attacker.aligned(held, ends[k]), 1)
+        seen.append(largest[k].max())
+    assert seen[0] <= claim.claims.slip_error
+    assert seen[1] <= claim.claims.slip_rate_error <= 2 * seen[1]
+    if row == "real peak":
+        assert claim.claims.slip_rate_error <= 1.5 * seen[1]
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_with_stick_no_course_leaves_the_bounds(row):
+    """The reference moves at its largest rate; the fault never slides backward."""
+    claim = designed(row)
+    held, back = numbers(claim), float(claim.task.reference_rates[0])
+    largest, _ = attacker.run(held, 60, 6, attacker.switching(held, 4_000, 360, seed=5), 4_000, back=back)
+    assert largest[0].max() <= claim.claims.slip_error
+    assert largest[1].max() <= claim.claims.slip_rate_error
+    found = worst_found(claim, sticks=True)
+    assert found.slip_error <= claim.claims.slip_error
+    assert found.slip_rate_error <= claim.claims.slip_rate_error
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_the_worst_found_is_below_the_bound_and_no_less_than_the_attacker_s(row):
+    claim = designed(row)
+    found, held = worst_found(claim), numbers(claim)
+    largest, _ = attacker.run(held, 40, 6, attacker.switching(held, 1_000, 240, seed=4), 1_000)
+    assert largest[1].max() <= found.slip_rate_error <= claim.claims.slip_rate_error
+    assert found.slip_error <= claim.claims.slip_error
+
+
+@pytest.mark.parametrize("delay", [F("0.03"), F("0.1")])
+def test_a_delay_is_attacked_too(delay):
+    task = task_of(load_fault("real-fault"))
+    claim = guarantee(task, replace(designed("real peak").held, delay=delay))
+    if delay == F("0.03"):
+        assert isinstance(claim, Guarantee)
+    if isinstance(claim, NoGuarantee):
+        assert "small gain" in claim.reason
+        assert claim.small_gain >= 1
+        return
+    held = numbers(claim)
+    ends = attacker.responses(held, 60, 46)
+    largest, _ = attacker.run(held, 60, 46, attacker.aligned(held, ends[1]), 1)
+    assert largest[1].max() <= claim.claims.slip_rate_error <= 2 * largest[1].max()
+
+
+def test_sharper_claims_are_not_proved():
+    claim = designed("real tracking")
+    for name in ("slip_error", "slip_rate_error", "peak_slip_rate", "largest_pressure", "least_pressure"):
+        sharper = type(getattr(claim.claims, name))(getattr(claim.claims, name) * F(99, 100))
+        wrong = replace(claim, claims=replace(claim.claims, **{name: sharper}))
+        assert wrong.check() is Verdict.UNDECIDED
+
+
+def test_a_step_far_too_long_has_no_guarantee_and_says_why():
+    found = design_held(task_of(load_fault("real-fault")), F(2), objective="peak")
+    assert isinstance(found, NoGuarantee)
+    assert "must be stable" in found.reason
+
+
+def test_another_objective_is_refused():
+    with pytest.raises(ParameterError, match="tracking, peak"):
+        design_held(task_of(load_fault("real-fault")), F(1), objective="speed")
