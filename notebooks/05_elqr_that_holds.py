@@ -33,7 +33,7 @@ import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.report.linear import verdict_lines
 from quakedesign.simulation import natural_earthquake
-from quakedesign.synthesis.linear.analysis.robust_stability import printed_theorem as theorem
+from quakedesign.synthesis.linear.analysis import printed_theorem as theorem
 from quakedesign.synthesis.linear.plant.uncertainty_bounds import uncertainty_bounds
 from quakedesign.synthesis.linear.certified_peaks import loop_for
 from quakedesign.synthesis.linear.disturbance_search import bang_bang, rate_limited, response

@@ -17,6 +17,7 @@ from quakedesign.symbolic.terms import Term, value
 
 def check(certificate: Certificate, law: Subject | None = None) -> Verdict:
     """Decide a certificate in exact arithmetic; see `Certificate.check`."""
+    _check_roots(certificate.loop)
     _same_field(certificate.loop, law)
     if certificate.refutation is not None:
         _check_equilibrium(certificate.loop, certificate.refutation)
@@ -81,7 +82,6 @@ def _check_proof(certificate: Certificate) -> None:
     require(all(c > 0 for c in claims.values()), "a claim must be positive.")
     uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.ranges)
     require(not uncertain, "V must not depend on an uncertain parameter.")
-    _check_roots(loop)
     _check_witnesses(certificate, claimed(loop, certificate.lyapunov, claims))
 
 

@@ -38,6 +38,8 @@ def _term(raw: Any, loop: Loop, powers: Sequence[str]) -> Term:
     need(all(isinstance(n, str) and n in known for n in parameters), "a term has an unknown parameter")
     factors = tuple(_factor(entry, powers) for entry in listed(entries, "factors", len(powers)))
     need(len({f[0] for f in factors}) == len(factors), "a state occurs twice in a term")
+    scaled = [power * loop.states.get(state, 0) for state, power, _ in factors]
+    need(all(power.denominator == 1 for power in scaled), "an exponent times the weight of its state is no integer")
     return Term(coefficient, parameters, factors)
 
 

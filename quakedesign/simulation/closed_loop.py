@@ -276,13 +276,17 @@ def casadi_function(
     outputs: dict[str, list[sp.Expr]],
     named: dict[sp.Symbol, sp.Expr] | None = None,
 ) -> Any:
-    """CasADi Function with names; `named` are expressions in the inputs that the outputs refer to."""
+    """CasADi Function with names; `named` are expressions in the inputs that the outputs refer to.
+
+    Derivatives at a kink are those of the side on which x1 and x2 grow.
+    """
     import casadi as ca
 
     vectors = {key: ca.SX.sym(key, len(symbols)) for key, symbols in inputs.items()}
     values = {symbol: vectors[key][i] for key, symbols in inputs.items() for i, symbol in enumerate(symbols)}
     if named:
         values |= dict(zip(named, to_casadi(list(named.values()), values), strict=True))
-    flat = to_casadi([part for parts in outputs.values() for part in parts], values)
+    motion = [values[moving] for moving in (plant.x1, plant.x2) if moving in values]
+    flat = to_casadi([part for parts in outputs.values() for part in parts], values, motion)
     results = [ca.vertcat(*(flat.pop(0) for _ in parts)) if parts else ca.SX(0, 1) for parts in outputs.values()]
     return ca.Function(name, list(vectors.values()), results, list(inputs), list(outputs))

@@ -56,6 +56,7 @@ def to_iosystem(subject: Fault | Controller) -> Any:
     Returns
     -------
     control.NonlinearIOSystem
+        That of a fault is linearised by derivatives instead of differences, at rest on the side of forward slip.
 
     Raises
     ------
@@ -70,10 +71,23 @@ def to_iosystem(subject: Fault | Controller) -> Any:
 
 
 def _fault_system(fault: Fault) -> Any:
+    import casadi as ca
     import control
 
     field = ClosedLoop(fault).plant
-    return control.NonlinearIOSystem(
+    inputs = [ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")]
+    slopes = ca.Function("slopes", inputs, [ca.jacobian(field(*inputs), v) for v in inputs[1:]])
+
+    class FaultSystem(control.NonlinearIOSystem):
+        def linearize(self, x0: Any, u0: Any = None, t: float = 0, *arguments: Any, **options: Any) -> Any:
+            if isinstance(x0, control.OperatingPoint):
+                x0, u0 = x0.states, x0.inputs if u0 is None else u0
+            linear = super().linearize(x0, u0, t, *arguments, **options)
+            exact = slopes(t, x0, 0 if u0 is None else u0)
+            linear.A[:], linear.B[:] = (part.full() for part in exact)
+            return linear
+
+    return FaultSystem(
         lambda t, x, u, _: field(t, x, u[0]).full().ravel(),
         lambda t, x, u, _: x,
         name=fault.name,

@@ -106,7 +106,7 @@ class SpringSlider:
 
         y, load, values = self._variables()
         known = values | {loading_rate: load}
-        _, _, *logged = to_casadi(self.derivation, known)
+        _, _, *logged = to_casadi(self.derivation, known, [y[0], y[2]])
         logged = [change / values[x] for change, x in zip(logged, list(values)[2:], strict=True)]
         field = ca.cse([ca.vertcat(values[rate], load - values[rate], *logged)])[0]
         return ca.Function("rates", [y, load], [field, ca.jacobian(field, y)])

@@ -14,7 +14,7 @@ from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 Operations = Mapping[Any, Any]
 
 
-def to_casadi(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -> list[Any]:
+def to_casadi(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], motion: Sequence[Any] = ()) -> list[Any]:
     """Expressions as CasADi SX; subexpressions that SymPy shares are shared there too.
 
     Parameters
@@ -23,6 +23,10 @@ def to_casadi(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -
         In signed and absolute powers, sums, products, powers, comparisons and elementary functions.
     values : mapping of Symbol to SX
         What every free symbol stands for.
+    motion : sequence of SX
+        Symbols that grow in motion. Where two branches of Max, Min or Abs meet, the derivative is that of the branch
+        which is entered when the first of them grows, or the second where the first changes nothing, and so on; without
+        any it is the mean of both branches, as CasADi has it. Values are the same.
 
     Returns
     -------
@@ -36,7 +40,8 @@ def to_casadi(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -
     """
     import casadi as ca
 
-    return [ca.SX(item) for item in _translate(expressions, values, _casadi_operations())]
+    table = {**_casadi_operations(), **(_kinks(ca.vertcat(*motion)) if motion else {})}
+    return [ca.SX(item) for item in _translate(expressions, values, table)]
 
 
 def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -> list[Any]:
@@ -142,6 +147,30 @@ def _powers(library: Any) -> dict[Any, Any]:
         sp.StrictGreaterThan: lambda a, b: a > b,
         sp.GreaterThan: lambda a, b: a >= b,
         **elementary,
+    }
+
+
+def _kinks(motion: Any) -> dict[Any, Any]:
+    """Max, Min and Abs with the values of CasADi's, and the derivatives of the branch that a motion enters."""
+    import casadi as ca
+
+    def not_less(a: Any, b: Any) -> Any:
+        ahead: Any = True
+        slopes = ca.jacobian(ca.SX(a) - b, motion)
+        for slope in reversed(ca.vertsplit(slopes.T)):
+            ahead = ca.logic_or(slope > 0, ca.logic_and(slope == 0, ahead))
+        return ca.logic_or(a > b, ca.logic_and(a == b, ahead))
+
+    def larger(a: Any, b: Any) -> Any:
+        return ca.if_else(not_less(a, b), a, b)
+
+    def smaller(a: Any, b: Any) -> Any:
+        return ca.if_else(not_less(a, b), b, a)
+
+    return {
+        sp.Max: lambda *parts: reduce(larger, parts),
+        sp.Min: lambda *parts: reduce(smaller, parts),
+        sp.Abs: lambda a: larger(a, -a),
     }
 
 

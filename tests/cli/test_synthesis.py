@@ -62,7 +62,7 @@ def test_people_get_a_table(capsys):
 
 
 def test_the_smallest_sampled_error_on_a_fault(capsys, tmp_path, monkeypatch):
-    from quakedesign.synthesis.gains.synthesise import sampled_objective as sampled_gains
+    from quakedesign.synthesis.gains import sampled_objective as sampled_gains
 
     search = cache(partial(sampled_gains.synthesise_sampled, rounds=2))  # so that the second call is short
     monkeypatch.setattr(sampled_gains, "synthesise", lambda *_, **__: None)

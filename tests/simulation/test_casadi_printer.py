@@ -56,3 +56,33 @@ def test_a_symbol_without_a_value_is_named():
 def test_an_unknown_operation_is_named():
     with pytest.raises(ParameterError, match="zeta"):
         to_casadi([sp.zeta(x)], {x: 1.0})
+
+
+X, V = sp.symbols("x v", real=True)
+KINKS = [
+    (sp.Max(X, 0), (1, 0)),
+    (sp.Min(X, 0), (0, 0)),
+    (sp.Max(-2 * X, 3 * X), (3, 0)),
+    (sp.Abs(V), (0, 1)),
+    (sp.Abs(X - V), (1, -1)),
+    (sp.Max(0, 1 - sp.Max(X + 1, 0)), (0, 0)),
+    (sp.exp(-sp.Max(X, 0)) * (1 + sp.Abs(V)), (-1, 1)),
+    (sp.Max(X**2, V), (0, 1)),
+    (sp.Min(sp.Max(sp.sin(X), 0), sp.Abs(V) - X), (-1, 1)),
+    (sp.Max(X, 0, 2 * V), (1, 0)),
+]
+
+
+@pytest.mark.parametrize(("expression", "slopes"), KINKS, ids=lambda v: str(v)[:30])
+def test_at_a_kink_the_derivative_is_that_of_the_branch_that_motion_enters(expression, slopes):
+    """Along x first and v second, both at 0; the value stays that of CasADi's own functions."""
+    import casadi as ca
+
+    at = ca.SX.sym("at", 2)
+    known = {X: at[0], V: at[1]}
+    (found,), (plain,) = to_casadi([expression], known, [at[0], at[1]]), to_casadi([expression], known)
+    both = ca.Function("both", [at], [found, plain, ca.jacobian(found, at)])
+    assert both([0, 0])[2].full().ravel() == pytest.approx(slopes)
+    for point in np.random.default_rng(1).normal(size=(50, 2)):
+        ours, theirs, _ = both(point)
+        assert float(ours) == float(theirs)

@@ -1,3 +1,6 @@
+from dataclasses import replace
+
+import casadi as ca
 import control
 import numpy as np
 import pytest
@@ -5,8 +8,10 @@ from scipy.integrate import solve_ivp
 
 from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
-from quakedesign.fault import load_fault
+from quakedesign.fault import Disturbance, friction_law, friction_laws, load_fault
 from quakedesign.simulation import simulate, to_casadi, to_iosystem
+from quakedesign.simulation.state_plants import SpringSlider
+from quakedesign.symbolic import derive
 
 LAB = load_fault("lab-fault")
 
@@ -64,3 +69,56 @@ def test_a_law_alone_gives_the_pressure_of_the_run(name):
 def test_anything_else_is_refused():
     with pytest.raises(ParameterError, match="Fault or a Controller"):
         to_iosystem(3)
+
+
+QUANTITIES = {
+    "residual": 0.5,
+    "drop": 0.1,
+    "critical_slip": 2.5e-3,
+    "critical_rate": 0.02,
+    "reference_coefficient": 0.6,
+    "direct_effect": 0.011,
+    "evolution_effect": 0.016,
+    "reference_rate": 1e-6,
+    "slowest_rate": 1e-9,
+    "fastest_rate": 1e-3,
+}
+
+
+def faults_of_every_law():
+    for kind in friction_laws().values():
+        law = kind(**{name: QUANTITIES[name] for name in kind.quantities()})
+        yield pytest.param(replace(LAB, friction=law, disturbance=Disturbance()), id=kind.name)
+
+
+def derived_jacobian(fault):
+    model = derive(fault)
+    return np.array(model.jacobian.subs(model.values).evalf(30), dtype=float)
+
+
+@pytest.mark.parametrize("fault", list(faults_of_every_law()))
+def test_derivatives_at_the_equilibrium_are_those_that_are_derived(fault):
+    """From rest motion goes to slip > 0 and slip rate > 0; rate and state are carried as logarithms (chain rule)."""
+    if fault.friction.state_names:
+        slider, at = SpringSlider.of(fault), fault.friction.operating_rate
+        y = np.array(slider.start(at))
+        _, found = slider.rates(y, at)
+        scale = np.array([1, *np.exp(y[2:])])
+        rows = found.full()[np.ix_([1, 2, 3], [1, 2, 3])]  # slip ahead of the far end is the stretch, backwards
+        turned = np.diag([-1, 1, 1]) @ rows @ np.diag([-1, 1, 1])
+        assert np.allclose(scale[:, None] * turned / scale, derived_jacobian(fault), rtol=1e-9, atol=0)
+        return
+    t, x, p = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")
+    found = ca.Function("J", [x, p], [ca.jacobian(to_casadi(fault)(t, x, p), x)])([0, 0], 0).full()
+    assert np.allclose(found, derived_jacobian(fault), rtol=1e-12, atol=0)
+    linear = to_iosystem(fault).linearize([0, 0], [0])
+    assert np.allclose(linear.A, derived_jacobian(fault), rtol=1e-12, atol=0)
+    authority = fault.friction.bounds[1] * fault.authority
+    assert np.allclose(linear.B.ravel(), [0, authority], rtol=1e-12, atol=0)
+
+
+def test_at_the_end_of_weakening_the_slope_is_that_of_slip_beyond_it():
+    law = friction_law("linear-slip-weakening")(residual=0.5, drop=0.1, critical_slip=2**-8)
+    fault = replace(LAB, friction=law, disturbance=Disturbance())
+    linear = to_iosystem(fault).linearize(control.OperatingPoint([2**-8, 0.0], [0.0]))
+    assert linear.A[1, 0] == pytest.approx(-LAB.specific_stiffness, rel=1e-12)

@@ -48,7 +48,7 @@ def test_what_is_given_takes_the_place_of_what_the_fault_needs(fault):
 
 
 def test_gains_from_the_literature_are_returned_where_nothing_is_better(fault, monkeypatch):
-    from quakedesign.synthesis.gains.synthesise import sampled_objective as sampled_gains
+    from quakedesign.synthesis.gains import sampled_objective as sampled_gains
 
     monkeypatch.setattr(sampled_gains, "synthesise", lambda *_, **__: None)
     monkeypatch.setattr(sampled_gains, "_tried", lambda *_: {})

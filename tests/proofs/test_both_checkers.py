@@ -1,0 +1,75 @@
+"""The files made by hand for the standalone checker, and every way to break them, decided by the package."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+from quakedesign.certificates import checking, parse_certificate
+from quakedesign.errors import CertificateError
+from quakedesign.sos.exact.files import load
+from quakedesign.sos.exact.proofs import SumOfSquares, holds
+
+
+def by_hand(name):
+    """Tests of `proofs/check.py`, with their files and the checker."""
+    specification = importlib.util.spec_from_file_location(f"{name}_by_hand", Path(__file__).with_name(f"{name}.py"))
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+LOOPS, POLYNOMIALS = by_hand("test_check"), by_hand("test_check_polynomials")
+REFUTATIONS = LOOPS.REFUTATIONS + POLYNOMIALS.FUNCTIONALS + POLYNOMIALS.POINTS
+MADE = [(LOOPS, make) for make in LOOPS.PROOFS + LOOPS.REFUTATIONS] + [(POLYNOMIALS, make) for make in POLYNOMIALS.ALL]
+BROKEN = [(kind, case) for kind in (LOOPS, POLYNOMIALS) for case in kind.BROKEN]
+BROKEN.remove((POLYNOMIALS, "reduced basis too large"))  # which bounds the time of the standalone checker alone
+
+
+def name(value):
+    return getattr(value, "__name__", str(value))
+
+
+@pytest.fixture(autouse=True)
+def any_field(monkeypatch):
+    """The laws made by hand are not laws of the package, so that their fields cannot be derived again."""
+    monkeypatch.setattr(checking, "_same_field", lambda loop, law: None)
+
+
+def by_package(document):
+    text = json.dumps(document)
+    try:
+        if "polynomial" not in document:
+            return str(parse_certificate(text).check())
+        statement, proof = load(text)
+    except CertificateError:
+        return "refused"
+    return ("proved" if isinstance(proof, SumOfSquares) else "refuted") if holds(statement, proof) else "refused"
+
+
+def by_itself(kind, document):
+    try:
+        return kind.verify(document).verdict
+    except kind.checker.Refused:
+        return "refused"
+
+
+@pytest.mark.parametrize(("kind", "make"), MADE, ids=name)
+def test_what_is_made_by_hand_is_decided(kind, make):
+    assert by_package(make()) == ("refuted" if make in REFUTATIONS else "proved")
+
+
+@pytest.mark.parametrize(("kind", "case"), BROKEN, ids=name)
+def test_what_breaks_a_rule_is_refused(kind, case):
+    make, steps, _ = kind.BROKEN[case]
+    assert by_package(kind.edited(make(), *steps)) == "refused"
+
+
+@pytest.mark.parametrize(("kind", "make"), MADE, ids=name)
+def test_a_changed_number_is_decided_alike(kind, make):
+    document = make()
+    for path, value in kind.leaves(document):
+        for new in kind.other_numbers(value):
+            changed = kind.edited(document, (*path, new))
+            assert by_package(changed) == by_itself(kind, changed), (path, new)
