@@ -4,7 +4,15 @@ from quakedesign.text import one_line
 
 
 class QuakedesignError(Exception):
-    """Anything that quakedesign refuses; the command line prints it as one line and exits with 2."""
+    """Anything that quakedesign refuses; the command line prints it as one line and exits with 2.
+
+    Attributes
+    ----------
+    parts : tuple of QuakedesignError
+        What is wrong one by one, where several things are.
+    """
+
+    parts: "tuple[QuakedesignError, ...]" = ()
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from quakedesign.errors import OutputError
 
+_LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for temporary neighbours and for what goes beside
+
 
 def require_room(path: Path) -> None:
     """Refuse a place that cannot be written, before the work begins.
@@ -17,13 +19,18 @@ def require_room(path: Path) -> None:
     ------
     OutputError
     """
-    parent = path.absolute().parent
-    try:
-        with tempfile.TemporaryFile(dir=parent):
-            pass
-    except OSError as error:
+    parent, length = path.absolute().parent, len(path.name.encode(errors="surrogatepass"))
+    if length > _LONGEST_NAME:
         raise OutputError(
-            f"{path} must be in a folder that can be written. Received {parent}: {error.strerror}. Choose another."
+            f"{path} must have a name of at most {_LONGEST_NAME} bytes. Received {length}. Choose a shorter one."
+        )
+    try:
+        with tempfile.NamedTemporaryFile(dir=parent, prefix=f".{path.name}."):
+            pass
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(
+            f"{path} must be in a folder that can be written. Received {parent}: {reason}. Choose another."
         ) from None
 
 

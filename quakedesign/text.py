@@ -1,6 +1,8 @@
 """Text of users as it may be shown: what a terminal would obey is written out, what is too long is shortened."""
 
 import re
+from collections.abc import Iterable
+from difflib import get_close_matches
 from unicodedata import category
 
 _OBEYED = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, invisible formats, half characters, line separators
@@ -19,6 +21,20 @@ def one_line(message: str) -> str:
     """Message in one visible line; long words, such as paths, and long messages lose their middle."""
     short = re.sub(rf"\S{{{_LONGEST_WORD + 1},}}", lambda word: _shortened(word[0], _LONGEST_WORD), message)
     return _shortened(visible(" ".join(short.split())), _LONGEST_MESSAGE)
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str:
+    """Question whether the nearest known name is meant, to be put at the end of a message; nothing if none is near."""
+    close = get_close_matches(name[:_LONGEST_WORD], list(known), 1)
+    return f" Did you mean {close[0]}?" if close else ""
+
+
+def shown(value: object) -> str:
+    """Python's text for a received value, short, even of one that has none or too many digits."""
+    try:
+        return _shortened(repr(value), _LONGEST_WORD)
+    except Exception:
+        return f"one of type {type(value).__name__}"
 
 
 def _shortened(text: str, length: int) -> str:

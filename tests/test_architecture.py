@@ -16,7 +16,7 @@ import quakedesign
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "quakedesign"
-EVERYWHERE = {f"quakedesign.{name}" for name in ("errors", "rationals", "output", "text", "bounds")}
+EVERYWHERE = {f"quakedesign.{name}" for name in ("errors", "rationals", "input", "output", "text", "bounds")}
 BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "loop", "certificates", "simulation")
 MAY_IMPORT = {
     "fault": (),
@@ -35,6 +35,7 @@ MAY_IMPORT = {
     "__init__": (),
     "errors": (),
     "text": (),
+    "input": (),
     "rationals": (),
     "output": (),
     "bounds": (),

@@ -11,6 +11,7 @@ from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Witne
 from quakedesign.certificates.response_files import limits_of, plain_response, read_response
 from quakedesign.certificates.term_files import LIMITS, plain_terms, read_terms, texts
 from quakedesign.errors import CertificateError
+from quakedesign.input import read_text
 from quakedesign.output import write_whole
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.exact.strict import (
@@ -59,13 +60,7 @@ def read_json(path: str | Path) -> Any:
     CertificateError
         When it cannot be read, or is no strict JSON.
     """
-    try:
-        if Path(path).stat().st_size > LARGEST_FILE:
-            raise CertificateError(f"{path}: a certificate must be at most 4 MiB.")
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise CertificateError(f"certificate cannot be read: {path}: {reason}.") from None
+    text = read_text(path, "certificate", largest=LARGEST_FILE, refusal=CertificateError)
     return parse(text)
 
 

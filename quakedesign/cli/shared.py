@@ -1,6 +1,7 @@
 """What all commands share: the application, options, output and progress."""
 
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -123,9 +124,9 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
     """
     if path is None:
         return
-    if path.exists() and not force:
+    if os.path.exists(path) and not force:
         raise OutputError(f"{what} must be new. Received {path}, which exists. Give --force to replace it.")
-    if path.is_dir():
+    if os.path.isdir(path):
         raise OutputError(f"{what} must be a file. Received {path}, which is a folder. Choose another --out.")
     require_room(path)
 

@@ -1,9 +1,9 @@
 """What acts on the fault besides the spring, the dashpot, friction and the injected fluid."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
-from quakedesign.fault.checks import require_finite, require_nonnegative
+from quakedesign.fault.checks import require_finite, require_nonnegative, require_ordinary
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -36,6 +36,7 @@ class Disturbance:
     def __post_init__(self) -> None:
         require_finite(constant=self.constant, slip_growth=self.slip_growth, rate_growth=self.rate_growth)
         require_nonnegative(amplitude=self.amplitude, frequency=self.frequency)
+        require_ordinary(**{field.name: getattr(self, field.name) for field in fields(self)})
 
     def acceleration(self, slip: "sp.Expr", rate: "sp.Expr", time: "sp.Expr") -> "sp.Expr":
         """φ̂_e [m/s²] at a slip [m], slip rate [m/s] and time [s]."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault.checks import require_nonnegative, require_positive
+from quakedesign.fault.checks import Problems, require_name, require_nonnegative, require_ordinary, require_positive
 from quakedesign.fault.disturbance import Disturbance
 from quakedesign.fault.friction import FrictionLaw
 from quakedesign.fault.reference import Reference
@@ -59,39 +59,19 @@ class Fault:
     box: UncertaintyBox = field(default_factory=lambda: uncertainty_box("paper"))
 
     def __post_init__(self) -> None:
-        require_positive(
-            density=self.density,
-            shear_modulus=self.shear_modulus,
-            length=self.length,
-            sampling_time=self.sampling_time,
-        )
-        require_positive(
-            "Compression is positive here; check the sign.", effective_normal_stress=self.effective_normal_stress
-        )
-        require_nonnegative(damping=self.damping)
+        problems = Problems()
+        with problems.collected():
+            require_name(self.name)
+        with problems.collected():
+            require_plant(**{name: getattr(self, name) for name in _PLANT})
+        with problems.collected():
+            require_ordinary(**{name: getattr(self.friction, name) for name in self.friction.quantities()})
+        problems.refuse()
         if self.reference.operation_time < 1000 * self.sampling_time:
             raise ParameterError(
                 f"sampling_time must be at most a thousandth of the operation time "
                 f"({self.reference.operation_time!r} s). Received {self.sampling_time!r} s."
             )
-        self._require_ordinary_size()
-
-    def _require_ordinary_size(self) -> None:
-        remedy = "The numbers are so extreme that derived quantities overflow."
-        try:
-            require_positive(
-                remedy,
-                mass=self.mass,
-                stiffness=self.stiffness,
-                authority=self.authority,
-                natural_frequency=self.natural_frequency,
-            )
-            require_nonnegative(remedy, seismic_moment=self.seismic_moment, damping_ratio=self.damping_ratio)
-        except ArithmeticError:
-            raise ParameterError(
-                f"density and length must give a finite mass. Received {self.density!r} kg/m³ and {self.length!r} m. "
-                f"{remedy}"
-            ) from None
 
     def require_memoryless(self, purpose: str) -> None:
         """Refuse friction with a state variable where only slip and slip rate are covered.
@@ -176,6 +156,28 @@ class Fault:
         from quakedesign.fault.statics import rest_slip
 
         return rest_slip(self)
+
+
+_PLANT = ("density", "shear_modulus", "length", "damping", "effective_normal_stress", "sampling_time")
+
+
+def require_plant(**numbers: float) -> None:
+    """Refuse numbers of a fault that are unphysical, all of them at once.
+
+    Raises
+    ------
+    ParameterError
+    """
+    problems = Problems()
+    compression = "Compression is positive here; check the sign."
+    for name, value in numbers.items():
+        with problems.collected():
+            if name == "damping":
+                require_nonnegative(damping=value)
+            else:
+                require_positive(compression if name == "effective_normal_stress" else "", **{name: value})
+            require_ordinary(**{name: value})
+    problems.refuse()
 
 
 def require_fault(fault: Fault) -> Fault:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from quakedesign.fault.checks import require_positive
+from quakedesign.fault.checks import require_ordinary, require_positive
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -26,6 +26,8 @@ class Reference:
 
     def __post_init__(self) -> None:
         require_positive(target_slip=self.target_slip, operation_time=self.operation_time)
+        require_ordinary(0, target_slip=self.target_slip)
+        require_ordinary(operation_time=self.operation_time)
 
     def shape(self, stage: "sp.Expr") -> "sp.Expr":
         """Share of the target slip [-] at the stage s = t/t_op in [0, 1] (eq. ref)."""

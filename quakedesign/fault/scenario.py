@@ -2,22 +2,39 @@
 
 import tomllib
 from dataclasses import MISSING, fields
-from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from quakedesign.errors import QuakedesignError, ScenarioError, UnknownNameError
+from quakedesign.errors import ScenarioError, UnknownNameError
+from quakedesign.fault.checks import Problems, require_name
 from quakedesign.fault.disturbance import Disturbance
 from quakedesign.fault.friction import friction_law
-from quakedesign.fault.parameters import Fault
+from quakedesign.fault.parameters import Fault, require_plant
 from quakedesign.fault.reference import Reference
+from quakedesign.fault.tables import Table
 from quakedesign.fault.uncertainty import UncertaintyBox, uncertainty_box
-from quakedesign.fault.units import si_value
+from quakedesign.input import read_text
 from quakedesign.rationals import rational
+from quakedesign.text import nearest_name
 
-_LARGEST_FILE = 1 << 20
-_BRANCHES = {"str", "float", "int", "Spread"}  # names that pydantic adds for the members of a union
+_LARGEST_FILE = 1 << 16  # reading a key of many dots takes the square of its length
+_PLANT = {
+    "density": "kg/m^3",
+    "shear_modulus": "Pa",
+    "length": "m",
+    "damping": "kg/s",
+    "effective_normal_stress": "Pa",
+}
+_TASK = {"target_slip": "m", "operation_time": "s", "sampling_time": "s"}
+_DISTURBANCE = {
+    "constant": "m/s^2",
+    "amplitude": "m/s^2",
+    "frequency": "rad/s",
+    "slip_growth": "1/s^2",
+    "rate_growth": "1/s",
+}
+_WIDTHS = ("stiffness", "damping", "authority")
 
 
 def presets() -> list[str]:
@@ -57,150 +74,101 @@ def load_fault(source: str | Path, *, box: str | None = None) -> Fault:
 def _read(source: str | Path) -> str:
     if str(source) in presets():
         return (files("quakedesign.fault") / "presets" / f"{source}.toml").read_text(encoding="utf-8")
-    path = Path(source)
-    if path.suffix != ".toml":
+    if Path(source).suffix != ".toml":
         raise UnknownNameError(
             f"fault must be a preset ({', '.join(presets())}) or the path of a .toml file. Received {str(source)!r}."
+            + nearest_name(str(source), presets())
         )
-    try:
-        large = path.stat().st_size > _LARGEST_FILE
-        text = "" if large else path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "its name or its text is not UTF-8"
-        raise ScenarioError(f"fault file cannot be read: {path}: {reason}. Give a readable TOML file.") from None
-    if large:
-        raise ScenarioError(
-            f"a fault file must be at most 1 MiB. Received {path}, which is larger. Give a smaller one."
-        )
-    return text
+    return read_text(source, "fault file", largest=_LARGEST_FILE, refusal=ScenarioError)
 
 
 def parse_fault(text: str, name: str) -> Fault:
-    """Fault from the text of a TOML file; `name` names it in messages. Raises as `load_fault`."""
+    """Fault from the text of a TOML file; `name` names it in messages, all errors in one. Raises as `load_fault`."""
+    if len(text) > _LARGEST_FILE:
+        raise ScenarioError(f"{name}: a fault file must be at most 64 KiB. Received {len(text)} characters.")
     try:
         raw = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{name} is not valid TOML: {error}. Compare with a preset.") from None
-    return _build(_validated(raw, name), name)
+    problems = Problems()
+    fault = _fault(Table(raw, problems), problems)
+    problems.refuse(name)
+    return fault
 
 
-@cache
-def _model() -> Any:
-    from typing import Annotated
-
-    from pydantic import BaseModel, ConfigDict, Field
-
-    class Strict(BaseModel):
-        model_config = ConfigDict(extra="forbid", strict=True)
-
-    class Task(Strict):
-        target_slip: str
-        operation_time: str
-        sampling_time: str
-
-    class Shaking(Strict):
-        constant: str = "0 m/s^2"
-        amplitude: str = "0 m/s^2"
-        frequency: str = "0 rad/s"
-        slip_growth: str = "0 1/s^2"
-        rate_growth: str = "0 1/s"
-
-    class Spread(Strict):
-        stiffness: str | float = 0.0
-        damping: str | float = 0.0
-        authority: str | float = 0.0
-
-    class Scenario(Strict):
-        name: Annotated[str, Field(pattern=r"^[\w][\w .+-]{0,59}$")]
-        source: str
-        density: str
-        shear_modulus: str
-        length: str
-        damping: str
-        effective_normal_stress: str
-        friction: dict[str, str | float | int]
-        task: Task
-        disturbance: Shaking = Shaking()
-        uncertainty: str | Spread = "paper"
-
-    return Scenario
+def _fault(table: Table, problems: Problems) -> Any:
+    """Fault of a whole file; there are problems where it is None."""
+    parts: dict[str, Any] = {key: table.text(key) for key in ("name", "source")}
+    parts |= table.quantities(_PLANT)
+    parts["friction"] = _friction(table.table("friction"), problems)
+    parts |= _task(table.table("task"), problems)
+    parts["disturbance"] = _disturbance(table.table("disturbance", optional=True), problems)
+    parts["box"] = _box(table, problems)
+    table.close()
+    given = {key: value for key, value in parts.items() if value is not None}
+    with problems.collected():
+        if given == parts:
+            return Fault(**parts)
+        require_plant(**{key: given[key] for key in (*_PLANT, "sampling_time") if key in given})
+    with problems.collected():
+        if given != parts and "name" in given:
+            require_name(given["name"])
+    return None
 
 
-def _validated(raw: dict[str, Any], name: str) -> Any:
-    from pydantic import ValidationError
-
-    try:
-        return _model().model_validate(raw)
-    except ValidationError as error:
-        deepest = max(error.errors(), key=lambda item: len(item["loc"]))
-        where = ".".join(str(part) for part in deepest["loc"] if part not in _BRANCHES)
-        said = {
-            "missing": f"{where} must be given. Received nothing",
-            "extra_forbidden": f"{where} is not a known key",
-            "string_pattern_mismatch": f"{where} must be of at most 60 letters, digits, spaces and _ . + -, beginning "
-            f"with a letter or digit. Received {str(deepest['input'])[:60]!r}",
-        }
-        wrong = f"{where} has the wrong type. Received {str(deepest['input'])[:60]!r}"
-        raise ScenarioError(
-            f"{name}: {said.get(deepest['type'], wrong)}. Every quantity is a text with a unit; compare with a preset."
-        ) from None
-
-
-def _build(scenario: Any, name: str) -> Fault:
-    try:
-        return Fault(
-            name=scenario.name,
-            source=scenario.source,
-            density=si_value(scenario.density, "kg/m^3", "density"),
-            shear_modulus=si_value(scenario.shear_modulus, "Pa", "shear_modulus"),
-            length=si_value(scenario.length, "m", "length"),
-            damping=si_value(scenario.damping, "kg/s", "damping"),
-            effective_normal_stress=si_value(scenario.effective_normal_stress, "Pa", "effective_normal_stress"),
-            friction=_friction(dict(scenario.friction)),
-            reference=Reference(
-                target_slip=si_value(scenario.task.target_slip, "m", "task.target_slip"),
-                operation_time=si_value(scenario.task.operation_time, "s", "task.operation_time"),
-            ),
-            sampling_time=si_value(scenario.task.sampling_time, "s", "task.sampling_time"),
-            disturbance=_disturbance(scenario.disturbance),
-            box=_box(scenario.uncertainty),
-        )
-    except QuakedesignError as error:
-        raise type(error)(f"{name}: {error}") from None
+def _friction(table: Table | None, problems: Problems) -> Any:
+    name = table.text("law") if table else None
+    if table is None or name is None:
+        if table:
+            table.say_missing()
+        return None
+    with problems.collected():
+        law = friction_law(name)
+        units = {key: field.metadata["unit"] for key, field in law.quantities().items()}
+        optional = {f.name for f in fields(law) if f.default is not MISSING}  # type: ignore[arg-type]
+        read: dict[str, Any] = {}
+        for field in fields(law):  # type: ignore[arg-type]
+            if field.name in units:
+                read |= table.quantities({field.name: units[field.name]}, optional=field.name in optional)
+            elif field.name not in optional or field.name in table.entries:
+                read[field.name] = table.text(field.name)
+        table.close()
+        return None if None in read.values() else law(**read)
+    return None
 
 
-def _friction(entries: dict[str, Any]):
-    if not isinstance(entries.get("law"), str):
-        raise ScenarioError('friction.law must name a friction law. Received none. Add law = "…".')
-    law = friction_law(entries.pop("law"))
-    units = {name: f.metadata["unit"] for name, f in law.quantities().items()}
-    expected = [f.name for f in fields(law)]  # type: ignore[arg-type]
-    needed = {f.name for f in fields(law) if f.default is MISSING}  # type: ignore[arg-type]
-    if not needed <= set(entries) <= set(expected):
-        raise ScenarioError(
-            f"friction must have exactly the parameters {', '.join(expected)} of {law.name}. "
-            f"Received {', '.join(entries) or 'none'}."
-        )
-    read = {key: si_value(entries[key], unit, f"friction.{key}") for key, unit in units.items() if key in entries}
-    return law(**entries | read)
+def _task(table: Table | None, problems: Problems) -> dict[str, Any]:
+    """Reference and sampling time."""
+    if table is None:
+        return {"reference": None, "sampling_time": None}
+    read: dict[str, Any] = {**table.quantities(_TASK)}
+    table.close()
+    sampling_time, reference = read.pop("sampling_time"), None
+    with problems.collected():
+        if None not in read.values():
+            reference = Reference(**read)
+    return {"reference": reference, "sampling_time": sampling_time}
 
 
-def _disturbance(entries: Any) -> Disturbance:
-    units = {
-        "constant": "m/s^2",
-        "amplitude": "m/s^2",
-        "frequency": "rad/s",
-        "slip_growth": "1/s^2",
-        "rate_growth": "1/s",
-    }
-    return Disturbance(**{k: si_value(getattr(entries, k), u, f"disturbance.{k}") for k, u in units.items()})
+def _disturbance(table: Table | None, problems: Problems) -> Disturbance | None:
+    read: dict[str, Any] = {**table.quantities(_DISTURBANCE, optional=True)} if table else {}
+    if table:
+        table.close()
+    with problems.collected():
+        return None if None in read.values() else Disturbance(**read)
+    return None
 
 
-def _box(entries: Any) -> UncertaintyBox:
-    if isinstance(entries, str):
-        return uncertainty_box(entries)
-    widths = {
-        k: rational(si_value(getattr(entries, k), "", f"uncertainty.{k}"), f"uncertainty.{k}")
-        for k in ("stiffness", "damping", "authority")
-    }
-    return UncertaintyBox(name="own", **widths)
+def _box(parent: Table, problems: Problems) -> UncertaintyBox | None:
+    """Named box, or one of the file's own."""
+    given = parent.name_or_table("uncertainty", "paper")
+    if not isinstance(given, Table):
+        with problems.collected():
+            return None if given is None else uncertainty_box(given)
+        return None
+    read = given.quantities(dict.fromkeys(_WIDTHS, ""), optional=True)
+    given.close()
+    with problems.collected():
+        widths = {key: rational(value, f"uncertainty.{key}") for key, value in read.items() if value is not None}
+        return None if None in read.values() else UncertaintyBox(name="own", **widths)
+    return None

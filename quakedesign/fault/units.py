@@ -1,10 +1,12 @@
 """Quantities with units, at the boundary only."""
 
+import re
 from decimal import Decimal
 from functools import cache
 from typing import Any
 
 from quakedesign.errors import UnitError
+from quakedesign.text import shown
 
 
 @cache
@@ -39,34 +41,53 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
     import pint
 
     wanted = f"a quantity in {unit}, such as {_example(unit)!r}" if unit else "a plain number"
+    received = f"{name} must be {wanted}. Received {shown(quantity)}"
     if isinstance(quantity, bool) or not isinstance(quantity, str | int | float):
-        raise UnitError(f"{name} must be {wanted}. Received {quantity!r}.")
+        raise UnitError(f"{received}.")
     if isinstance(quantity, int | float):
-        if unit:
-            raise UnitError(f"{name} must be {wanted}. Received {quantity!r} without a unit. Add the unit.")
-        return float(quantity)
+        return _plain_number(quantity, unit, received)
     if len(quantity) > 100:
         raise UnitError(f"{name} must be {wanted}. Received a text of {len(quantity)} characters.")
     try:
         parsed = _registry().Quantity(quantity)
         converted = parsed.to(unit or "dimensionless") if not (unit and parsed.unitless) else None
     except pint.UndefinedUnitError:
-        raise UnitError(
-            f"{name} must be {wanted}. Received {quantity!r}, whose unit is unknown. Check its spelling."
-        ) from None
+        raise UnitError(f"{received}, whose unit is unknown. Check its spelling.") from None
     except pint.DimensionalityError:
-        raise UnitError(f"{name} must be {wanted}. Received {quantity!r}, which has another dimension.") from None
+        raise UnitError(f"{received}, which has another dimension.") from None
     except Exception:
-        raise UnitError(f"{name} must be {wanted}. Received {quantity!r}, which cannot be read.") from None
+        raise UnitError(f"{received}, which cannot be read.") from None
     if not isinstance(parsed.magnitude, Decimal):
-        raise UnitError(f"{name} must be {wanted}. Received {quantity!r} without a number. Add the number.")
+        raise UnitError(f"{received} without a number. Add the number.")
     if converted is None:
-        raise UnitError(f"{name} must be {wanted}. Received {quantity!r} without a unit. Add the unit.")
+        raise UnitError(f"{received} without a unit. Add the unit.")
+    if plural := next(filter(_is_plural_of_a_symbol, re.findall(r"[^\W\d_]\w*", quantity)), None):
+        raise UnitError(f"{received}, whose unit is unknown: symbols have no plural. Write {plural[:-1]}.")
     if unit == "rad/s" and "hertz" in str(parsed.units):
         raise UnitError(
             f"{name} must be an angular frequency in rad/s. Received {quantity!r}. Give 2π times it in rad/s."
         )
     return float(converted.magnitude)
+
+
+def _plain_number(number: float, unit: str, received: str) -> float:
+    if unit:
+        raise UnitError(f"{received} without a unit. Add the unit.")
+    try:
+        return float(number)
+    except OverflowError:
+        raise UnitError(f"{received}, which is too large. Check its exponent.") from None
+
+
+def _is_plural_of_a_symbol(word: str) -> bool:
+    """Whether pint made a plural of a unit's symbol, as MPas of MPa; hours are the plural of a name."""
+    if not word.endswith("s"):
+        return False
+    for _, unit, _ in _registry().parse_unit_name(word)[:1]:
+        known = _registry()._units[unit]
+        own = word.endswith((known.name, known.symbol, *known.aliases))
+        return not own and known.symbol != known.name and word[:-1].endswith(known.symbol)
+    return False
 
 
 def _example(unit: str) -> str:

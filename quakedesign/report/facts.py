@@ -41,6 +41,13 @@ def fault_sentences(fault: Fault) -> list[str]:
         f"{fault.natural_frequency:.4g} rad/s, damping ratio {fault.damping_ratio:.4g}",
         f"seismic moment {fault.seismic_moment:.4g} N·m, magnitude {magnitude}",
         f"next rest slip {fault.rest_slip:.4g} m, target slip {fault.reference.target_slip:.4g} m in "
-        f"{fault.reference.operation_time:.6g} s",
+        f"{fault.reference.operation_time:.6g} s{beyond_rest(fault)}",
         f"{state}; eigenvalues {poles} 1/s",
     ]
+
+
+def beyond_rest(fault: Fault) -> str:
+    """What a target means that is more than one percent beyond the next rest slip; empty for others."""
+    if not 0 < 1.01 * fault.rest_slip < fault.reference.target_slip:
+        return ""
+    return f", {fault.reference.target_slip / fault.rest_slip:.3g} times the rest slip: pressure has to hold it there"

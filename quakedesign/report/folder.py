@@ -1,6 +1,7 @@
 """The folder of results, complete or not there."""
 
 import json
+import os
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -27,9 +28,9 @@ def prepare(out: Path, *, force: bool) -> None:
     ------
     OutputError
     """
-    if out.exists() and not force:
+    if os.path.exists(out) and not force:
         raise OutputError(f"output folder must be new. Received {out}, which exists. Give --force to replace it.")
-    if out.exists() and not (out / "results.json").is_file():
+    if os.path.exists(out) and not (out / "results.json").is_file():
         raise OutputError(f"only a folder with results.json is replaced. Received {out}. Choose another --out.")
     require_room(out)
 

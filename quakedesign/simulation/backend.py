@@ -96,9 +96,12 @@ def compiler() -> tuple[str, ...]:
     Raises
     ------
     FileNotFoundError
-        When there is none.
+        When there is none, or CC cannot be read.
     """
-    wanted = shlex.split(os.environ.get("CC", ""))
+    try:
+        wanted = shlex.split(os.environ.get("CC", ""))
+    except ValueError as error:
+        raise FileNotFoundError(f"CC must be a command: {error}") from None
     for command in [wanted] if wanted else [["cc"], ["gcc"], ["clang"]]:
         path = shutil.which(command[0])
         if path:

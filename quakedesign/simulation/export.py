@@ -1,5 +1,6 @@
 """A sampled controller as C, for the computer of a laboratory."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
@@ -137,11 +138,11 @@ def export_controller(
 
 
 def _require_free(folder: Path, force: bool) -> None:
-    if folder.exists() and not force:
+    if os.path.exists(folder) and not force:
         raise OutputError(
             f"the folder of an export must be new. Received {folder}, which exists. Give --force to replace it."
         )
-    if folder.exists() and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= {SOURCE, HEADER}):
+    if os.path.exists(folder) and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= {SOURCE, HEADER}):
         raise OutputError(f"only a folder with {SOURCE} and {HEADER} is replaced. Received {folder}. Choose another.")
     require_room(folder)
 

@@ -137,3 +137,32 @@ def test_a_design_whose_run_opens_the_fault_is_no_positive_answer(capsys, tmp_pa
     assert found["verdict"] == "proved"
     assert {"opening", "diverged"} & set(found["events"])
     assert code == 1
+
+
+UNTIMELY = {
+    "no workers": ("map", "cta", "--over", "k1", "k2", "--workers", "0"),
+    "many workers": ("map", "cta", "--over", "k1", "k2", "--workers", "100000"),
+    "no workers to search": ("synthesise", "cta", "--workers", "0"),
+    "a long folder": ("design", "real-fault", "--out", "a" * 300),
+    "a long folder of letters of four bytes": ("design", "real-fault", "--out", chr(0x1D49C) * 60),
+    "a long file": ("simulate", "real-fault", "--out", "a" * 300 + ".nc"),
+    "a long export": ("export", "real-fault", "--out", "a" * 300),
+    "a long path": ("fault", "/".join("a" * 200 for _ in range(25)) + ".toml"),
+}
+
+
+@pytest.mark.parametrize("arguments", UNTIMELY.values(), ids=UNTIMELY)
+def test_what_cannot_be_is_refused_before_the_work(arguments, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    began = time.perf_counter()
+    code, out, err = run(capsys, *arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert len(err) < 600
+    assert time.perf_counter() - began < 10
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_compiler_that_cannot_be_read_is_none(capsys, monkeypatch):
+    monkeypatch.setenv("CC", "'x")
+    code, _, err = run(capsys, "simulate", "lab-fault", "--duration", "0.01", "--json")
+    assert (code, err) == (0, "")

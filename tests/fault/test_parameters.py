@@ -2,13 +2,15 @@
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault import load_fault
+from quakedesign.fault import Disturbance, load_fault
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
+PLANT = ("density", "shear_modulus", "length", "damping", "effective_normal_stress")
 
 
 @pytest.mark.parametrize(("fault", "frequency"), [(REAL, 0.6928), (LAB, 127.6)], ids=lambda v: getattr(v, "name", ""))
@@ -80,8 +82,23 @@ def test_damping_may_vanish_but_not_be_negative():
     "extreme", [{"length": 1e300}, {"length": 1e-150}, {"density": 1e300, "length": 1e6}, {"shear_modulus": 1e307}]
 )
 def test_numbers_that_overflow_are_refused(extreme):
-    with pytest.raises(ParameterError, match="so extreme that derived quantities overflow"):
+    with pytest.raises(ParameterError, match="must be of a size between 1e-40 and 1e\\+40 in SI units"):
         replace(REAL, **extreme)
+
+
+@pytest.mark.parametrize("name", ["constant", "amplitude", "frequency", "slip_growth", "rate_growth"])
+def test_a_disturbance_of_no_size_is_refused(name):
+    with pytest.raises(ParameterError, match=f"{name} must be of a size between"):
+        Disturbance(**{name: 3.2e160})
+
+
+def test_every_fault_of_ordinary_numbers_has_derived_quantities():
+    """At the corners of what is let pass nothing overflows or vanishes."""
+    for extremes in product((1e-40, 1e40), repeat=5):
+        fault = replace(REAL, **dict(zip(PLANT, extremes, strict=True)))
+        for name in (*("mass", "stiffness", "authority", "specific_stiffness", "natural_frequency"), "damping_ratio"):
+            assert 0 < getattr(fault, name) < math.inf
+        assert 0 < fault.seismic_moment < math.inf
 
 
 def test_sampling_is_fine_against_the_operation():

@@ -16,6 +16,8 @@ from quakedesign.fault.units import si_value
         ("276.35 mm", "m", 0.27635),
         ("184.17 hour", "s", 663012.0),
         ("184 ms", "s", 0.184),
+        ("2 hours", "s", 7200.0),
+        ("3 meters", "m", 3.0),
         ("5e14 kg/s", "kg/s", 5e14),
         ("2.5 g/cm^3", "kg/m^3", 2500.0),
         ("2500 kg/m³", "kg/m^3", 2500.0),
@@ -41,6 +43,8 @@ def test_decimals_are_not_rounded_twice():
     ("quantity", "unit", "reason"),
     [
         ("30 GPaa", "Pa", "whose unit is unknown. Check its spelling"),
+        ("20 MPas", "Pa", "symbols have no plural. Write MPa."),
+        ("3 Pas", "Pa", "symbols have no plural. Write Pa."),
         ("30 m", "Pa", "which has another dimension"),
         ("30 + 2 GPa", "Pa", "which has another dimension"),
         ("30", "Pa", "without a unit. Add the unit"),

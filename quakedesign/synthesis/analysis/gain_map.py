@@ -10,6 +10,7 @@ from time import perf_counter
 from quakedesign.certificates import Loop
 from quakedesign.controllers import Subject
 from quakedesign.errors import ParameterError
+from quakedesign.fault.checks import MOST_WORKERS, require_count
 from quakedesign.rationals import rational
 from quakedesign.synthesis.analysis.certify import Number, closed_loop
 from quakedesign.synthesis.analysis.gain_map_workers import Crew, Place, Sheet
@@ -125,6 +126,7 @@ def gain_map(
     ParameterError, UnknownNameError, CertificateError
         For unknown gains, empty ranges or levels, and as `certify`.
     """
+    require_count(MOST_WORKERS, workers=workers)
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
     with Crew(sheet, workers) as crew:
         began = perf_counter()

@@ -10,7 +10,7 @@ from multiprocessing import get_context
 
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.controllers import Subject
-from quakedesign.errors import ParameterError
+from quakedesign.fault.checks import MOST_WORKERS, require_count
 from quakedesign.synthesis.analysis.certify import Number
 from quakedesign.synthesis.gains.dilation import scaled_norm
 from quakedesign.synthesis.gains.objectives import SmallestNorm
@@ -19,6 +19,7 @@ from quakedesign.synthesis.gains.problem import Question, begin_with, question
 
 _STRETCHES = (1.0, 1.5, 4.0)
 _DRAWS = 12
+_MOST_STARTS = 10_000
 _TRIES, _FEW = 6, 2
 _INSIDE = 0.98
 _SHARES = (1.0, 0.9, 0.7)
@@ -132,8 +133,8 @@ def synthesise(
         For an unknown law or objective.
     """
     asked = question(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
-    if starts < 1 or workers < 1:
-        raise ParameterError(f"starts and workers must be at least 1. Received {starts} and {workers}.")
+    require_count(_MOST_STARTS, starts=starts)
+    require_count(MOST_WORKERS, workers=workers)
     first = list(islice(begin_with(asked, seed), starts * _DRAWS))
     found = _best(asked, _climbed(asked.setting, first, starts, workers))
     mine = _synthesis(asked, *found) if found else None

@@ -97,3 +97,18 @@ def test_plain_values_are_json_and_never_an_address():
 def test_differences_are_named_with_dots():
     assert differences({"a": {"b": 1}, "c": 2}, {"a": {"b": 2}, "d": 3}) == ["a.b", "c", "d"]
     assert differences({"a": [1, 2]}, {"a": [1, 2]}) == []
+
+
+def test_a_batch_with_any_byte_changed_is_whole_or_passed_over(tmp_path):
+    """Flags of encryption and methods of compression among them, whose errors are no errors of files."""
+    ledger, starts, ends = filled(tmp_path)
+    (path,) = (tmp_path / "batches").iterdir()
+    content = path.read_bytes()
+    whole = {start.tobytes(): end.tobytes() for start, end in zip(starts, ends, strict=True)}
+    kept = 0
+    for at in range(len(content)):
+        path.write_bytes(content[:at] + bytes([content[at] ^ (0x01, 0x80, 0xFF)[at % 3]]) + content[at + 1 :])
+        found = {start: end.tobytes() for start, end in ledger.read().items()}
+        assert found in ({}, whole)
+        kept += bool(found)
+    assert 0 < kept < len(content)

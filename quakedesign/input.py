@@ -1,0 +1,36 @@
+"""Files of users are read whole, from a regular file of bounded size: nothing waits, nothing is endless."""
+
+import os
+import stat
+from pathlib import Path
+
+from quakedesign.errors import QuakedesignError
+
+
+def read_text(path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError]) -> str:
+    """Text of a file in UTF-8.
+
+    Parameters
+    ----------
+    path : str or Path
+    what : str
+        What the file is, for the message.
+    largest : int
+        Most bytes that it may have.
+    refusal : type of QuakedesignError
+        What is raised when it cannot be read, is larger, or is a pipe, a device or a folder.
+    """
+    try:
+        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as handle:
+            if not stat.S_ISREG(os.fstat(handle.fileno()).st_mode):
+                raise refusal(f"{what} must be a regular file. Received {path}, a pipe or device. Give a file.")
+            data = handle.read(largest + 1)
+        if len(data) > largest:
+            size = f"{largest >> 20} MiB" if largest >> 20 else f"{largest >> 10} KiB"
+            raise refusal(f"{what} must be at most {size}. Received {path}, which is larger. Give a smaller one.")
+        return data.decode()
+    except QuakedesignError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "its name or its text is not UTF-8"
+        raise refusal(f"{what} cannot be read: {path}: {reason}. Give a readable file.") from None

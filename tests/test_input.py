@@ -1,0 +1,67 @@
+"""Files of users are regular, whole and of bounded size."""
+
+import os
+
+import pytest
+
+from quakedesign.errors import CertificateError, OutputError, ScenarioError
+from quakedesign.input import read_text
+from quakedesign.output import require_room
+
+
+def read(path):
+    return read_text(path, "it", largest=2048, refusal=ScenarioError)
+
+
+def test_a_file_of_the_largest_size_is_read(tmp_path):
+    (tmp_path / "a").write_text("ä" * 1024, encoding="utf-8")
+    assert read(tmp_path / "a") == read(str(tmp_path / "a")) == "ä" * 1024
+
+
+def test_what_is_no_file_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "large").write_bytes(b"a" * 2049)
+    (tmp_path / "latin").write_bytes(b"\xe9")
+    said = {
+        "pipe": "regular file",
+        "zero": "regular file",
+        "loop": "Too many levels",
+        "large": "at most 2 KiB",
+        "latin": "not UTF-8",
+        ".": "Is a directory|regular file",
+        "none": "No such file",
+        "x" * 5000: "File name too long",
+        "nul\0": "not UTF-8",
+    }
+    for name, reason in said.items():
+        with pytest.raises(ScenarioError, match=f"^it .*({reason})") as raised:
+            read(tmp_path / name)
+        assert len(str(raised.value)) < 500
+
+
+def test_certificates_are_read_alike(tmp_path):
+    from quakedesign.certificates import load_certificate
+
+    os.mkfifo(tmp_path / "pipe.json")
+    with pytest.raises(CertificateError, match="must be a regular file"):
+        load_certificate(tmp_path / "pipe.json")
+
+
+@pytest.mark.parametrize("name", ["a" * 300, chr(0x1D49C) * 60, "nul\0", "x/" * 3000 + "y"])
+def test_a_place_that_cannot_be_is_refused_before_the_work(name, tmp_path):
+    with pytest.raises(OutputError, match=r"must have a name of at most 200 bytes|folder that can be written"):
+        require_room(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_longest_name_has_room_for_its_neighbours(tmp_path):
+    from quakedesign.output import whole_folder
+
+    target = tmp_path / ("a" * 200)
+    for _ in range(2):
+        require_room(target)
+        with whole_folder(target) as partial:
+            (partial / "file").write_text("x")
+    assert [p.name for p in tmp_path.iterdir()] == [target.name]
