@@ -149,10 +149,10 @@ def test_a_sensed_controller_measures_the_slip_alone_and_leaves_the_noise_to_the
     assert controller_step(LAB, PUBLISHED["cta"], scheme=noisy).start == plain.start
 
 
-def test_no_text_of_the_user_ends_the_comment(tmp_path):
-    from dataclasses import replace
-
-    export_controller(replace(LAB, name="*/ #error \n#error"), PUBLISHED["elqr"], tmp_path / "c")
+def test_no_text_of_the_user_ends_the_comment(tmp_path, monkeypatch):
+    monkeypatch.setattr(type(PUBLISHED["elqr"]), "title", "*/ #error \n#error")
+    export_controller(LAB, PUBLISHED["elqr"], tmp_path / "c")
+    assert "* / #error" in (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")
     compiled(tmp_path / "c")
 
 
