@@ -1,0 +1,126 @@
+"""Largest perturbations and smallest decays that quadratic functions have in closed form."""
+
+from dataclasses import replace
+from fractions import Fraction as F
+
+import pytest
+import sympy as sp
+
+from quakedesign.certificates import Certificate, Loop
+from quakedesign.certificates.robustness import _Cells, decay, decay_by_norms, robustness
+from quakedesign.controllers import LoopField
+from quakedesign.symbolic.terms import Term
+
+
+def power(coefficient, name, exponent, kind="a", parameters=()):
+    return Term(F(coefficient), parameters, ((name, F(exponent), kind),))
+
+
+def product(coefficient, kind="s"):
+    return Term(F(coefficient), (), (("e1", F(1), kind), ("e2", F(1), kind)))
+
+
+def certificate(*more, **claims):
+    """e1' = -e1, e2' = -beta e2 with beta in [1, 4], V = e1^2 + e2^2 and more: -V' = 2 e1^2 + 2 beta e2^2."""
+    loop = Loop(
+        law="own",
+        gains={"k": F(3)},
+        constants={},
+        states={"e1": 1, "e2": 1},
+        domain="cells",
+        uncertain={"beta": (F(1), F(4))},
+        field={"e1": (power(-1, "e1", 1, "s"),), "e2": (power(-1, "e2", 1, "s", ("beta",)),)},
+    )
+    lyapunov = (power(1, "e1", 2), power(1, "e2", 2), *more)
+    return Certificate(loop=loop, lyapunov=lyapunov, claims={name: F(value) for name, value in claims.items()})
+
+
+def weighted():
+    """e1' = e2, e2' = -2 [e1]^(1/3) - 3 [e2]^(1/2), V = |e1|^(4/3) + |e2|^2, of degrees 4 and 3 in u, weights 3 and 2.
+
+    V' = 4/3 s1 s2 u1 u2^2 - 4 s1 s2 u1 u2^2 - 6 u2^3, hence zero at u2 = 0.
+    """
+    return replace(
+        certificate(),
+        loop=replace(
+            certificate().loop,
+            states={"e1": 3, "e2": 2},
+            field={
+                "e1": (power(1, "e2", 1, "s"),),
+                "e2": (power(-2, "e1", "1/3", "s"), power(-3, "e2", "1/2", "s")),
+            },
+        ),
+        lyapunov=(power(1, "e1", "4/3"), power(1, "e2", 2)),
+    )
+
+
+def covers(bound, exact):
+    return exact * (1 - 1e-9) <= float(bound) <= 1.051 * exact
+
+
+def test_the_worst_perturbation_of_a_decoupled_loop():
+    """beta 2w u / (2u^2 + 2 beta w^2) is sqrt(beta)/2 at most, so 1; beta 2w w / (...) is 1 at u = 0."""
+    found = robustness(certificate())
+    assert covers(found.slip, 1)
+    assert covers(found.rate, 1)
+    assert (found.slip_power, found.rate_power) == (0, 0)
+    assert found.source == "bisection of the cells"
+
+
+def test_units_enlarge_what_a_perturbation_does():
+    """Errors of 6 and of 2 per unit of the states: e1 weighs three times as much against e2."""
+    e1, e2, k, beta = sp.symbols("e1 e2 k beta", real=True)
+    model = LoopField(
+        states={e1: 1, e2: 1},
+        field={e1: -e1, e2: -beta * e2},
+        gains=(k,),
+        constants=(),
+        uncertain=(beta,),
+        domain="reals",
+        units={e1: 2 * k, e2: sp.Integer(2)},
+    )
+    found = robustness(certificate(), model)
+    assert covers(found.slip, 3)
+    assert covers(found.rate, 1)
+
+
+def test_a_claimed_decay_serves_where_powers_are_nested():
+    """beta 2w u / (u^2 + w^2) is 4 at most, beta 2w w / (...) is 8; over kappa = 1/2 twice that."""
+    nested = certificate(decay="1/2")
+    loop = replace(nested.loop, lifts={"n": (power(1, "e1", 1, "s"),)})
+    found = robustness(replace(nested, loop=replace(loop, field=loop.field | {"e1": (power(-1, "n", 1, "s"),)})))
+    assert found.source == "claimed decay"
+    assert covers(found.slip, 8)
+    assert covers(found.rate, 16)
+    assert robustness(replace(nested, loop=loop, claims={})) is None
+
+
+def test_powers_of_v_follow_the_weights():
+    """p1 = (3 - 2 + 1)/4, p2 = (2 - 2 + 1)/4."""
+    cells = _Cells(weighted())
+    assert (cells.m, cells.degree, cells.fallen) == (4, -1, 3)
+    assert (cells.power(0), cells.power(1)) == (F(1, 2), F(1, 4))
+
+
+def test_the_decay_of_a_decoupled_loop():
+    """(2u^2 + 2 beta w^2) / (u^2 + w^2) is 2 at least, at beta = 1."""
+    found = decay(certificate())
+    assert found.source == "bisection of the cells"
+    assert 2 / 1.051 <= float(found.rate) <= 2
+    assert decay(certificate(decay="1/7")).rate == F(1, 7)
+
+
+def test_the_chain_of_norms_by_hand():
+    """V = e1^2 + e2^2 + 4 e1 e2 is at most (1 + 2)(u^2 + w^2)."""
+    assert decay_by_norms(certificate(decrease="1/2")) <= F(1, 2)
+    assert float(decay_by_norms(certificate(decrease="1/2"))) == pytest.approx(0.5, rel=1e-8)
+    assert float(decay_by_norms(certificate(product(4), decrease="1/2"))) == pytest.approx(1 / 6, rel=1e-8)
+    heavy = replace(weighted(), lyapunov=(power(16, "e1", "4/3"), power(1, "e2", 2)), claims={"decrease": F(3)})
+    assert float(decay_by_norms(heavy)) == pytest.approx(3 / 8, rel=1e-8)  # 16^(3/4) = 8
+
+
+def test_without_any_bound_the_chain_of_norms_serves():
+    """V' is zero at u2 = 0, so that no piece bounds the quotient."""
+    found = decay(replace(weighted(), claims={"decrease": F(2)}))
+    assert found.source == "chain of norms"
+    assert float(found.rate) == pytest.approx(2, rel=1e-8)
