@@ -18,6 +18,7 @@ from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.analysis.sampling_time import largest_sampling_time, on_trajectory
 from quakedesign.synthesis.linear.certified_peaks import CLASSES, CertifiedPeaks
 from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
+from quakedesign.synthesis.linear.sampled.held import HeldLoop
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +42,8 @@ class Entry:
         hold p, of which `held` speaks.
     variants : tuple of Variant
         For a designed sliding mode: what is certified of the same gains with every named feed-forward.
-    held : mapping or None
-        For a linear law: what is decided when p is held over T_s, see `Design.held_facts`.
+    held : HeldLoop or None
+        For a linear law: what is decided when p is held over T_s, see `Design.held_loop`.
     peaks : mapping of str to CertifiedPeaks
         For a designed linear law that is proved: certified peaks by class of disturbances; no class without any.
     """
@@ -54,7 +55,7 @@ class Entry:
     largest_step: float | None = None
     growth_per_step: float | None = None
     variants: tuple[Variant, ...] = ()
-    held: Mapping[str, Any] | None = None
+    held: HeldLoop | None = None
     peaks: Mapping[str, CertifiedPeaks] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -71,7 +72,7 @@ class Entry:
             "headline": headline(self),
             "largest_sampling_time": self.largest_step,
             "growth_per_step": self.growth_per_step,
-            "held": dict(self.held) if self.held else None,
+            "held": self.held.to_dict() if self.held else None,
             "peaks": {name: found.to_dict() for name, found in self.peaks.items()} or None,
             "details": dict(found.details),
             "metrics": self.run.metrics.to_dict() if self.run else None,
@@ -216,7 +217,7 @@ def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Callab
             design=design,
             run=run,
             growth_per_step=growth,
-            held=design.held_facts(),
+            held=design.held_loop(),
             peaks={kind: found for kind, found in peaks.items() if found is not None},
         )
     bound = float(_lipschitz(design))

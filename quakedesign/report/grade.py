@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premise import Premise
+from quakedesign.rationals import rational
 
 if TYPE_CHECKING:
     from quakedesign.report.comparison import Entry
@@ -46,11 +47,12 @@ def _held(entry: "Entry") -> list[str]:
         return ["UNSTABLE at the step used"] if unstable else []
     if entry.held is None or scheme != "explicit":
         return [f"p is held ({scheme}), which is not covered"]
-    verdicts, longest = {entry.held["verdict"], entry.held["summed"]}, entry.held["largest_step"]
-    if "refuted" in verdicts:
+    if entry.held.runs.verdict is Verdict.REFUTED:
         return ["UNSTABLE with p held"]
-    if not longest:
+    used, longest = rational(step), entry.held.largest_step
+    if longest is None:
         return ["p is held, and no T_s is proved"]
-    if step > longest:
-        return [f"T_s is {UpperBound(Fraction(step / longest)):.3g} times the largest proved"]
-    return [f"p is held: stability {'proved' if verdicts == {'proved'} else 'undecided'}, errors without a bound"]
+    proved = used <= longest or (used == entry.held.step and entry.held.runs.verdict is Verdict.PROVED)
+    if not proved:
+        return [f"T_s is {UpperBound(used / longest):.3g} times the largest proved"]
+    return ["p is held: stability proved, errors without a bound"]

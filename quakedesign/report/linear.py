@@ -1,33 +1,46 @@
 """What is said about an e-LQR: certified margins, sampling and peaks, in lines for people."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
 
-from quakedesign.rationals import rational
+from quakedesign.certificates import Verdict
+from quakedesign.synthesis.linear.analysis.robust_stability import Analysis
 from quakedesign.synthesis.linear.analysis.verdict import LinearVerdict
 from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks
+from quakedesign.synthesis.linear.sampled.held import ConstantLoop, HeldLoop
 
 
-def held_sentence(held: Mapping[str, Any]) -> str:
-    """Whether the loop is stable when p is held over every step, and up to which step it is."""
-    step, longest = held["step"], held["largest_step"]
-    end = f"every T_s up to {longest:.3g} s is proved" if longest else "no T_s is proved"
-    if held["verdict"] == "refuted":
-        at = "β = {:.4g}, s = {:.4g} 1/s^2, w = {:.4g} 1/s".format(*held["witness"])
-        return f"UNSTABLE if p is held over T_s = {step:.4g} s (at {at}); {end}"
-    if held["verdict"] == "undecided":
-        return f"undecided if p is held over T_s = {step:.4g} s; {end}"
-    course = "any course of the parameters" if held["varying"] == "proved" else "constant parameters"
-    if held["summed"] != "proved":
-        state = {"refuted": "UNSTABLE", "undecided": "undecided"}[held["summed"]]
-        course += f", but {state} with integrals summed from the samples"
-    return f"stable if p is held over T_s = {step:.4g} s, proved for {course}; {end}"
+def held_sentence(held: HeldLoop) -> str:
+    """Whether the law that runs is stable when p is held over every step, and up to which step it is."""
+    step, end = f"{float(held.step):.12g}", _proved_up_to(held)
+    if held.runs.verdict is Verdict.REFUTED and held.runs.witness is not None:
+        return f"UNSTABLE if p is held over T_s = {step} s ({_near(held.runs.witness)}); {end}"
+    if held.runs.verdict is Verdict.UNDECIDED:
+        return f"undecided if p is held over T_s = {step} s; {end}"
+    course = "any course of the parameters, integrals summed over the samples"
+    return f"stable if p is held over T_s = {step} s, proved for {course}; {end}"
+
+
+def _proved_up_to(held: HeldLoop) -> str:
+    if held.largest_step is None:
+        return "no T_s is proved"
+    said = f"every T_s up to {held.largest_step:.4g} s is proved"
+    return said if held.refuted_step is None else f"{said}, {held.refuted_step:.15g} s is refuted, open in between"
+
+
+def constant_sentence(loops: Mapping[str, ConstantLoop]) -> str:
+    """The same for the idealised loops with constant parameters."""
+    said = [
+        f"{name} integrals {loop.verdict}, {'no T_s' if loop.largest_step is None else f'{loop.largest_step:.4g} s'}"
+        for name, loop in loops.items()
+    ]
+    return f"idealised, constant parameters (verdict, longest T_s proved): {'; '.join(said)}"
 
 
 def peaks_sentence(peaks: Mapping[str, CertifiedPeaks | None]) -> str:
     """How fast the fault can slip at most, for every class of disturbances that was asked for."""
     said = [
-        f"{float(found.peak_slip_rate):.3g} m/s (slip error {float(found.total('slip_error')):.3g} m) for "
+        f"{found.peak_slip_rate:.3g} m/s (slip error {found.total('slip_error'):.3g} m) for "
         + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
         for name, found in peaks.items()
         if found is not None
@@ -39,26 +52,36 @@ def peaks_sentence(peaks: Mapping[str, CertifiedPeaks | None]) -> str:
 
 def verdict_lines(judged: LinearVerdict) -> list[str]:
     """Lines about a given K."""
-    facts, fault = judged.to_dict(), judged.fault
+    fault, tests = judged.fault, judged.facts["tests"]
     gains = " ".join(f"{float(k):.6g}" for k in judged.controller.gains.values())
-    lines = [f"{facts['verdict']}: elqr {gains} on {fault.name}, box {fault.box.name}"]
-    if facts["unstable_at"]:
-        lines.append("  not stable at beta = {:.4g}, s = {:.4g} 1/s^2, w = {:.4g} 1/s".format(*facts["unstable_at"]))
-    if facts["decay_rate"]:
-        decay = float(rational(facts["decay_rate"]))
-        lines.append(f"  decay rate {decay:.4g} 1/s certified; no vertex is faster than {facts['decay_limit']:.4g} 1/s")
-    if facts["friction_slope_margin"]:
-        margin, limit = (float(rational(facts[name])) for name in ("friction_slope_margin", "linear_limit"))
-        lines.append(f"  friction-slope margin {margin:.5g} certified; unstable from {limit:.5g} on")
-    if "beta_low" in facts:
-        low, high, end = (float(rational(facts[name])) for name in ("beta_low", "beta_high", "beta_low_limit"))
-        lines.append(f"  beta down to {low:.4g} (unstable from {end:.4g} on) or up to {high:.4g} is certified")
-    optimal = {True: "yes", False: "no", None: "undecided"}[facts["inverse_optimal"]]
-    tests = facts["tests"]
-    lines.append(
-        f"  optimal for a Q that covers the uncertainty: {optimal} (the printed test: {tests['printed']['verdict']})"
-    )
-    lines.append(f"  {held_sentence(facts['held'])}")
-    if judged.asked is not None:
-        lines.append(f"  {peaks_sentence({judged.asked: judged.peaks})}")
+    optimal = {True: "yes", False: "no", None: "undecided"}[judged.facts["inverse_optimal"]]
+    lines = [
+        f"{judged.analysis.verdict}: elqr {gains} on {fault.name}, box {fault.box.name}",
+        *(f"  {line}" for line in margin_lines(judged.analysis)),
+        f"  optimal for a Q that covers the uncertainty: {optimal} (the printed test: {tests['printed']['verdict']})",
+        f"  {held_sentence(judged.held)}",
+        f"  {constant_sentence(judged.held.constant)}",
+    ]
+    return lines if judged.asked is None else [*lines, f"  {peaks_sentence({judged.asked: judged.peaks})}"]
+
+
+def margin_lines(found: Analysis) -> list[str]:
+    """Decay rate and margins, each beside its limit; or a vertex that is not stable."""
+    lines, decay, slope, span = [], found.decay, found.slope, found.span
+    if found.unstable_at:
+        lines.append(f"not stable {_near(found.unstable_at)}")
+    if decay is not None:
+        lines.append(
+            f"decay rate {decay.certified:.4g} 1/s certified; that of the slowest vertex is {decay.limit:.4g} 1/s"
+        )
+    if slope is not None and slope.certified:
+        lines.append(f"friction-slope margin {slope.certified:.5g} certified; unstable from {slope.limit:.5g} on")
+    if span is not None:
+        end = f"unstable from {span.low_limit:.4g} on"
+        lines.append(f"beta down to {span.low:.4g} ({end}) or up to {span.high:.4g} is certified")
     return lines
+
+
+def _near(vertex: Sequence[Fraction]) -> str:
+    """A corner of the box, nearly: its exact numbers are in the JSON facts."""
+    return "near β = {:.4g}, s = {:.4g} 1/s^2, w = {:.4g} 1/s".format(*map(float, vertex))

@@ -187,7 +187,7 @@ def _design_held(fault: Fault) -> Design:
     except ParameterError as error:
         return _without_gains(fault, str(error))
     certificate = quadratic_certificate(linear_loop(fault, found.controller), theta=found.theta)
-    details = {"method": found.method, "held_for": str(found.step)}
+    details = {"method": found.method, "held_for": str(found.step), "held": str(found.varying.verdict)}
     return _judged_linear(fault, found.controller, certificate, details)
 
 

@@ -10,10 +10,9 @@ from quakedesign.certificates.premises import Domain, Premise, Variant, feedforw
 from quakedesign.controllers import Controller, SlidingMode, control_law
 from quakedesign.controllers.feed_forward import NONE
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
-from quakedesign.synthesis.linear.analysis.facts import held_facts
 from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks, certified_peaks
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -91,12 +90,12 @@ class Design:
             return None
         return certified_peaks(self.fault, self.controller, disturbance_class=disturbance_class)
 
-    def held_facts(self) -> dict[str, Any] | None:
+    def held_loop(self) -> HeldLoop | None:
         """What is decided of an e-LQR when p is held over the fault's sampling time; None for another law."""
         if self.controller is None or isinstance(self.controller, SlidingMode):
             return None
         gains = tuple(self.controller.gains.values())
-        return held_facts(LinearProblem.of(self.fault), gains, rational(self.fault.sampling_time))
+        return held_loop(LinearProblem.of(self.fault), gains, self.fault.sampling_time)
 
     def __repr__(self) -> str:
         gains = ", ".join(f"{name} = {value}" for name, value in self.gains.items()) or "none"

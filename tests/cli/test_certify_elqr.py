@@ -38,7 +38,7 @@ def test_a_destabilising_gain_is_refuted_in_words(capsys):
     code, said, _ = run(capsys, "certify", "elqr", "lab-fault", "--gains", f"-{SLOW[0]}", *SLOW[1:])
     assert code == 1
     assert said.startswith("refuted: elqr")
-    assert "not stable at beta = 1" in said
+    assert "not stable near β = 1" in said
 
 
 WRONG = {

@@ -1,36 +1,62 @@
-"""Sentences about an e-LQR say what was decided."""
+"""Sentences about an e-LQR say what was decided, and round every bound to its outer side."""
 
+from fractions import Fraction as F
 from types import SimpleNamespace
 
 import pytest
 
-from quakedesign.report.linear import held_sentence, peaks_sentence
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates import Verdict
+from quakedesign.report.linear import constant_sentence, held_sentence, margin_lines, peaks_sentence
+from quakedesign.synthesis.linear.sampled.held import ConstantLoop, HeldLoop
+from quakedesign.synthesis.linear.sampled.varying_parameters import LargestVaryingStep, VaryingVerdict
 
-HELD = {
-    "step": 0.184, "verdict": "proved", "varying": "proved", "summed": "proved", "radius": 0.9, "witness": None,
-    "largest_step": 0.27,
-}  # fmt: skip
+LONGEST = LargestVaryingStep(proved=LowerBound("0.15769"), refuted=UpperBound("0.15822"), proofs=())
+CONSTANT = {"exact": ConstantLoop(verdict=Verdict.PROVED, largest_step=LowerBound("0.157675"))}
+
+
+def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
+    runs = VaryingVerdict(verdict=verdict, step=F(step), witness=witness)
+    return HeldLoop(runs=runs, longest=longest, radius=0.9, constant=CONSTANT)
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("loop", "said"),
     [
-        ({}, "stable if p is held over T_s = 0.184 s, proved for any course of the parameters; every T_s up to 0.27 s"),
-        ({"varying": "undecided"}, "proved for constant parameters"),
-        ({"summed": "refuted"}, "any course of the parameters, but UNSTABLE with integrals summed from the samples"),
-        (
-            {"verdict": "refuted", "witness": [1.4, -0.5, 1.6]},
-            "UNSTABLE if p is held over T_s = 0.184 s (at β = 1.4",
-        ),
-        ({"verdict": "undecided", "largest_step": None}, "undecided if p is held over T_s = 0.184 s; no T_s is proved"),
+        (held(Verdict.PROVED, step="0.1"), "stable if p is held over T_s = 0.1 s, proved for any course"),
+        (held(Verdict.PROVED, step="0.1"), "T_s up to 0.1576 s is proved, 0.15822 s is refuted, open in between"),
+        (held(Verdict.REFUTED, witness=(F("1.4"), F(-1, 2), F(2))), "UNSTABLE if p is held over T_s = 0.184 s (near β"),
+        (held(Verdict.UNDECIDED, step="0.158"), "undecided if p is held over T_s = 0.158 s; every T_s up to 0.1576"),
+        (held(Verdict.UNDECIDED, longest=None), "undecided if p is held over T_s = 0.184 s; no T_s is proved"),
     ],
-)
-def test_a_held_pressure(changed, said):
-    assert said in held_sentence(HELD | changed)
+)  # fmt: skip
+def test_a_held_pressure(loop, said):
+    assert said in held_sentence(loop)
+
+
+def test_idealised_loops_are_named_as_such():
+    said = constant_sentence(CONSTANT | {"summed": ConstantLoop(verdict=Verdict.REFUTED, largest_step=None)})
+    assert said.startswith("idealised, constant parameters")
+    assert said.endswith("exact integrals proved, 0.1576 s; summed integrals refuted, no T_s")
 
 
 def test_peaks_of_one_or_no_class():
-    peaks = SimpleNamespace(peak_slip_rate=0.25, total=lambda output: {"slip_error": 0.5}[output])
+    peaks = SimpleNamespace(
+        peak_slip_rate=UpperBound("8.33542235e-5"), total=lambda output: {"slip_error": UpperBound("0.50001")}[output]
+    )
     said = peaks_sentence({"rate": peaks, "amplitude": None})
-    assert said.endswith("slip rate below 0.25 m/s (slip error 0.5 m) for one of its amplitude and rate")
+    assert said.endswith("slip rate below 8.34e-05 m/s (slip error 0.501 m) for one of its amplitude and rate")
     assert peaks_sentence({"rate": None}) == "no bound on the slip rate is certified"
+
+
+def test_margins_are_rounded_towards_what_is_proved_and_limits_away_from_it():
+    found = SimpleNamespace(
+        unstable_at=None,
+        decay=SimpleNamespace(certified=LowerBound("0.55559"), limit=0.7),
+        slope=SimpleNamespace(certified=LowerBound("1.2345678"), limit=UpperBound("1.2345678")),
+        span=SimpleNamespace(low=UpperBound("0.70001"), high=LowerBound("5.69999"), low_limit=LowerBound("0.69999")),
+    )
+    decay, slope, span = margin_lines(found)
+    assert "0.5555 1/s certified" in decay
+    assert slope == "friction-slope margin 1.2345 certified; unstable from 1.2346 on"
+    assert span == "beta down to 0.7001 (unstable from 0.6999 on) or up to 5.699 is certified"

@@ -130,7 +130,7 @@ def test_a_design_for_a_held_pressure_is_proved_as_such_and_slower(real):
     held, free = qd.design(real, "elqr", held=True), qd.design(real, "elqr")
     assert held.verdict is free.verdict is Verdict.PROVED
     assert (held.details["method"], held.details["held_for"]) == ("continuous", "23/125")
-    facts, other = held.held_facts(), free.held_facts()
+    facts, other = held.held_loop().to_dict(), free.held_loop().to_dict()
     assert (facts["verdict"], facts["varying"], other["verdict"]) == ("proved", "proved", "refuted")
     # the sampled loop itself, at the vertices (ERRATA 22)
     assert facts["radius"] < 1 < other["radius"]
@@ -144,7 +144,7 @@ def test_a_period_that_nothing_holds_is_undecided_with_a_reason(real):
     assert slow.controller is None
     assert "Sample faster" in slow.details["reason"]
     assert slow.certified_peaks() is None
-    assert slow.held_facts() is None
+    assert slow.held_loop() is None
 
 
 def test_a_sliding_mode_has_no_held_design_and_no_peaks(real):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from quakedesign.bounds import Enclosure, UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.claim import require
 from quakedesign.certificates.linear_premises import Sectors, rest_pressure, sectors
@@ -53,28 +54,28 @@ class CertifiedPeaks:
     rest_pressure: tuple[Fraction, Fraction]
     bounds: Mapping[tuple[str, str], PeakBound]
 
-    def total(self, output: str) -> Fraction:
+    def total(self, output: str) -> UpperBound:
         """Bound on |x1 − r| [m], |x2 − r′| [m/s] or |p − p*(r)| [Pa], all inputs together."""
-        return sum((b.bound for (_, name), b in self.bounds.items() if name == output), Fraction(0))
+        return UpperBound(sum((b.bound for (_, name), b in self.bounds.items() if name == output), Fraction(0)))
 
     @property
-    def peak_slip_rate(self) -> Fraction:
+    def peak_slip_rate(self) -> UpperBound:
         """The fault never slips faster than this [m/s]."""
-        return self.reference_rate + self.total("slip_rate_error")
+        return UpperBound(self.reference_rate + self.total("slip_rate_error"))
 
     @property
-    def pressure(self) -> tuple[Fraction, Fraction] | None:
+    def pressure(self) -> Enclosure | None:
         """Range that p never leaves [Pa]; None when the offset from p* was not bounded."""
         if not any(output == "pressure_offset" for _, output in self.bounds):
             return None
         offset = self.total("pressure_offset")
-        return self.rest_pressure[0] - offset, self.rest_pressure[1] + offset
+        return Enclosure.of(self.rest_pressure[0] - offset, self.rest_pressure[1] + offset)
 
     def within(self, limits: PressureLimits | None) -> bool:
         """Whether p provably stays strictly inside limits, so that the loop is the one without them."""
         if limits is None:
             return True
-        return self.pressure is not None and limits.lowest < self.pressure[0] <= self.pressure[1] < limits.highest
+        return self.pressure is not None and limits.lowest < self.pressure.low <= self.pressure.high < limits.highest
 
     def check(self) -> Verdict:
         """Re-decide every bound in exact arithmetic.
@@ -115,9 +116,9 @@ class CertifiedPeaks:
         """Exact bounds as texts, SI; with the share of every input in the slip-rate error."""
         return {
             "disturbance_class": self.disturbance_class,
-            "peak_slip_rate": str(self.peak_slip_rate),
-            **{name: str(self.total(name)) for name in _OUTPUTS},
-            "pressure": [str(v) for v in self.pressure] if self.pressure else None,
+            "peak_slip_rate": self.peak_slip_rate.exact,
+            **{name: self.total(name).exact for name in _OUTPUTS},
+            "pressure": [self.pressure.low.exact, self.pressure.high.exact] if self.pressure else None,
             "parts": {f"{name} {output}": str(b.bound) for (name, output), b in self.bounds.items()},
             "premises": list(PREMISES),
         }

@@ -5,29 +5,36 @@ from dataclasses import replace
 
 import quakedesign as qd
 from quakedesign.synthesis.linear.analysis.facts import linear_facts
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.sampled.held import held_loop
 
 LAB = qd.load_fault("lab-fault")
 
 
+def facts_of(controller, step="1e-3"):
+    held = held_loop(LinearProblem.of(LAB), tuple(controller.gains.values()), step)
+    return json.loads(json.dumps(linear_facts(LAB, controller, held)))
+
+
 def test_the_facts_of_the_published_gains_can_be_written_as_json():
-    facts = json.loads(json.dumps(linear_facts(LAB, qd.published("lab-fault")["elqr"])))
+    facts = facts_of(qd.published("lab-fault")["elqr"])
     assert facts["inverse_optimal"] is True
     assert facts["tests"]["sound"]["verdict"] == "proved"
     assert facts["held"]["verdict"] == "refuted"
     assert 0.6e-3 < facts["held"]["largest_step"] < 0.7e-3
     assert [f["feedback"] for f in facts["feedback"]] == ["error", "state"]
-    assert linear_facts(LAB, qd.published("lab-fault")["elqr"], step="0.5e-3")["held"]["varying"] == "proved"
+    assert facts_of(qd.published("lab-fault")["elqr"], step="0.5e-3")["held"]["varying"] == "proved"
 
 
 def test_a_destabilising_gain_has_facts_too():
     good = qd.published("lab-fault")["elqr"]
-    facts = linear_facts(LAB, replace(good, gains={n: -k for n, k in good.gains.items()}))
+    facts = facts_of(replace(good, gains={n: -k for n, k in good.gains.items()}))
     assert facts["inverse_optimal"] is False
     assert facts["held"]["largest_step"] is None
 
 
 def test_without_double_integral_action_there_is_no_way_to_compare():
     good = qd.published("lab-fault")["elqr"]
-    facts = linear_facts(LAB, replace(good, gains={**good.gains, "k4": 0}))
+    facts = facts_of(replace(good, gains={**good.gains, "k4": 0}))
     assert facts["feedback"] == []
     assert facts["inverse_optimal"] is False

@@ -11,6 +11,7 @@ from quakedesign.synthesis.linear.sampled.input_delay import FOUR_OVER_PI_SQUARE
 PROBLEM = LinearProblem.of(qd.load_fault("real-fault"))
 AUTHORITY = PROBLEM.sectors.authority
 NOTHING = ((F(0),) * 4,) * 4
+ALONE = ((F(0),) * 3, (F(0),) * 3, (F(0), F(0), F(1)))
 
 
 def collected(step, course):
@@ -24,9 +25,9 @@ def collected(step, course):
         t = F(j, 4)
         beta, mean = course[0] + course[1] * t, course[0] * t + course[1] * t**2 / 2  # and ∫β/T up to t
         delta = AUTHORITY * step * mean
-        x = (F(0), 1 - delta, F(0), F(0), delta)
-        # minus the form of the proof, for P = 0 and λ = 1, at the vertex where β is now
-        form = decrease_form(PROBLEM, K, step, (beta, F(0), F(0)), NOTHING, F(1))
+        x = (F(0), 1 - delta, F(0), F(0), F(0), F(0), delta)
+        # minus the form of the proof, for P = 0 and W that weighs δu alone, at the vertex where β is now
+        form = decrease_form(PROBLEM, K, step, (beta, F(0), F(0)), NOTHING, ALONE)
         total += F(weight, 90) * sum(a * form[i][k] * b for i, a in enumerate(x) for k, b in enumerate(x))
     return total
 

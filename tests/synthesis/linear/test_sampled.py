@@ -13,9 +13,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
 from quakedesign.synthesis.linear.design.riccati import riccati_design
-from quakedesign.synthesis.linear.plant import rational_matrices as m
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
-from quakedesign.synthesis.linear.sampled.input_delay import largest_varying_step, varying_proof, varying_verdict
 from quakedesign.synthesis.linear.sampled.stability import hold_verdict, largest_radius, largest_step
 
 CASES = {"lab-fault": (("1e-3", False), ("0.5e-3", True)), "real-fault": (("0.184", False), ("0.092", True))}
@@ -45,10 +43,8 @@ def test_the_published_gains_agree_with_the_eigenvalues_of_the_sampled_loop(name
         for _ in range(100):
             point = [rng.uniform(float(a), float(b)) for a, b in (sectors.beta, sectors.slip, sectors.rate)]
             assert radius(problem, gains, float(step), *point) < 1
-        assert varying_verdict(problem, gains, step).verdict is Verdict.PROVED
     else:
         assert radius(problem, gains, float(step), *(float(v) for v in found.witness)) > 1
-        assert varying_verdict(problem, gains, step).verdict is Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize(("name", "limit"), [("lab-fault", 0.699e-3), ("real-fault", 0.128)])
@@ -61,8 +57,6 @@ def test_the_largest_period_is_just_below_the_limit_of_the_errata(name, limit):
     assert largest_radius(problem, gains, float(found.refuted)) > 1
     for step in np.linspace(0.02, 1, 25) * float(found.proved):
         assert largest_radius(problem, gains, step) < 1
-    varying = largest_varying_step(problem, gains)
-    assert 0.6 * found.proved < varying < found.proved
 
 
 def test_euler_integrals_and_ranges_of_periods():
@@ -82,7 +76,6 @@ def test_a_small_budget_is_undecided_never_wrong():
 def test_a_loop_that_is_unstable_itself_has_no_period():
     problem, gains = loop_of("real-fault")
     assert largest_step(problem, tuple(-k for k in gains)) is None
-    assert largest_varying_step(problem, tuple(-k for k in gains)) == 0
 
 
 @pytest.mark.parametrize("step", ["0", "-1e-3", (F(2), F(1))])
@@ -90,39 +83,6 @@ def test_a_period_that_is_not_positive_is_refused(step):
     problem, gains = loop_of("lab-fault")
     with pytest.raises(ParameterError, match="step must be positive"):
         hold_verdict(problem, gains, step)
-
-
-def test_the_proof_for_varying_parameters_is_exact_in_si_and_breaks_when_a_number_changes():
-    problem, gains = loop_of("lab-fault")
-    found = varying_verdict(problem, gains, "0.5e-3")
-    assert varying_proof(problem, gains, found.step, found.P, found.multiplier)
-    assert not varying_proof(problem, gains, found.step * 2, found.P, found.multiplier)
-    assert not varying_proof(problem, gains, found.step, found.P, -found.multiplier)
-    assert not varying_proof(problem, gains, found.step, found.P, found.multiplier * 100)
-    assert not varying_proof(problem, gains, found.step, m.times(-1, found.P), found.multiplier)
-
-
-def test_what_is_proved_holds_for_parameters_and_instants_at_random():
-    # switched inside a period too; V at the sampling instants falls in the long run
-    from scipy.linalg import expm
-
-    problem, gains = loop_of("lab-fault")
-    step = 0.5e-3
-    P = np.array(varying_verdict(problem, gains, "0.5e-3").P, dtype=float)
-    b, K = float(problem.sectors.authority), np.array([float(k) for k in gains])
-    rng = np.random.default_rng(9)
-    corners = [tuple(float(v) for v in vertex) for vertex in problem.vertices()]
-    x = rng.normal(size=4) * 1 / np.sqrt(np.diag(P))
-    start = x @ P @ x
-    for _ in range(4000):
-        u = -b * K @ x
-        for _half in range(2):
-            beta, s, w = corners[rng.integers(len(corners))]
-            A = np.array([[0, 1, 0, 0], [s, -w, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0]])
-            key = np.zeros((5, 5))
-            key[:4, :4], key[1, 4] = A, beta * u
-            x = (expm(key * step * rng.uniform(0.4, 0.5)) @ np.append(x, 1.0))[:4]
-    assert x @ P @ x < 0.99 * start
 
 
 def test_a_loop_without_a_longest_period_is_proved_as_far_as_it_was_tried():

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 
-from quakedesign.certificates import Verdict
 from quakedesign.sos import Answer
 from quakedesign.sos.exact.polynomial import constant
 from quakedesign.sos.exact.proofs import Square, SumOfSquares
@@ -11,7 +10,7 @@ from quakedesign.sos.exact.statement import Statement
 from quakedesign.synthesis.linear.analysis.inverse_optimality import InverseOptimality
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix
-from quakedesign.synthesis.linear.sampled.input_delay import VaryingVerdict, decrease_form
+from quakedesign.synthesis.linear.sampled.varying_parameters import VaryingVerdict
 
 _LARGEST = 16
 
@@ -24,13 +23,8 @@ def inverse_optimality_files(found: InverseOptimality) -> list[Answer]:
 
 
 def held_files(problem: LinearProblem, gains: Sequence[Fraction], found: VaryingVerdict) -> list[Answer]:
-    """P and minus the form in (x, δ) at every vertex, in SI, of a held loop that is proved; else nothing."""
-    if found.verdict is not Verdict.PROVED or found.P is None or found.multiplier is None:
-        return []
-    forms = {"P": found.P}
-    for n, vertex in enumerate(problem.vertices()):
-        forms[f"v{n}_"] = decrease_form(problem, gains, found.step, vertex, found.P, found.multiplier)
-    return definite_files(forms)
+    """Every form, in SI, whose definiteness proves a held loop; nothing for another verdict."""
+    return definite_files(found.proof.forms(problem, gains)) if found.proof is not None else []
 
 
 def definite_files(forms: Mapping[str, Matrix]) -> list[Answer]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import plant_ranges
@@ -28,9 +29,9 @@ class SlopeMargin:
 
     Attributes
     ----------
-    certified : Fraction
+    certified : LowerBound
         The common quadratic V proves it up to here; 0 when nothing was proved.
-    limit : Fraction
+    limit : UpperBound
         A constant s of limit·s_max, with β = `limit_beta`, is not asymptotically stable (Routh–Hurwitz, exact).
     limit_beta : Fraction
     circle : float
@@ -42,8 +43,8 @@ class SlopeMargin:
     certificate : Certificate or None
     """
 
-    certified: Fraction
-    limit: Fraction
+    certified: LowerBound
+    limit: UpperBound
     limit_beta: Fraction
     circle: float
     slope: Fraction
@@ -58,13 +59,13 @@ class SlopeMargin:
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts, measured ones as numbers."""
         return {
-            "friction_slope_margin": str(self.certified),
-            "linear_limit": str(self.limit),
+            "friction_slope_margin": self.certified.exact,
+            "linear_limit": self.limit.exact,
             "linear_limit_beta": str(self.limit_beta),
             "circle_limit": self.circle,
             "slope": str(self.slope),
             "working_slope": str(self.working_slope),
-            "working_margin": float(self.certified * self.slope / self.working_slope),
+            "working_margin": float(LowerBound(self.certified * self.slope / self.working_slope)),
         }
 
 
@@ -101,8 +102,8 @@ def friction_slope_margin(fault: Fault, controller: Controller) -> SlopeMargin |
     certified, certificate = _largest(prove, limit)
     stress = needed.largest_effective_stress / rational(fault.effective_normal_stress)
     return SlopeMargin(
-        certified=certified,
-        limit=limit,
+        certified=LowerBound(certified),
+        limit=UpperBound(limit),
         limit_beta=beta,
         circle=circle_limit(loop, beta, damping, -spring) / float(slope),
         slope=slope,
@@ -145,22 +146,22 @@ class GainRange:
 
     Attributes
     ----------
-    low, high : Fraction
-        Each with the other end as the box has it. `high` is at most 1024 times the box's: no upper limit was looked for
-        above.
-    low_limit : Fraction
+    low, high : UpperBound, LowerBound
+        Printed, they stay inside what is proved. Each with the other end as the box has it. `high` is at most 1024
+        times the box's: no upper limit was looked for above.
+    low_limit : LowerBound
         A constant β of this, with a constant vertex of the rest, is not asymptotically stable (exact).
     certificates : tuple of Certificate
     """
 
-    low: Fraction
-    high: Fraction
-    low_limit: Fraction
+    low: UpperBound
+    high: LowerBound
+    low_limit: LowerBound
     certificates: tuple[Certificate, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts."""
-        return {"beta_low": str(self.low), "beta_high": str(self.high), "beta_low_limit": str(self.low_limit)}
+        return {"beta_low": self.low.exact, "beta_high": self.high.exact, "beta_low_limit": self.low_limit.exact}
 
 
 def gain_range(fault: Fault, controller: Controller) -> GainRange | None:
@@ -192,9 +193,9 @@ def gain_range(fault: Fault, controller: Controller) -> GainRange | None:
             found["high"] = (most * factor, proof)
         factor *= 4
     return GainRange(
-        low=found["low"][0],
-        high=found["high"][0],
-        low_limit=limit,
+        low=UpperBound(found["low"][0]),
+        high=LowerBound(found["high"][0]),
+        low_limit=LowerBound(limit),
         certificates=(found["low"][1], found["high"][1]),
     )
 
@@ -219,14 +220,14 @@ class DecayRate:
 
     Attributes
     ----------
-    certified : Fraction
+    certified : LowerBound
         a with |x(t)| ≤ C·e^{−at} [1/s].
     limit : float
         The slowest pole of a constant vertex [1/s], measured; nothing decays faster.
     certificate : Certificate
     """
 
-    certified: Fraction
+    certified: LowerBound
     limit: float
     certificate: Certificate
 
@@ -237,7 +238,7 @@ def decay_rate(loop: Loop) -> DecayRate | None:
     if certificate is None:
         return None
     limit = -polytope_of(loop).slowest()
-    return DecayRate(certified=certificate.claims["rate"], limit=limit, certificate=certificate)
+    return DecayRate(certified=LowerBound(certificate.claims["rate"]), limit=limit, certificate=certificate)
 
 
 def supremum(loop_at: Callable[[Fraction], Loop], limit: Fraction, steps: int = 14) -> float:

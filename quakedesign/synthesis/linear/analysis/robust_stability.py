@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Certificate, Verdict
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.controllers import Controller
@@ -70,7 +71,7 @@ class Analysis:
         return {
             "verdict": str(self.verdict),
             "unstable_at": [float(v) for v in self.unstable_at] if self.unstable_at else None,
-            "decay_rate": str(self.decay.certified) if self.decay else None,
+            "decay_rate": self.decay.certified.exact if self.decay else None,
             "decay_limit": self.decay.limit if self.decay else None,
             **(self.slope.to_dict() if self.slope else {"friction_slope_margin": None}),
             **(self.span.to_dict() if self.span else {}),
@@ -107,7 +108,9 @@ def _decay_of_optimal_gains(fault: Fault, controller: Controller) -> DecayRate |
     certificate = finished_exactly(loop, found.scales.form_outside(found.P))
     if certificate is None:
         return None
-    return DecayRate(certified=certificate.claims["rate"], limit=-polytope_of(loop).slowest(), certificate=certificate)
+    return DecayRate(
+        certified=LowerBound(certificate.claims["rate"]), limit=-polytope_of(loop).slowest(), certificate=certificate
+    )
 
 
 def unstable_vertex(loop: ErrorLoop) -> Vertex | None:
@@ -125,6 +128,6 @@ def why_undecided(loop: ErrorLoop) -> str:
         )
     beta, s, w = map(float, vertex)
     return (
-        f"the loop is not stable at beta = {beta:.4g}, s = {s:.4g} 1/s^2, w = {w:.4g} 1/s of the box, so no V exists; "
-        "a narrower box or a shorter sampling time (more bandwidth) may help"
+        f"the loop is not stable near beta = {beta:.4g}, s = {s:.4g} 1/s^2, w = {w:.4g} 1/s of the box, so no V "
+        "exists; a narrower box or a shorter sampling time (more bandwidth) may help"
     )

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from quakedesign.synthesis.linear.analysis.robust_stability import Analysis, ana
 from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks, certified_peaks
 from quakedesign.synthesis.linear.peak_certificate import peak_certificate
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
-from quakedesign.synthesis.linear.sampled.input_delay import varying_verdict
+from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +32,8 @@ class LinearVerdict:
     analysis : Analysis
     facts : mapping
         See `linear_facts`.
-    step : Fraction
-        Sampling period [s] that the facts are about.
+    held : HeldLoop
+        What is decided when p is held over the sampling period asked for.
     peaks : CertifiedPeaks or None
         None when they were not asked for or not found.
     asked : str or None
@@ -45,7 +44,7 @@ class LinearVerdict:
     controller: ExtendedLQR
     analysis: Analysis
     facts: Mapping[str, Any]
-    step: Fraction
+    held: HeldLoop
     peaks: CertifiedPeaks | None
     asked: str | None = None
 
@@ -64,7 +63,7 @@ class LinearVerdict:
             found["peaks"] = peak_certificate(self.peaks, self.controller)
         problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
         several = {"inverse-optimal": inverse_optimality_files(inverse_optimality(problem, gains))}
-        several["held"] = held_files(problem, gains, varying_verdict(problem, gains, self.step))
+        several["held"] = held_files(problem, gains, self.held.runs)
         for name, answers in several.items():
             found |= {f"{name}{f'-{n}' if n else ''}": answer for n, answer in enumerate(answers)}
         return found
@@ -120,13 +119,14 @@ def judge(
     """
     fault.require_memoryless("a verdict on gains")
     period = rational(fault.sampling_time if step is None else step, "step")
+    held = held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), period)
     bounded = certified_peaks(fault, controller, disturbance_class=peaks) if peaks is not None else None
     return LinearVerdict(
         fault=fault,
         controller=controller,
-        facts=linear_facts(fault, controller, step=period),
+        facts=linear_facts(fault, controller, held),
         analysis=analysis(fault, controller),
-        step=period,
+        held=held,
         peaks=bounded,
         asked=peaks,
     )

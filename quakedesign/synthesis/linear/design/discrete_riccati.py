@@ -1,13 +1,16 @@
-"""e-LQR for a given sampling period: the continuous design where the period is short enough, else a discrete one."""
+"""e-LQR for a given sampling period: the continuous design where the period is short enough, else a discrete one.
+
+Both are about the law that runs: p held, integrals summed over the samples, parameters that vary in time.
+"""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Verdict
-from quakedesign.controllers import control_law
+from quakedesign.controllers import Controller, control_law
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
@@ -18,8 +21,8 @@ from quakedesign.synthesis.linear.design.riccati import riccati_design
 from quakedesign.synthesis.linear.design.specifications import Specifications
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Vertex
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix
-from quakedesign.synthesis.linear.sampled.input_delay import VaryingVerdict, varying_verdict
 from quakedesign.synthesis.linear.sampled.stability import HoldVerdict, hold_verdict, largest_radius
+from quakedesign.synthesis.linear.sampled.varying_parameters import VaryingVerdict, varying_verdict
 from quakedesign.synthesis.linear.sampled.zero_order_hold import held_plant
 
 _SHARES = (1.5, 1.2, 1.0, 0.8, 0.6)
@@ -28,7 +31,7 @@ _TRIES = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledDesign:
-    """An e-LQR that holds for a sampling period over the whole box.
+    """An e-LQR for a sampling period, over the whole box.
 
     Attributes
     ----------
@@ -39,9 +42,9 @@ class SampledDesign:
     step : Fraction
         T_s [s].
     constant : HoldVerdict
-        For constant parameters.
+        Of the law that runs for constant parameters; proved.
     varying : VaryingVerdict
-        For parameters that vary in time.
+        The same for parameters that vary in time, with its proof; undecided only where no gains are proved so.
     theta : Matrix or None
         xᵀΘx in SI of the Riccati equation; None for a discrete design.
     """
@@ -58,7 +61,8 @@ def sampled_design(fault: Fault, step: float | str | None = None, *, feedback: s
     """Design for a sampling period, proved over the whole box.
 
     The Riccati design is slowed down from a bandwidth of 1.5/T_s to 0.6/T_s until it is proved for parameters that vary
-    in time, or at least for constant ones; where neither succeeds, a discrete linear-quadratic design takes over.
+    in time; where none is, a discrete linear-quadratic design takes over. The last resort is proved for constant
+    parameters only.
 
     Parameters
     ----------
@@ -74,38 +78,73 @@ def sampled_design(fault: Fault, step: float | str | None = None, *, feedback: s
         When no gains are found; the message says how much the fault moves away within one period.
     """
     period = rational(fault.sampling_time if step is None else step, "step")
-    problem, kept = LinearProblem.of(fault), list[SampledDesign]()
-    for share in _SHARES:
-        found = riccati_design(fault, bandwidth=share / float(period), feedback=feedback)
-        verdict = hold_verdict(problem, _values(found.controller), period)
-        if verdict.verdict is Verdict.PROVED:
-            kept.append(replace(_finished(problem, found.controller, "continuous", verdict), theta=found.theta))
-            if kept[-1].varying.verdict is Verdict.PROVED:
-                return kept[-1]
-    return kept[0] if kept else discrete_design(fault, period, feedback=feedback)
+    problem = LinearProblem.of(fault)
+    tried = (
+        _judged(problem, found.controller, "continuous", period, found.theta)
+        for found in (riccati_design(fault, bandwidth=share / float(period), feedback=feedback) for share in _SHARES)
+    )
+    best = _first_proved(tried)
+    if best is not None and best.varying.verdict is Verdict.PROVED:
+        return best
+    try:
+        other = discrete_design(fault, period, feedback=feedback)
+    except ParameterError:
+        if best is None:
+            raise
+        return best
+    return other if best is None or other.varying.verdict is Verdict.PROVED else best
+
+
+def _first_proved(tried: Iterable[SampledDesign]) -> SampledDesign | None:
+    """First design that is proved for parameters that vary, else the first that is for constant ones."""
+    kept = None
+    for design in tried:
+        if design.constant.verdict is not Verdict.PROVED:
+            continue
+        if design.varying.verdict is Verdict.PROVED:
+            return design
+        kept = kept or design
+    return kept
+
+
+def _judged(
+    problem: LinearProblem, controller: Controller, method: str, step: Fraction, theta: Matrix | None = None
+) -> SampledDesign:
+    gains = tuple(controller.gains.values())
+    return SampledDesign(
+        controller=controller,  # type: ignore[arg-type]
+        method=method,
+        step=step,
+        constant=hold_verdict(problem, gains, step, integration="euler"),
+        varying=varying_verdict(problem, gains, step),
+        theta=theta,
+    )
 
 
 def discrete_design(fault: Fault, step: float | str | Fraction, *, feedback: str = "error") -> SampledDesign:
-    """Discrete linear-quadratic gains with the smallest spectral radius over the box, proved.
+    """Discrete linear-quadratic gains, those with a small spectral radius over the box first, proved.
 
     python-control's `dlqr` (method "scipy") on the held plant at the middle and at the most unstable corner of the box,
     weights R over sixteen decades; where none is stable at every corner, the best one is improved by a direct search
-    (Nelder and Mead) on the spectral radius.
+    (Nelder and Mead) on the spectral radius. Those with the smallest radii may not be proved for parameters that vary
+    in time, so that a few of all are tried.
 
     Raises
     ------
     ParameterError
-        When none is proved.
+        When none is proved, not even for constant parameters.
     """
     period = rational(step, "step")
     problem = LinearProblem.of(fault)
     law = control_law("elqr")
-    for gains in _candidates(fault, problem, float(period))[:_TRIES]:
-        verdict = hold_verdict(problem, gains, period)
-        if verdict.verdict is Verdict.PROVED:
-            controller = law.from_values(tuple(gains), feedback=feedback)
-            return _finished(problem, controller, "discrete", verdict)  # type: ignore[arg-type]
-    raise ParameterError(refusal(problem, float(period)))
+    candidates = _candidates(fault, problem, float(period))
+    spread = candidates[:: max(len(candidates) // _TRIES, 1)]
+    found = _first_proved(
+        _judged(problem, law.from_values(gains, feedback=feedback), "discrete", period) for gains in spread
+    )
+    if found is None:
+        raise ParameterError(refusal(problem, float(period)))
+    return found
 
 
 def refusal(problem: LinearProblem, step: float) -> str:
@@ -125,17 +164,6 @@ def open_loop_growth(problem: LinearProblem, step: float) -> float:
     return math.exp(min(max(pole, 0.0) * step, 700.0))
 
 
-def _finished(problem: LinearProblem, controller: ExtendedLQR, method: str, verdict: HoldVerdict) -> SampledDesign:
-    period = verdict.steps[1]
-    return SampledDesign(
-        controller=controller,
-        method=method,
-        step=period,
-        constant=verdict,
-        varying=varying_verdict(problem, _values(controller), period),
-    )
-
-
 def _candidates(fault: Fault, problem: LinearProblem, step: float) -> list[tuple[Fraction, ...]]:
     """Gains with stable vertices in floating point, smallest spectral radius first."""
     import numpy as np
@@ -150,7 +178,7 @@ def _candidates(fault: Fault, problem: LinearProblem, step: float) -> list[tuple
             if inner is None:
                 continue
             gains = tuple(rational(f"{float(k):.9e}") for k in scales.gains_outside(inner))
-            found.append((largest_radius(problem, gains, step), gains))
+            found.append((largest_radius(problem, gains, step, "euler"), gains))
     found.sort()
     if found and found[0][0] >= 1:
         found = [_improved(problem, found[0][1], step)]
@@ -168,7 +196,7 @@ def _improved(problem: LinearProblem, gains: tuple[Fraction, ...], step: float) 
         )
 
     found = minimize(
-        lambda change: largest_radius(problem, moved(change), step),
+        lambda change: largest_radius(problem, moved(change), step, "euler"),
         np.zeros(4), method="Nelder-Mead", options={"maxfev": 600, "fatol": 1e-6, "xatol": 1e-4},
     )  # fmt: skip
     return float(found.fun), moved(found.x)
@@ -185,7 +213,7 @@ def _discrete_gains(vertex: Vertex, length: float, Q0: Any, R: float) -> list[Fr
     import numpy as np
 
     beta, s, w = (float(v) for v in vertex)
-    F, G = held_plant(length, s, w)
+    F, G = held_plant(length, s, w, "euler")
     if not np.isfinite(F).all() or np.abs(F).max() > 1e8:
         return None
     try:
@@ -193,7 +221,3 @@ def _discrete_gains(vertex: Vertex, length: float, Q0: Any, R: float) -> list[Fr
     except (np.linalg.LinAlgError, ValueError, control.ControlArgument):
         return None
     return [Fraction(float(k)) for k in K[0]]
-
-
-def _values(controller: ExtendedLQR) -> Sequence[Fraction]:
-    return tuple(controller.gains.values())

@@ -11,8 +11,8 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, congruent
 
-Matrix = tuple[tuple[Fraction, ...], ...]
 Vertex = tuple[Fraction, Fraction, Fraction]
 
 
@@ -49,18 +49,11 @@ class Scales:
 
     def form_inside(self, matrix: Sequence[Sequence[Fraction | float]]) -> Matrix:
         """Matrix (4 × 4) of the quadratic form xᵀMx in nondimensional states."""
-        return _congruent(matrix, self.states)
+        return congruent(matrix, self.states)
 
     def form_outside(self, matrix: Sequence[Sequence[Fraction | float]]) -> Matrix:
         """Matrix (4 × 4) of a nondimensional quadratic form in SI states."""
-        return _congruent(matrix, [1 / u for u in self.states])
-
-
-def _congruent(matrix: Sequence[Sequence[Fraction | float]], units: Sequence[Fraction]) -> Matrix:
-    return tuple(
-        tuple(Fraction(v) * a * b for v, b in zip(row, units, strict=True))
-        for a, row in zip(units, matrix, strict=True)
-    )
+        return congruent(matrix, [1 / u for u in self.states])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -57,6 +57,14 @@ def times(factor: Fraction | int, a: Rows) -> Matrix:
     return tuple(tuple(factor * v for v in row) for row in a)
 
 
+def congruent(matrix: Sequence[Sequence[Fraction | float]], units: Sequence[Fraction]) -> Matrix:
+    """DMD for the diagonal D of some units: a quadratic form in states that are so many times smaller."""
+    return tuple(
+        tuple(Fraction(v) * a * b for v, b in zip(row, units, strict=True))
+        for a, row in zip(units, matrix, strict=True)
+    )
+
+
 def outer(a: Sequence[Fraction], b: Sequence[Fraction]) -> Matrix:
     """a bᵀ."""
     return tuple(tuple(x * y for y in b) for x in a)

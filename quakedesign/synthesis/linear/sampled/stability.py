@@ -8,6 +8,7 @@ from fractions import Fraction
 from itertools import count
 from typing import Any
 
+from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
@@ -202,7 +203,7 @@ class LargestStep:
 
     Attributes
     ----------
-    proved : Fraction
+    proved : LowerBound
         Every period in (0, proved] is stable over the whole box [s].
     refuted : Fraction or None
         A longer one that is not [s]; None where none was found, up to four million times the fastest pole's time.
@@ -210,7 +211,7 @@ class LargestStep:
         Of the final subdivision over periods and box.
     """
 
-    proved: Fraction
+    proved: LowerBound
     refuted: Fraction | None
     cells: int
 
@@ -258,7 +259,7 @@ def _all_shorter(
         step = longest * share
         found = hold_verdict(problem, gains, (Fraction(0), step), integration=integration, cells=_CELLS)
         if found.verdict is Verdict.PROVED:
-            return LargestStep(proved=step, refuted=refuted, cells=found.cells)
+            return LargestStep(proved=LowerBound(step), refuted=refuted, cells=found.cells)
     return None
 
 
