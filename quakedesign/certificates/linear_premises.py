@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, lru_cache
 
 import sympy as sp
 
@@ -145,6 +145,27 @@ def rest_pressure(
     return min(ends), max(ends)
 
 
+@lru_cache(maxsize=64)
+def equilibrium_pressure(fault: Fault, slip: Fraction) -> Range:
+    """Rigorous range of the pressure [Pa] that holds the nominal fault at rest at references from 0 to a slip [m].
+
+    Without the part of the disturbance that depends on time alone. Each end is within 1e-4 of the range of what is
+    attained.
+
+    Raises
+    ------
+    ParameterError
+        When no finite enclosure is found.
+    """
+    box = {_r: (Fraction(0), slip)}
+    expression = _rest(fault, nominal=True)[0].subs(_drift, 0)
+    low, high = rest_pressure(fault, box[_r], nominal=True)
+    above = upper_bound(expression - to_sympy(low), box, tolerance=_FINE)
+    below = upper_bound(to_sympy(high) - expression, box, tolerance=_FINE)
+    return high - below, low + above
+
+
+_FINE = Fraction(1, 10**4)
 _r = sp.Symbol("r_0", nonnegative=True)
 _mu = sp.Symbol("mu", positive=True)
 _growth = sp.Symbol("phi_1", real=True)

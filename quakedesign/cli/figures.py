@@ -101,8 +101,8 @@ def figures(
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
+    from quakedesign.report.needed_pressure import run_sentences
     from quakedesign.report.numbers import printed_lines
-    from quakedesign.report.outcomes import run_sentences
     from quakedesign.report.paper_study import paper_study
 
     with progress() as tell:
@@ -112,7 +112,7 @@ def figures(
     if json:
         print_json(results)
         return 0
-    told = ((e.label, "; ".join(run_sentences(e.run))) for e in comparison.entries if e.run)
+    told = ((e.label, "; ".join(run_sentences(e.run, found))) for e in comparison.entries if e.run)
     print_lines(f"{label}: {said}" for label, said in told)
     files = [(drawn["file"], drawn["paper"]) for drawn in results["figures"].values()]
     print_lines(f"{folder}/{file}" + (f": {paper} of the paper" if paper else "") for file, paper in files)

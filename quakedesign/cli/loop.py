@@ -119,16 +119,19 @@ def simulate(
     if out is not None:
         trajectory.save(out)
     if json:
-        print_json(_answer(trajectory, premises))
+        print_json(_answer(trajectory, found, premises))
     else:
-        _print_run(trajectory, premises)
+        _print_run(trajectory, found, premises)
     return 0
 
 
-def _answer(trajectory: Any, premises: Any) -> dict[str, Any]:
+def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
+    from quakedesign.report.needed_pressure import shortfall
+
     metrics, energy = trajectory.metrics.to_dict(), trajectory.energy
     return {
         "outcome": trajectory.outcome.to_dict(),
+        "shortfall": shortfall(trajectory, fault),
         "metrics": metrics,
         "units": {name: trajectory.metrics.unit(name) for name in metrics},
         "premises": [p.to_dict() for p in premises],
@@ -140,10 +143,10 @@ def _answer(trajectory: Any, premises: Any) -> dict[str, Any]:
     }
 
 
-def _print_run(trajectory: Any, premises: Any) -> None:
+def _print_run(trajectory: Any, fault: Any, premises: Any) -> None:
     from quakedesign.report.terminal import print_run
 
-    print_run(trajectory, premises, console())
+    print_run(trajectory, fault, premises, console())
     if trajectory.energy:
         lost = f"{trajectory.energy.relative_residual:.2g} of the largest share"
         print_lines([f"  energy that the integration loses: {lost}"])

@@ -1,14 +1,22 @@
 """What a fault is, in numbers and in sentences."""
 
+from fractions import Fraction
 from typing import Any
 
+from quakedesign.bounds import LowerBound
 from quakedesign.fault import Fault
+from quakedesign.report.needed_pressure import need_sentence, needed_pressure, ways
 from quakedesign.symbolic import derive
+from quakedesign.synthesis.analysis.sampling_adequacy import LARGEST_PRODUCT, SamplingAdequacy, sampling_adequacy
 
 
 def fault_dict(fault: Fault) -> dict[str, Any]:
-    """Keys of the command ``fault`` in DESIGN.md; SI, eigenvalues as [real, imaginary] in 1/s."""
-    model = derive(fault)
+    """Keys of the command ``fault`` in DESIGN.md; SI, eigenvalues as [real, imaginary] in 1/s.
+
+    ``equilibrium_pressure`` is the range [Pa] that the task needs, and ``needs`` says whether that is withdrawal,
+    injection or both.
+    """
+    model, needed = derive(fault), needed_pressure(fault)
     return {
         "name": fault.name,
         "source": fault.source,
@@ -27,6 +35,9 @@ def fault_dict(fault: Fault) -> dict[str, Any]:
         "specific_stiffness": fault.specific_stiffness,
         "specific_damping": fault.specific_damping,
         "uncertainty_box": fault.box.name,
+        "sampling": sampling_adequacy(fault).to_dict(),
+        "equilibrium_pressure": [float(needed.low), float(needed.high)] if needed else None,
+        "needs": list(ways(needed)) if needed else None,
     }
 
 
@@ -43,6 +54,8 @@ def fault_sentences(fault: Fault) -> list[str]:
         f"next rest slip {fault.rest_slip:.4g} m, target slip {fault.reference.target_slip:.4g} m in "
         f"{fault.reference.operation_time:.6g} s{beyond_rest(fault)}",
         f"{state}; eigenvalues {poles} 1/s",
+        sampling_sentence(sampling_adequacy(fault)),
+        *([need_sentence(needed)] if (needed := needed_pressure(fault)) else []),
     ]
 
 
@@ -51,3 +64,16 @@ def beyond_rest(fault: Fault) -> str:
     if not 0 < 1.01 * fault.rest_slip < fault.reference.target_slip:
         return ""
     return f", {fault.reference.target_slip / fault.rest_slip:.3g} times the rest slip: pressure has to hold it there"
+
+
+def sampling_sentence(found: SamplingAdequacy) -> str:
+    """Whether T_s is short enough for the instability, and which one would be."""
+    if found.adequate_step is None:
+        return f"T_s = {found.step:.4g} s: nothing grows between two samples"
+    where = "over the uncertainty box" if found.over_box else "of the nominal fault"
+    longest = LowerBound(Fraction(found.adequate_step)).quantity("s")
+    judged = "is adequate" if found.adequate else "is TOO LONG for the instability"
+    return (
+        f"T_s = {found.step:.4g} s {judged}: times the unstable pole, {found.pole:.4g} 1/s {where}, it is "
+        f"{found.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
+    )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premises import Domain, Variant
 from quakedesign.report.linear import held_sentence, peaks_sentence
-from quakedesign.report.outcomes import run_sentences
+from quakedesign.report.needed_pressure import run_sentences
 from quakedesign.simulation import Trajectory
 
 if TYPE_CHECKING:
@@ -26,7 +26,12 @@ def headline(entry: "Entry") -> str:
         Verdict.REFUTED: f"refuted: {design.details.get('reason', 'a counterexample checks in exact arithmetic')}",
         Verdict.UNDECIDED: f"undecided: {design.details.get('reason', 'no certificate')}",
     }[design.verdict]
-    parts = [*(run_sentences(entry.run) if entry.run else ()), verdict, *_broken(design.premises), *_held(entry.run)]
+    parts = [
+        *(run_sentences(entry.run, design.fault) if entry.run else ()),
+        verdict,
+        *_broken(design.premises),
+        *_held(entry.run),
+    ]
     if design.verdict is Verdict.PROVED and all(p.holds for p in design.premises):
         parts.append("every premise holds")
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):

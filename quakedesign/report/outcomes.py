@@ -5,11 +5,6 @@ from quakedesign.simulation import Trajectory
 OUTCOME_COLUMNS = ("outcome", "peak rate [m/s]", "of natural")
 
 
-def run_sentences(run: Trajectory) -> list[str]:
-    """Outcome of a run, and the least and the largest pressure where it has a controller."""
-    return [outcome_sentence(run), *([pressure_sentence(*extremes)] if (extremes := pressure_extremes(run)) else [])]
-
-
 def outcome_sentence(run: Trajectory) -> str:
     """Outcome of a run with its peak slip rate."""
     found = run.outcome

@@ -15,11 +15,12 @@ from quakedesign.report.headlines import (
     headline,
     scheme_sentence,
 )
-from quakedesign.report.outcomes import run_sentences
+from quakedesign.report.needed_pressure import run_sentences
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 
 if TYPE_CHECKING:
     from quakedesign.certificates.premises import Premise
+    from quakedesign.fault import Fault
     from quakedesign.report.comparison import Entry
     from quakedesign.simulation import Trajectory
 
@@ -86,10 +87,10 @@ def _line(premise: "Premise") -> str:
     return f"premise {premise.name} {sign}: {values}, {ratio}"
 
 
-def print_run(run: "Trajectory", premises: "Sequence[Premise]", console: Any) -> None:
+def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", console: Any) -> None:
     """Outcome, pressure, metrics with units, events and premises of one run."""
     console.print(run.name, style="bold")
-    for sentence in run_sentences(run):
+    for sentence in run_sentences(run, fault):
         console.print(f"  {sentence}")
     for name, number in run.metrics.to_dict().items():
         if number is not None:

@@ -62,10 +62,9 @@ def natural_earthquake(
     recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
     criterion = OutcomeCriterion.of(fault, natural_peak(fault) if pressure else None)
     found = run(recorder, setting, integrator("dormand-prince"), criterion, progress=progress, compiled=compiled)
-    own = found.metrics.peak_slip_rate
-    return (
-        found if pressure or not derive(fault).unstable else replace(found, criterion=OutcomeCriterion.of(fault, own))
-    )
+    if pressure or not derive(fault).unstable:
+        return found
+    return replace(found, criterion=OutcomeCriterion.of(fault, found.metrics.peak_slip_rate))
 
 
 def natural_peak(fault: Fault) -> float | None:

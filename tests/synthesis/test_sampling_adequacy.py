@@ -1,0 +1,80 @@
+"""Whether T_s is short enough, against eigenvalues of the plant on a grid of the box."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quakedesign.fault import Disturbance, load_fault
+from quakedesign.fault.friction import friction_law
+from quakedesign.synthesis.analysis.sampling_adequacy import sampling_adequacy
+
+REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
+UNDERSAMPLED = load_fault(Path(__file__).parent.parent / "data" / "undersampled_fault.toml")
+
+
+def growing(slope, damping):
+    poles = np.linalg.eigvals([[0.0, 1.0], [slope, -damping]])
+    return max((abs(z) for z in poles if z.real > 0), default=0.0)
+
+
+def test_the_pole_is_that_of_the_steepest_friction_at_the_largest_effective_stress():
+    """Closed form of x2'' = s·x1 − w·x2 with s = N̂Δμ/d_c·(σ' − p) − k̂ at the least p of the task, box `paper`."""
+    law, task = REAL.friction, REAL.reference
+    slip = np.linspace(0, task.target_slip, 100_001)
+    low, high = law.bounds
+    friction = np.maximum(low, high - law.drop / law.critical_slip * slip)
+    push = REAL.specific_stiffness - REAL.disturbance.slip_growth
+    stress = (high * REAL.effective_normal_stress - push * slip / REAL.authority) / friction
+    slope = REAL.authority * law.drop / law.critical_slip * stress.max() - push
+    found = sampling_adequacy(REAL)
+    assert found.over_box
+    exact = growing(slope, REAL.specific_damping)
+    assert exact * (1 - 1e-9) <= found.pole <= exact * 1.01
+    assert found.adequate
+
+
+def test_the_fault_that_is_sampled_too_slowly_is_told_which_step_would_do():
+    """Its nominal pole is 13.15 1/s at rest; the box is wider."""
+    found = sampling_adequacy(UNDERSAMPLED)
+    nominal = growing(0.15 / 0.005 * 25e6 * UNDERSAMPLED.authority - UNDERSAMPLED.specific_stiffness, 1e13 / 8.775e12)
+    assert nominal == pytest.approx(13.15, abs=0.005)
+    assert nominal < found.pole < 1.3 * nominal
+    assert found.pole_times_step == found.pole * 0.1 > 1
+    assert not found.adequate
+    finer = sampling_adequacy(replace(UNDERSAMPLED, sampling_time=found.adequate_step * 0.999))
+    assert finer.adequate
+    assert not sampling_adequacy(replace(UNDERSAMPLED, sampling_time=found.adequate_step * 1.001)).adequate
+
+
+def test_a_fault_that_does_not_run_away_bears_any_step():
+    stable = replace(REAL, friction=replace(REAL.friction, drop=0.0), disturbance=Disturbance())
+    found = sampling_adequacy(stable)
+    assert (found.pole, found.pole_times_step, found.adequate, found.adequate_step) == (0.0, 0.0, True, None)
+
+
+def test_a_pair_that_swings_counts_by_its_modulus():
+    """Friction that weakens with the slip rate only: λ² + wλ + k̂ with w < 0, |λ|² = k̂."""
+    law = friction_law("slip-rate-weakening")(residual=0.2, drop=0.2, critical_rate=1e-3)
+    found = sampling_adequacy(replace(REAL, friction=law, damping=1e10, disturbance=Disturbance()))
+    assert found.over_box
+    assert found.pole >= REAL.natural_frequency
+
+
+def test_friction_with_a_state_is_judged_at_its_operating_point():
+    from quakedesign.symbolic import derive
+
+    law = friction_law("rate-and-state-aging")(
+        reference_coefficient=0.6,
+        direct_effect=0.005,
+        evolution_effect=0.015,
+        critical_slip=0.01,
+        reference_rate=1e-6,
+        slowest_rate=1e-12,
+        fastest_rate=1.0,
+    )
+    fault = replace(REAL, friction=law, disturbance=Disturbance())
+    found = sampling_adequacy(fault)
+    assert not found.over_box
+    assert found.pole == max((abs(z) for z in derive(fault).eigenvalues if complex(z).real > 0), default=0.0)
