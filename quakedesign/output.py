@@ -1,19 +1,19 @@
 """Files and folders are written whole or not at all."""
 
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from quakedesign.errors import OutputError
+from quakedesign.temporary import ASIDE, is_temporary, sweep, temporary_folder
 
-_LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for temporary neighbours and for what goes beside
+_placed = [0]
+_LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for what goes beside
 
 
 def require_room(path: Path) -> None:
-    """Refuse a place that cannot be written, before the work begins.
+    """Refuse a place that cannot be written, before the work begins; put in order what a killed process left there.
 
     Raises
     ------
@@ -25,13 +25,19 @@ def require_room(path: Path) -> None:
             f"{path} must have a name of at most {_LONGEST_NAME} bytes. Received {length}. Choose a shorter one."
         )
     try:
-        with tempfile.NamedTemporaryFile(dir=parent, prefix=f".{path.name}."):
-            pass
+        with temporary_folder(parent) as work:
+            (work / path.name).touch()
+        sweep(parent)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise OutputError(
             f"{path} must be in a folder that can be written. Received {parent}: {reason}. Choose another."
         ) from None
+
+
+def number_placed() -> int:
+    """How many files and folders this process has put in their places, that which it is about to put among them."""
+    return _placed[0]
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -44,15 +50,11 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """
     data = content.encode() if isinstance(content, str) else content
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as handle:
-            try:
-                handle.write(data)
-                handle.close()
-                os.chmod(handle.name, 0o644)
-                os.replace(handle.name, path)
-            except BaseException:
-                os.unlink(handle.name)
-                raise
+        with temporary_folder(path.parent) as work:
+            new = work / "new"
+            new.write_bytes(data)
+            new.chmod(0o644)
+            _place(new, path)
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror}. Choose a folder that you may write.") from None
 
@@ -67,24 +69,22 @@ def whole_folder(target: Path) -> Iterator[Path]:
         When it cannot be written; nothing is left behind then, and an earlier folder stays.
     """
     try:
-        partial = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.absolute().parent))
-        try:
-            yield partial
-            partial.chmod(0o755)
-            _swap(partial, target)
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)
+        with temporary_folder(target.absolute().parent) as work:
+            new = work / "new"
+            new.mkdir()
+            yield new
+            new.chmod(0o755)
+            if target.exists():
+                (work / ASIDE).mkdir()
+                os.replace(target, work / ASIDE / target.name)
+            _place(new, target)
     except OutputError:
         raise
     except OSError as error:
         raise OutputError(f"{target} cannot be written: {error.strerror}. Choose another folder.") from None
 
 
-def _swap(partial: Path, target: Path) -> None:
-    if not target.exists():
-        partial.rename(target)
-        return
-    old = Path(tempfile.mkdtemp(prefix=f".{target.name}-old-", dir=target.absolute().parent))
-    os.replace(target, old / target.name)
-    os.replace(partial, target)
-    shutil.rmtree(old, ignore_errors=True)
+def _place(new: Path, target: Path) -> None:
+    if not is_temporary(target):
+        _placed[0] += 1
+    os.replace(new, target)

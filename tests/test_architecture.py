@@ -16,7 +16,7 @@ import quakedesign
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "quakedesign"
-EVERYWHERE = {f"quakedesign.{name}" for name in ("errors", "rationals", "input", "output", "text", "bounds")}
+EVERYWHERE = {f"quakedesign.{name}" for name in ("errors", "rationals", "input", "output", "temporary", "text", "bounds")}
 BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "loop", "certificates", "simulation")
 MAY_IMPORT = {
     "fault": (),
@@ -27,11 +27,14 @@ MAY_IMPORT = {
     "controllers": ("fault", "symbolic"),
     "loop": ("fault", "symbolic", "controllers"),
     "certificates": ("fault", "symbolic", "controllers", "loop", "sos", "sos.exact"),
-    "simulation": ("fault", "symbolic", "controllers", "loop"),
-    "synthesis": BELOW,
+    "simulation": ("fault", "symbolic", "controllers", "loop", "workers"),
+    "synthesis": (*BELOW, "workers"),
     "report": (*BELOW, "synthesis"),
-    "cli": (*BELOW, "synthesis", "report"),
-    "__main__": ("cli",),
+    "cli": (*BELOW, "synthesis", "report", "interruption"),
+    "__main__": ("cli", "interruption"),
+    "workers": ("interruption",),
+    "interruption": (),
+    "temporary": (),
     "__init__": (),
     "errors": (),
     "text": (),

@@ -7,10 +7,10 @@ import subprocess
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from quakedesign.errors import SimulationError
+from quakedesign.temporary import temporary_folder
 
 FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
 RADIX = 64
@@ -115,8 +115,8 @@ def _compile(source: tuple[str, tuple[str, ...]], command: tuple[str, ...]) -> t
     import casadi as ca
 
     text, names = source
-    with TemporaryDirectory(prefix="quakedesign-", ignore_cleanup_errors=True) as folder:
-        library = shared_library(text, Path(folder), command)
+    with temporary_folder() as folder:
+        library = shared_library(text, folder, command)
         return tuple(ca.external(name, str(library)) for name in names)
 
 

@@ -12,6 +12,7 @@ from zipfile import BadZipFile
 
 from quakedesign.errors import OutputError, SimulationError
 from quakedesign.output import write_whole
+from quakedesign.temporary import sweep
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,6 +64,7 @@ class Checkpoint:
         """
         import numpy as np
 
+        sweep(self.path.parent)
         try:
             with np.load(BytesIO(self.path.read_bytes()), allow_pickle=False) as held:
                 fingerprint, vectors = str(held["fingerprint"]), held["vectors"]

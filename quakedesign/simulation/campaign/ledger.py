@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import OutputError, SimulationError
 from quakedesign.output import write_whole
+from quakedesign.temporary import FAMILY, sweep
 
 if TYPE_CHECKING:
     import numpy as np
 
 MANIFEST, BATCHES = "campaign.json", "batches"
-_RESULTS = ("results.json", "samples.csv", "distribution.png", "sample-*.nc", "steps-*.so")
+_RESULTS = ("results.json", "samples.csv", "distribution.png", "sample-*.nc")
 _NAMED = 5
 
 
@@ -92,6 +93,8 @@ class Ledger:
         """
         text = json.dumps(inputs, indent=1, sort_keys=True, allow_nan=False)
         ledger = cls(folder, hashlib.sha256(text.encode()).hexdigest())
+        for place in (folder, folder / BATCHES):
+            sweep(place)
         changed = ledger._changes(json.loads(text)) if (folder / MANIFEST).exists() else None
         if changed is None:
             ledger._require_nothing_else()
@@ -123,7 +126,7 @@ class Ledger:
             names = [path.name for path in self.folder.iterdir()] if self.folder.exists() else []
         except OSError as error:
             raise OutputError(f"{self.folder} must be a folder: {error.strerror}. Choose another one.") from None
-        others = [name for name in names if name != BATCHES and not name.startswith(f".{MANIFEST}.")]
+        others = [name for name in names if name != BATCHES and not name.startswith(FAMILY)]
         if others:
             raise OutputError(
                 f"the folder of a campaign must be new, empty, or that of this campaign. Received {self.folder}, "

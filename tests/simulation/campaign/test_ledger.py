@@ -11,6 +11,7 @@ from quakedesign.errors import OutputError, SimulationError
 from quakedesign.simulation.campaign.ledger import Ledger, differences, plain
 from quakedesign.simulation.schemes import simulation_scheme
 from quakedesign.simulation.sensing import Transducer
+from quakedesign.temporary import FAMILY, PREFIX
 
 INPUTS = {"seed": 1, "controller": {"gains": {"k1": "7"}}}
 
@@ -48,8 +49,11 @@ def test_other_files_are_not_touched(tmp_path):
 
 def test_a_campaign_killed_while_it_wrote_its_manifest_goes_on(tmp_path):
     (tmp_path / "batches").mkdir()
-    (tmp_path / ".campaign.json.x7").write_text('{"se')
+    for prefix in (PREFIX, f"{FAMILY}another-machine-"):
+        (tmp_path / f"{prefix}x7").mkdir()
+        (tmp_path / f"{prefix}x7" / "new").write_text('{"se')
     assert not Ledger.open(tmp_path, INPUTS).read()
+    assert {path.name for path in tmp_path.iterdir()} == {"batches", "campaign.json", f"{FAMILY}another-machine-x7"}
 
 
 def test_force_leaves_what_is_not_of_a_campaign(tmp_path):
