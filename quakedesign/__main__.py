@@ -1,5 +1,15 @@
-"""``python -m quakedesign``."""
+"""``python -m quakedesign``, and the command ``quakedesign``."""
 
-from quakedesign.cli import main
+from quakedesign.interruption import ending
 
-main()
+
+def main() -> None:
+    """Run the command line; an interruption is one line from the first import on."""
+    with ending():
+        from quakedesign.cli import main as run
+
+        run()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,10 +1,65 @@
 """Random tests draw the same examples every time; every worker computes on one thread, as there is one per core."""
 
+import gc
 import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("reproducible", derandomize=True, print_blob=True)
 settings.load_profile("reproducible")
+
+ROOT = Path(__file__).parent.parent
+LAUNCH = """
+import os, signal, sys
+for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+    signal.signal(getattr(signal, name), signal.SIG_IGN if name in sys.argv[1].split(",") else signal.SIG_DFL)
+os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_warning_wanders():
+    """What a file of tests has left open is warned of there, and not in another file."""
+    yield
+    gc.collect()
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starts Python with some arguments, in a session and with signals of its own; ends and closes it in any case.
+
+    Its workers hold its stderr, so that `communicate` returns when the last of them is gone.
+    """
+    started = []
+
+    def begin(*arguments, folder=tmp_path, ignored=(), **environment):
+        where = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+        process = subprocess.Popen(
+            [sys.executable, "-c", LAUNCH, ",".join(ignored), *map(str, arguments)],
+            cwd=folder,
+            env=os.environ | {"PYTHONPATH": where} | {name: str(value) for name, value in environment.items()},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        started.append(process)
+        return process
+
+    yield begin
+    for process in started:
+        try:
+            os.killpg(process.pid, signal.SIGKILL)
+        except (ProcessLookupError, PermissionError):  # nobody is there, or only what has ended
+            pass
+        process.wait()
+        process.stdout.close()
+        process.stderr.close()

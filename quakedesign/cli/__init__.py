@@ -11,6 +11,7 @@ from cyclopts import CycloptsError
 from quakedesign.cli import campaign, design, figures, gain_map, loop, plant, polynomial, proof, synthesis
 from quakedesign.cli.shared import app
 from quakedesign.errors import QuakedesignError
+from quakedesign.interruption import ending
 from quakedesign.text import one_line
 
 __all__ = [
@@ -40,15 +41,13 @@ def main(arguments: list[str] | None = None) -> None:
     if arguments is None and not sys.warnoptions:
         _without_warnings()
     try:
-        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        with ending():
+            code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.exit(code if isinstance(code, int) else 0)
     except QuakedesignError as error:
         _refuse(str(error))
     except CycloptsError as error:
         _refuse(str(error))
-    except KeyboardInterrupt:
-        print("quakedesign: interrupted; nothing was written.", file=sys.stderr)
-        sys.exit(130)
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)

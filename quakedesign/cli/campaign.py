@@ -1,6 +1,5 @@
 """The command that runs many samples of one closed loop."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +19,7 @@ from quakedesign.cli.shared import (
     progress,
 )
 from quakedesign.errors import ParameterError
-from quakedesign.text import one_line
+from quakedesign.interruption import remedy
 
 if TYPE_CHECKING:
     from quakedesign.simulation.campaign import Campaign, Problem
@@ -146,14 +145,11 @@ def campaign(
     )
     folder = out or Path(f"quakedesign-{found.name}-campaign")
     chosen: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
-    try:
-        with progress() as tell:
-            done = run_campaign(problem, samples, folder, tell=tell, **chosen)
-            done.save(folder)
-            answer = done.to_dict() | _again(done, rerun, folder)
-    except KeyboardInterrupt:
-        print(one_line(f"quakedesign: interrupted; the same command goes on from {folder}."), file=sys.stderr)
-        return 130
+    remedy(f"the same command goes on from {folder}")
+    with progress() as tell:
+        done = run_campaign(problem, samples, folder, tell=tell, **chosen)
+        done.save(folder)
+        answer = done.to_dict() | _again(done, rerun, folder)
     if json:
         print_json(answer)
     else:

@@ -4,10 +4,7 @@ import errno
 import io
 import json
 import os
-import signal
-import subprocess
 import sys
-import time
 
 import pytest
 
@@ -88,16 +85,6 @@ def test_a_proof_about_a_polynomial_says_nothing_about_a_fault(capsys, tmp_path)
     code, out, _ = run(capsys, "check", file, "--fault", "lab-fault")
     assert code == 0
     assert "nothing is said about lab-fault" in out
-
-
-def test_an_interruption_ends_with_one_line(tmp_path):
-    command = [sys.executable, "-m", "quakedesign", "synthesise", "cta", "--objective", "decay", "--workers", "1"]
-    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    time.sleep(4)
-    os.killpg(process.pid, signal.SIGINT)
-    _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert err.strip().splitlines()[-1] == "quakedesign: interrupted; nothing was written."
 
 
 class Full(io.StringIO):

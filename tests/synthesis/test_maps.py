@@ -3,6 +3,7 @@
 import importlib.util
 from dataclasses import replace
 from fractions import Fraction as F
+from multiprocessing import active_children
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.synthesis.analysis import gain_map as maps
 from quakedesign.synthesis.analysis.certify import closed_loop
 from quakedesign.synthesis.analysis.gain_map import SHARES, axis, gain_map
-from quakedesign.synthesis.analysis.gain_map_workers import Crew, Screener
+from quakedesign.synthesis.analysis.gain_map_workers import Screener, Screeners
 from quakedesign.synthesis.lyapunov.search import find_certificate
 
 SPECIFICATION = importlib.util.spec_from_file_location(
@@ -113,14 +114,15 @@ def test_an_interrupted_map_leaves_no_process_waiting(monkeypatch):
 
     with pytest.raises(KeyboardInterrupt):
         gain_map("super-twisting", ("1.5", "1.1"), ("k1", "k2"), tell=stop, **ASKED)
+    assert not active_children()
 
 
 def test_processes_give_the_same_answers_even_if_they_are_killed():
     sheet = maps._sheet("super-twisting", ("1.5", "1.1"), ("k1", "k2"), RANGES, 3, ("1",), (1, 1), 4)
     alone = Screener(sheet)
-    with Crew(sheet, 2) as crew:
+    with Screeners(sheet, 2) as crew:
         first = [found for found, _ in crew.answers("row", [(row,) for row in sheet.rows])]
-        for process in list(crew._pool._processes.values()):
+        for process in active_children():
             process.kill()
         second = list(crew.answers("proof", [((2, 2), 1)]))
     assert sorted(first) == sorted(alone.row(row)[0] for row in sheet.rows)

@@ -1,15 +1,12 @@
-"""Who computes the batches: processes on this machine, a cluster, or any executor of `concurrent.futures`."""
+"""Who computes the batches besides processes on this machine: a cluster, or any executor of `concurrent.futures`."""
 
-import os
-from abc import ABC, abstractmethod
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from multiprocessing import get_context
+from concurrent.futures import Executor, Future
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
-from quakedesign.errors import ParameterError, SimulationError
-from quakedesign.simulation.campaign.worker import enlist
+from quakedesign.errors import SimulationError
+from quakedesign.workers import Crew, cores
 
 _PATIENCE = "10s"
 
@@ -25,83 +22,6 @@ class SerialExecutor(Executor):
         except Exception as error:
             future.set_exception(error)
         return future
-
-
-class Crew(ABC):
-    """Workers behind an executor, which a context opens and closes."""
-
-    @property
-    @abstractmethod
-    def width(self) -> int:
-        """Number of batches that are worth having under way at once."""
-
-    @abstractmethod
-    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """Start a task."""
-
-    @abstractmethod
-    def renew(self) -> None:
-        """Replace workers that are dead.
-
-        Raises
-        ------
-        SimulationError
-            When that is not possible.
-        """
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        return None
-
-
-class Processes(Crew):
-    """A pool of processes on this machine, each started afresh; it is filled again after a death.
-
-    Parameters
-    ----------
-    count : int or None
-        One process per core that this process may use, unless given.
-
-    Raises
-    ------
-    ParameterError
-    """
-
-    def __init__(self, count: int | None = None) -> None:
-        if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
-            raise ParameterError(f"workers must be a whole number of at least 1. Received {count!r}.")
-        self._count = count or cores()
-        self._context = get_context("spawn")
-        self._stop = self._context.Event()
-        self._pool: Executor = self._filled()
-
-    def _filled(self) -> Executor:
-        return ProcessPoolExecutor(self._count, self._context, enlist, (self._stop,))
-
-    @property
-    def width(self) -> int:
-        """See `Crew.width`."""
-        return self._count
-
-    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """See `Crew.submit`."""
-        return self._pool.submit(task, *arguments)
-
-    def renew(self) -> None:
-        """See `Crew.renew`."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        self._pool = self._filled()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is not None:
-            self._stop.set()
-        self._pool.shutdown(wait=True, cancel_futures=True)
 
 
 class Given(Crew):
@@ -171,8 +91,3 @@ class Cluster(Given):
     ) -> None:
         self._executor.shutdown(wait=False)
         self._client.close()
-
-
-def cores() -> int:
-    """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from typing import Any
 
-from quakedesign.simulation.campaign.crews import Crew
+from quakedesign.workers import Crew
 
 ATTEMPTS = 3
 _MOST_DEATHS = 2 * ATTEMPTS  # in a row: then the workers themselves do not live

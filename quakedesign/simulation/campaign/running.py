@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.simulation.campaign.crews import Cluster, Crew, Given, Processes
+from quakedesign.simulation.campaign.crews import Cluster, Given
 from quakedesign.simulation.campaign.dispatch import dispatch
 from quakedesign.simulation.campaign.ledger import Ledger
 from quakedesign.simulation.campaign.problem import Problem, SampleResult
@@ -25,6 +25,8 @@ from quakedesign.simulation.loading import Load
 from quakedesign.simulation.metrics import ActuatorMetrics
 from quakedesign.simulation.run import Setting
 from quakedesign.simulation.schemes import Scheme, simulation_scheme
+from quakedesign.temporary import temporary_folder
+from quakedesign.workers import Crew, Processes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -134,9 +136,8 @@ def run_campaign(
         raise ParameterError("give a scheduler or an executor. Received both. Leave one out.")
     began = perf_counter()
     ledger = Ledger.open(Path(folder), problem.inputs, renew=renew)
-    program = problem.program.compiled(Path(folder))
-    with _crew(workers, scheduler, executor) as crew:
-        runner = _Runner(problem, ledger, program, crew, batch, tell)
+    with temporary_folder() as private, _crew(workers, scheduler, executor) as crew:
+        runner = _Runner(problem, ledger, problem.program.compiled(private), crew, batch, tell)
         chosen = [problem.sample(i) for i in range(samples)]
         results = runner.results(chosen, list(map(str, range(samples))), "samples")
         worst = runner.search(results, metric, rounds) if metric else None

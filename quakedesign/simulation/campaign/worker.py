@@ -1,20 +1,13 @@
-"""What runs in a worker: one batch of samples, in slices, so that it can be stopped."""
+"""What runs in a worker: one batch of samples, in slices, so that it can be interrupted."""
 
-import os
-import signal
-from multiprocessing import parent_process
-from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from quakedesign.errors import SimulationError
 from quakedesign.simulation.campaign.program import Program, mover
 
 if TYPE_CHECKING:
     import numpy as np
 
-SLICE = 200_000  # steps of all samples together between two looks at the stop sign: a fraction of a second
-
-_stop: Any = None
+SLICE = 200_000  # steps of all samples together in one call of compiled code, which is deaf: a fraction of a second
 
 
 def advance(program: Program, starts: "np.ndarray", steps: int) -> "np.ndarray":
@@ -26,11 +19,6 @@ def advance(program: Program, starts: "np.ndarray", steps: int) -> "np.ndarray":
     starts : ndarray
         Shape (samples, size).
     steps : int
-
-    Raises
-    ------
-    SimulationError
-        When the campaign has been interrupted.
     """
     import numpy as np
 
@@ -38,28 +26,5 @@ def advance(program: Program, starts: "np.ndarray", steps: int) -> "np.ndarray":
     vectors = np.array(starts, dtype=np.float64, order="C", ndmin=2)
     slice_ = max(1, SLICE // len(vectors))
     for taken in range(0, steps, slice_):
-        if _stop is not None and _stop.is_set():
-            raise SimulationError("the campaign must go on. Received an interruption. Run it again to resume.")
         move(vectors, min(slice_, steps - taken))
     return vectors
-
-
-def enlist(stop: Any) -> None:
-    """Prepare a process of a pool: the parent handles Ctrl-C, and nobody survives the parent.
-
-    Parameters
-    ----------
-    stop : multiprocessing.Event
-        Set by the parent to end unfinished batches.
-    """
-    global _stop
-    _stop = stop
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_follow_parent, daemon=True).start()
-
-
-def _follow_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -13,7 +13,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import MOST_WORKERS, require_count
 from quakedesign.rationals import rational
 from quakedesign.synthesis.analysis.certify import Number, closed_loop
-from quakedesign.synthesis.analysis.gain_map_workers import Crew, Place, Sheet
+from quakedesign.synthesis.analysis.gain_map_workers import Place, Screeners, Sheet
 from quakedesign.synthesis.analysis.margins import necessary_limit
 from quakedesign.synthesis.analysis.parametric_program import CLEAR, Sweep
 from quakedesign.synthesis.lyapunov.search import candidate_degrees
@@ -128,11 +128,11 @@ def gain_map(
     """
     require_count(MOST_WORKERS, workers=workers)
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
-    with Crew(sheet, workers) as crew:
+    with Screeners(sheet, workers) as screeners:
         began = perf_counter()
-        limits, screened, solves = _screen(sheet, crew, tell)
+        limits, screened, solves = _screen(sheet, screeners, tell)
         middle = perf_counter()
-        proved, texts, edges, more = _prove(sheet, crew, dict(screened), interior, seed, tell)
+        proved, texts, edges, more = _prove(sheet, screeners, dict(screened), interior, seed, tell)
         ended = perf_counter()
     return GainMap(
         sheet=sheet,
@@ -216,14 +216,14 @@ def _lowest_degree(loop: Loop, bound: Fraction) -> int:
 
 
 def _screen(
-    sheet: Sheet, crew: Crew, tell: Callable[[str, float], None]
+    sheet: Sheet, screeners: Screeners, tell: Callable[[str, float], None]
 ) -> tuple[dict[Place, Fraction | None], dict[Place, int], int]:
     """Limit and screened level of every point, and solves."""
     limits: dict[Place, Fraction | None] = {}
     screened: dict[Place, int] = {}
     rows, solves = sheet.rows, 0
     tell(f"screening 0 of {sum(map(len, rows))} points", 0.0)
-    for found, more in crew.answers("row", ((row,) for row in rows)):
+    for found, more in screeners.answers("row", ((row,) for row in rows)):
         solves += more
         for place, limit, reached in found:
             limits[place], screened[place] = limit, reached
@@ -232,7 +232,12 @@ def _screen(
 
 
 def _prove(
-    sheet: Sheet, crew: Crew, reached: dict[Place, int], interior: int, seed: int, tell: Callable[[str, float], None]
+    sheet: Sheet,
+    screeners: Screeners,
+    reached: dict[Place, int],
+    interior: int,
+    seed: int,
+    tell: Callable[[str, float], None],
 ) -> tuple[dict[Place, int], dict[Place, str], frozenset[Place], int]:
     """Proved level of the points at edges and of random ones, certificates, edges, and solves.
 
@@ -245,7 +250,7 @@ def _prove(
 
     def run(asked: list[tuple[Place, int]], what: str) -> None:
         nonlocal solves
-        for done, (place, level, text, more) in enumerate(crew.answers("proof", asked), 1):
+        for done, (place, level, text, more) in enumerate(screeners.answers("proof", asked), 1):
             solves += more
             if text is None:
                 reached[place] = level - 1

@@ -1,25 +1,21 @@
 """Who computes the points of a map: what is asked at each, and processes that keep their compiled sweeps."""
 
 import os
-import signal
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from multiprocessing import get_context
 from typing import Any, Self
 
 from quakedesign.certificates import Loop, certificate_text
 from quakedesign.certificates.claim import root_enclosure
 from quakedesign.controllers import Subject
-from quakedesign.errors import CertificateError, SimulationError
+from quakedesign.errors import CertificateError
 from quakedesign.synthesis.analysis.margins import necessary_limit, prove
 from quakedesign.synthesis.analysis.parametric_program import CLEAR, Sweep
+from quakedesign.workers import Processes
 
 Place = tuple[int, int]
 _FAST = 1e-8
-_LIVES = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,8 +121,8 @@ class Screener:
         return sum(s.solves for s in self._sweeps)
 
 
-class Crew:
-    """Processes, or this one, that answer questions about a sheet.
+class Screeners:
+    """Screeners of a sheet, in processes or in this one.
 
     Parameters
     ----------
@@ -136,19 +132,15 @@ class Crew:
     """
 
     def __init__(self, sheet: Sheet, workers: int) -> None:
-        self._sheet, self._workers = sheet, workers
         self._own = Screener(sheet) if workers == 1 else None
-        self._pool = None if workers == 1 else self._filled()
-
-    def _filled(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self._workers, get_context("spawn"), _begin, (self._sheet,))
+        self._crew = None if workers == 1 else Processes(workers, _begin, (sheet,))
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
+    def __exit__(self, *error: Any) -> None:
+        if self._crew is not None:
+            self._crew.__exit__(*error)
 
     def answers(self, question: str, arguments: Iterable[tuple]) -> Iterator[Any]:
         """Answers of one method of `Screener` to many arguments, in any order.
@@ -158,36 +150,19 @@ class Crew:
         SimulationError
             When processes die again and again; one that was killed from outside is replaced.
         """
-        if self._own is not None:
+        if self._crew is None:
             yield from (getattr(self._own, question)(*one) for one in arguments)
-            return
-        waiting = list(arguments)
-        for _ in range(_LIVES):
-            try:
-                for one, answer in self._done(question, waiting):
-                    waiting.remove(one)
-                    yield answer
-                return
-            except BrokenProcessPool:
-                self._pool = self._filled()
-        raise SimulationError(
-            f"the processes of the map died {_LIVES} times, with {len(waiting)} tasks left. Ask for fewer workers."
-        )
-
-    def _done(self, question: str, waiting: Sequence[tuple]) -> Iterator[tuple[tuple, Any]]:
-        assert self._pool is not None
-        futures = {self._pool.submit(_answer, question, one): one for one in waiting}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
+        else:
+            found = self._crew.answers(_answer, [(question, one) for one in arguments])
+            yield from (answer for _, answer in found)
 
 
 _screener: list[Screener] = []
 
 
 def _begin(sheet: Sheet) -> None:
-    """Start a worker: one thread, and interruptions left to the process that asks."""
+    """Start a worker, on one thread."""
     os.environ["OMP_NUM_THREADS"] = "1"
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _screener.append(Screener(sheet))
 
 

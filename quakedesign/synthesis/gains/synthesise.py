@@ -1,12 +1,10 @@
 """Gains and Lyapunov function found together for an objective; gains without a proof are never returned."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from itertools import islice
-from multiprocessing import get_context
 
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.controllers import Subject
@@ -16,6 +14,7 @@ from quakedesign.synthesis.gains.dilation import scaled_norm
 from quakedesign.synthesis.gains.objectives import SmallestNorm
 from quakedesign.synthesis.gains.path_following import FAINT, Setting, State, climb, look, short, with_gains
 from quakedesign.synthesis.gains.problem import Question, begin_with, question
+from quakedesign.workers import Processes
 
 _STRETCHES = (1.0, 1.5, 4.0)
 _DRAWS = 12
@@ -193,9 +192,10 @@ def _climbed(setting: Setting, first: Sequence[Loop], wanted: int, workers: int)
     done: list[list[State]] = []
     if workers == 1:
         return list(islice((states for states in map(job, first) if states), wanted))
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+    with Processes(workers) as crew:
         for at in range(0, len(first), workers):
-            done += [states for states in pool.map(job, first[at : at + workers]) if states]
+            found = dict(crew.answers(job, [(loop,) for loop in first[at : at + workers]]))
+            done += [found[place] for place in sorted(found) if found[place]]
             if len(done) >= wanted:
                 break
     return done[:wanted]

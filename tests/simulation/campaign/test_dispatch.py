@@ -5,8 +5,9 @@ from concurrent.futures import BrokenExecutor, CancelledError, Future
 import pytest
 
 from quakedesign.errors import SimulationError
-from quakedesign.simulation.campaign.crews import Crew, Given, Processes, SerialExecutor
+from quakedesign.simulation.campaign.crews import Given, SerialExecutor
 from quakedesign.simulation.campaign.dispatch import ATTEMPTS, dispatch
+from quakedesign.workers import Crew, Processes
 
 
 class Frail(Crew):

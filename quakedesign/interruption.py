@@ -1,0 +1,132 @@
+"""Signals that end a command: one line, the exit code of the shell, no process and no temporary folder left."""
+
+import os
+import select
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Thread, current_thread, main_thread
+from time import monotonic
+from types import FrameType
+from typing import Any
+
+from quakedesign.output import number_placed
+from quakedesign.temporary import discard_all, sweep_system
+from quakedesign.text import one_line
+
+_NAMES = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
+SIGNALS = {getattr(signal, name): said for name, said in _NAMES.items() if hasattr(signal, name)}
+"""What is said of each; SIGHUP is not everywhere."""
+PATIENCE = 3.0  # seconds: what a library has swallowed, or does not return from, is not waited for any longer
+
+
+class _Ending:
+    """What is known of the end of a command."""
+
+    def __init__(self) -> None:
+        self._number: int | None = None
+        self._said = False
+        self._before = number_placed()
+        self.remedy: str | None = None
+
+    def receive(self, number: int, _frame: FrameType | None) -> None:
+        """Handle the first signal; further ones do not disturb the end."""
+        if self._number is None:
+            self._number = number
+            raise KeyboardInterrupt
+
+    def watch(self, reader: int) -> None:
+        """End the process where it has not ended by itself some time after a signal."""
+        number, end = None, None
+        while select.select([reader], [], [], None if end is None else max(0.0, end - monotonic()))[0]:
+            if not (received := os.read(reader, 1)):
+                os.close(reader)
+                return
+            if end is None and received[0] in SIGNALS:
+                number, end = received[0], monotonic() + PATIENCE
+        self._number = self._number or number
+        os._exit(self._conclude())
+
+    @contextmanager
+    def concluded(self) -> Iterator[None]:
+        """Whatever arrives here after a signal is its doing: libraries make other exceptions of it."""
+        try:
+            yield
+        except BaseException as error:
+            if self._number is None and not isinstance(error, KeyboardInterrupt):
+                raise
+            raise SystemExit(self._conclude()) from None
+
+    def _conclude(self) -> int:
+        """Leave no process and no temporary folder behind, say so once, and return the exit code."""
+        processes: Any = sys.modules.get("multiprocessing")
+        for child in processes.active_children() if processes else ():
+            child.kill()
+        discard_all()
+        number = self._number or signal.SIGINT
+        if not self._said:
+            self._said = True
+            kept = "nothing was written" if number_placed() == self._before else "what was written is whole"
+            _say(one_line(f"quakedesign: {SIGNALS[number]}; {self.remedy or kept}."))
+        return 128 + number
+
+
+_ending: _Ending | None = None
+
+
+def remedy(text: str) -> None:
+    """Say this, instead of whether anything was written, if the command is interrupted from now on."""
+    if _ending is not None:
+        _ending.remedy = text
+
+
+@contextmanager
+def ending() -> Iterator[None]:
+    """Turn the signals of `SIGNALS`, unless they are ignored, into one line and `SystemExit` with 128 + signal.
+
+    They raise `KeyboardInterrupt` in the block, so that it can put things in order. Whatever becomes of that, the
+    command ends as was asked; what has not ended within `PATIENCE` is ended. A block in another one leaves them to it.
+    """
+    global _ending
+    if _ending is not None:
+        with _ending.concluded():
+            yield
+        return
+    _ending = new = _Ending()
+    sweep_system()
+    try:
+        with new.concluded(), _received(new), new.concluded():
+            yield
+    finally:
+        _ending = None
+
+
+@contextmanager
+def _received(by: _Ending) -> Iterator[None]:
+    """Signals are received, and a thread sees them too while the main one is busy with foreign code."""
+    if current_thread() is not main_thread():
+        yield
+        return
+    handled = [number for number in SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    Thread(target=by.watch, args=(reader,), daemon=True).start()
+    woken = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    before = {number: signal.getsignal(number) for number in handled}
+    try:
+        for number in handled:
+            signal.signal(number, by.receive)
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(woken)
+        os.close(writer)
+
+
+def _say(line: str) -> None:
+    try:
+        print(line, file=sys.stderr, flush=True)
+    except (OSError, ValueError):  # the terminal is gone
+        return

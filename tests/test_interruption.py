@@ -1,0 +1,127 @@
+"""Signals that end a command: one line and the exit code of the shell, whatever libraries make of them."""
+
+import os
+import signal
+import time
+
+import pytest
+
+from quakedesign.interruption import SIGNALS, ending, remedy
+from quakedesign.output import write_whole
+
+
+@pytest.fixture(autouse=True)
+def _ordinary():
+    """The signals of the tests themselves are ordinary ones, even in a job that ignores them."""
+    before = {number: signal.signal(number, signal.default_int_handler) for number in SIGNALS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def ended(block, capsys):
+    with pytest.raises(SystemExit) as found, ending():
+        block()
+    assert all(signal.getsignal(number) is signal.default_int_handler for number in SIGNALS)
+    return found.value.code, capsys.readouterr().err
+
+
+def send(number):
+    os.kill(os.getpid(), number)
+    time.sleep(1)
+
+
+@pytest.mark.parametrize(("number", "said"), SIGNALS.items(), ids=[number.name for number in SIGNALS])
+def test_one_line_and_the_exit_code_of_the_shell(capsys, number, said):
+    assert ended(lambda: send(number), capsys) == (128 + number, f"quakedesign: {said}; nothing was written.\n")
+
+
+def test_what_a_library_makes_of_it_is_still_an_interruption(capsys):
+    def block():
+        try:
+            send(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise ImportError("numpy.core.multiarray failed to import") from None
+
+    assert ended(block, capsys) == (143, "quakedesign: terminated; nothing was written.\n")
+
+
+def test_further_signals_do_not_disturb_the_end(capsys):
+    done = []
+
+    def block():
+        try:
+            send(signal.SIGTERM)
+        finally:
+            for number in SIGNALS:
+                os.kill(os.getpid(), number)
+            time.sleep(0.01)
+            done.append("in order")
+
+    assert ended(block, capsys)[0] == 143
+    assert done == ["in order"]
+
+
+def test_an_ignored_signal_stays_ignored(capsys):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with ending():
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    assert capsys.readouterr().err == ""
+
+
+def test_inner_blocks_leave_the_signals_to_the_outer_one(capsys):
+    def block():
+        with ending():
+            send(signal.SIGTERM)
+
+    assert ended(block, capsys) == (143, "quakedesign: terminated; nothing was written.\n")
+
+
+def test_what_was_written_is_not_denied(capsys, tmp_path):
+    def block():
+        write_whole(tmp_path / "result", "x")
+        raise KeyboardInterrupt
+
+    assert ended(block, capsys) == (130, "quakedesign: interrupted; what was written is whole.\n")
+
+
+def test_a_command_may_say_how_to_go_on(capsys):
+    def block():
+        remedy("the same command\ngoes on")
+        raise KeyboardInterrupt
+
+    assert ended(block, capsys) == (130, "quakedesign: interrupted; the same command goes on.\n")
+
+
+def test_other_errors_pass(capsys):
+    with pytest.raises(ZeroDivisionError), ending():
+        divmod(1, 0)
+    assert capsys.readouterr().err == ""
+
+
+SWALLOWS = """
+import time
+from quakedesign.interruption import ending
+from quakedesign.temporary import temporary_folder
+
+with ending(), temporary_folder():
+    while True:
+        try:
+            print("there", flush=True)
+            time.sleep(600)
+        except KeyboardInterrupt:
+            pass
+"""
+
+
+def test_an_interruption_that_is_swallowed_ends_the_process_all_the_same(start, tmp_path):
+    (tmp_path / "tmp").mkdir()
+    process = start("-c", SWALLOWS, TMPDIR=tmp_path / "tmp")
+    assert process.stdout.readline() == "there\n"
+    assert os.listdir(tmp_path / "tmp")
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=10)
+    assert (process.returncode, err) == (143, "quakedesign: terminated; nothing was written.\n")
+    assert not os.listdir(tmp_path / "tmp")

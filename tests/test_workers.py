@@ -1,0 +1,72 @@
+"""Processes of a pool end with the process that asks, however that ends."""
+
+import os
+import signal
+import sys
+
+import pytest
+
+from quakedesign.workers import Processes
+
+PROGRAM = """
+import sys, time
+from quakedesign.interruption import ending
+from quakedesign.workers import Processes
+
+def work(kind):
+    print("there", flush=True)
+    while kind == "idle":
+        time.sleep(1)
+    while kind == "busy":
+        pass
+    sum(range(10**12))  # foreign code, in which no thread of the process has its turn
+
+if __name__ == "__main__":
+    with ending(), Processes(2) as crew:
+        list(crew.answers(work, [(sys.argv[1],)] * 2))
+"""
+KINDS = ["idle", "busy", *(["foreign"] if sys.platform == "linux" else [])]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("number", "code", "said"),
+    [
+        (signal.SIGINT, 130, "quakedesign: interrupted; nothing was written.\n"),
+        (signal.SIGTERM, 143, "quakedesign: terminated; nothing was written.\n"),
+        (signal.SIGHUP, 129, "quakedesign: hung up; nothing was written.\n"),
+        (signal.SIGKILL, -signal.SIGKILL, ""),
+    ],
+    ids=lambda value: value.name if isinstance(value, signal.Signals) else "",
+)
+def test_nobody_outlives_the_process_that_asks(start, tmp_path, number, code, said, kind):
+    (tmp_path / "program.py").write_text(PROGRAM)
+    process = start("program.py", kind)
+    assert [process.stdout.readline() for _ in range(2)] == ["there\n"] * 2
+    process.send_signal(number)
+    _, err = process.communicate(timeout=5)
+    assert process.returncode == code
+    assert err == said or not said
+
+
+def test_interruptions_of_the_whole_group_are_one_line_from_the_start(start, tmp_path):
+    """Ctrl-C reaches the workers too, which may have just begun to start."""
+    (tmp_path / "program.py").write_text("print('begun', flush=True)\n" + PROGRAM)
+    process = start("program.py", "idle")
+    assert [process.stdout.readline() for _ in range(2)] == ["begun\n"] * 2  # of the parent, and of a worker
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=5)
+    assert (process.returncode, err) == (130, "quakedesign: interrupted; nothing was written.\n")
+
+
+def test_a_worker_that_was_killed_is_replaced_and_answers_keep_their_places():
+    with Processes(2) as crew:
+        (answer,) = crew.answers(os.getpid, [()])
+        os.kill(answer[1], signal.SIGKILL)
+        found = dict(crew.answers(divmod, [(i, 7) for i in range(20)]))
+    assert found == {i: divmod(i, 7) for i in range(20)}
+
+
+def test_an_error_of_a_task_is_that_of_the_caller():
+    with pytest.raises(ZeroDivisionError), Processes(1) as crew:
+        list(crew.answers(divmod, [(1, 0)]))
