@@ -2,19 +2,17 @@
 
 import ctypes
 import hashlib
-import platform
 import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.output import write_whole
-from quakedesign.simulation.backend import FLAGS, Backend, compiler, ladder, shared_library
+from quakedesign.simulation.backend import Backend, compiler, ladder, shared_library
 from quakedesign.simulation.stepping import Advancer
+from quakedesign.temporary import temporary_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -51,6 +49,42 @@ CASADI_SYMBOL_EXPORT int advance_samples(double* vectors, long long samples, lon
 
 
 @dataclass(frozen=True, kw_only=True)
+class Library:
+    """Compiled source, bound to its content: whoever loads it makes sure that it is what was built.
+
+    Attributes
+    ----------
+    path : Path
+    digest : str
+    """
+
+    path: Path
+    digest: str
+
+    @classmethod
+    def of(cls, path: Path) -> "Library":
+        """Library that has just been built in a private place."""
+        return cls(path=path, digest=_digest(path.read_bytes()))
+
+    def content(self) -> bytes:
+        """What was built.
+
+        Raises
+        ------
+        OSError
+            When it is not there any more, or something else is.
+        """
+        content = self.path.read_bytes()
+        if _digest(content) != self.digest:
+            raise OSError(f"{self.path} is not what was built")
+        return content
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Program:
     """What a worker needs to move samples on; it can be sent anywhere.
 
@@ -64,15 +98,15 @@ class Program:
         Length of the vector of one sample.
     diverged : int
         Index of the time of divergence in it.
-    library : str or None
-        Path of the compiled source, where somebody has compiled it already.
+    library : Library or None
+        Where somebody has compiled the source already.
     """
 
     source: str
     function: str
     size: int
     diverged: int
-    library: str | None = None
+    library: Library | None = None
 
     @classmethod
     def of(cls, step: Any, diverged: int) -> "Program":
@@ -99,36 +133,35 @@ class Program:
         return hashlib.sha256(self.function.encode()).hexdigest()
 
     def compiled(self, folder: Path) -> "Program":
-        """Program whose library lies in a folder; the same program where no compiler works."""
+        """Program whose library lies in a folder, which must be private; the same program where no compiler works."""
         try:
-            command = compiler()
-            told = "\n".join((self.source, *command, *FLAGS, platform.machine(), platform.system()))
-            library = folder / f"steps-{hashlib.sha256(told.encode()).hexdigest()[:16]}.so"
-            if not library.exists():
-                with TemporaryDirectory(prefix="quakedesign-", ignore_cleanup_errors=True) as scratch:
-                    write_whole(library, shared_library(self.source, Path(scratch), command).read_bytes())
-            return replace(self, library=str(library.absolute()))
+            return replace(self, library=Library.of(shared_library(self.source, folder, compiler())))
         except (OSError, subprocess.SubprocessError):
             return self
 
 
 @lru_cache(maxsize=8)
 def mover(program: Program) -> Mover:
-    """Callable (vectors, steps) that moves vectors, one a row, on in place: machine code where it can be had."""
-    with TemporaryDirectory(prefix="quakedesign-", ignore_cleanup_errors=True) as scratch:
-        for found in (lambda: program.library, lambda: program.compiled(Path(scratch)).library):
+    """Callable (vectors, steps) that moves vectors, one a row, on in place: machine code where it can be had.
+
+    A library that is missing or is not what was built, as on another machine, is built anew.
+    """
+    with temporary_folder() as folder:
+        for given in (program, replace(program, library=None)):
             try:
-                if library := found():
-                    return _machine_code(library, program.size)
+                if library := (given if given.library else given.compiled(folder)).library:
+                    return _machine_code(library.content(), folder, program.size)
             except (OSError, AttributeError):
                 continue
     return _virtual_machine(program)
 
 
-def _machine_code(library: str, size: int) -> Mover:
+def _machine_code(content: bytes, folder: Path, size: int) -> Mover:
     import numpy as np
 
-    advance = ctypes.CDLL(library).advance_samples
+    library = folder / "loaded.so"
+    library.write_bytes(content)
+    advance = ctypes.CDLL(str(library)).advance_samples
     rows = np.ctypeslib.ndpointer(dtype=np.float64, ndim=2, flags="C_CONTIGUOUS")
     advance.argtypes, advance.restype = [rows, ctypes.c_longlong, ctypes.c_longlong], ctypes.c_int
 

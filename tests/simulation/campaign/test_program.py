@@ -1,11 +1,15 @@
 """The compiled call over many samples has the digits of one run, and of the virtual machine."""
 
+import ctypes
+import os
+
 import numpy as np
 import pytest
 
 from quakedesign.controllers import published
 from quakedesign.fault import load_fault
 from quakedesign.simulation import Variation, simulate
+from quakedesign.simulation.backend import compiler, shared_library
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign import worker as worker_module
 from quakedesign.simulation.campaign.program import mover
@@ -51,20 +55,65 @@ def test_slices_and_company_change_nothing(ends, monkeypatch):
         assert advance(PROBLEM.program, starts(16)[[i, 3]], STEPS)[0].tobytes() == ends[i].tobytes()
 
 
-def test_a_library_that_cannot_be_loaded_is_made_anew(ends, tmp_path):
-    from dataclasses import replace
-
-    (tmp_path / "no.so").write_bytes(b"none")
-    for library in (tmp_path / "no.so", tmp_path / "missing.so"):
-        found = advance(replace(PROBLEM.program, library=str(library)), starts(2), STEPS)
-        assert found.tobytes() == ends[:2].tobytes()
+PLANTED = """
+#include <stdio.h>
+__attribute__((constructor)) static void sign(void) {{ fclose(fopen("{mark}", "w")); }}
+int advance_samples(double* vectors, long long samples, long long steps) {{ return 0; }}
+"""
 
 
-def test_a_compiled_library_is_used_again(tmp_path):
-    first = PROBLEM.program.compiled(tmp_path).library
-    before = (tmp_path / first).stat().st_mtime_ns
-    assert PROBLEM.program.compiled(tmp_path).library == first
-    assert (tmp_path / first).stat().st_mtime_ns == before
+@pytest.fixture
+def plant(tmp_path):
+    """Replaces a library by one that leaves a mark as soon as it is loaded, and computes nothing."""
+    mark = tmp_path / "loaded"
+
+    def replace_library(path):
+        library = shared_library(PLANTED.format(mark=mark), tmp_path, compiler())
+        os.replace(library, path)
+        return mark
+
+    return replace_library
+
+
+def test_the_planted_library_of_these_tests_would_be_seen(plant, tmp_path):
+    mark = plant(tmp_path / "planted.so")
+    ctypes.CDLL(str(tmp_path / "planted.so"))
+    assert mark.exists()
+
+
+def test_a_planted_library_is_not_loaded(ends, plant, tmp_path):
+    program = PROBLEM.program.compiled(tmp_path)
+    mark = plant(program.library.path)
+    assert advance(program, starts(2), STEPS).tobytes() == ends[:2].tobytes()
+    assert not mark.exists()
+
+
+@pytest.mark.parametrize("left", [0.0, 0.5, 0.99])
+def test_a_damaged_library_is_built_anew(ends, tmp_path, left):
+    program = PROBLEM.program.compiled(tmp_path)
+    content = program.library.path.read_bytes()
+    program.library.path.write_bytes(content[: int(left * len(content))])
+    assert advance(program, starts(2), STEPS).tobytes() == ends[:2].tobytes()
+
+
+def test_a_library_that_is_gone_is_built_anew(ends, tmp_path):
+    program = PROBLEM.program.compiled(tmp_path)
+    program.library.path.unlink()
+    assert advance(program, starts(2), STEPS).tobytes() == ends[:2].tobytes()
+
+
+def test_nothing_compiled_in_its_folder_changes_a_campaign(ends, plant, tmp_path):
+    """Whatever a folder of results holds comes from whoever may write there."""
+    from quakedesign.simulation.campaign import SerialExecutor, run_campaign
+
+    folder = tmp_path / "campaign"
+    run_campaign(PROBLEM, 2, folder, executor=SerialExecutor())
+    for path in [*folder.rglob("*.so"), folder / "steps.so"]:
+        mark = plant(path)
+    found = run_campaign(PROBLEM, 4, folder, executor=SerialExecutor())
+    assert list(found.results) == PROBLEM.results(ends[:4])
+    assert not mark.exists()
+    assert [path.name for path in folder.rglob("*.so")] == ["steps.so"]
 
 
 def test_a_sample_is_what_simulate_gives():
