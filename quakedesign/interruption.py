@@ -21,6 +21,14 @@ SIGNALS = {getattr(signal, name): said for name, said in _NAMES.items() if hasat
 PATIENCE = 3.0  # seconds: what a library has swallowed, or does not return from, is not waited for any longer
 
 
+class Interruption(KeyboardInterrupt):
+    """A signal asks for the end.
+
+    After a plain `KeyboardInterrupt` that has gone through ``exec`` of a text, as in generated classes, Python dies of
+    SIGINT when it ends, whatever the exit code.
+    """
+
+
 class _Ending:
     """What is known of the end of a command."""
 
@@ -34,7 +42,7 @@ class _Ending:
         """Handle the first signal; further ones do not disturb the end."""
         if self._number is None:
             self._number = number
-            raise KeyboardInterrupt
+            raise Interruption
 
     def watch(self, reader: int) -> None:
         """End the process where it has not ended by itself some time after a signal."""
@@ -85,7 +93,7 @@ def remedy(text: str) -> None:
 def ending() -> Iterator[None]:
     """Turn the signals of `SIGNALS`, unless they are ignored, into one line and `SystemExit` with 128 + signal.
 
-    They raise `KeyboardInterrupt` in the block, so that it can put things in order. Whatever becomes of that, the
+    They raise `Interruption` in the block, so that it can put things in order. Whatever becomes of that, the
     command ends as was asked; what has not ended within `PATIENCE` is ended. A block in another one leaves them to it.
     """
     global _ending

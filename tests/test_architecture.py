@@ -16,7 +16,9 @@ import quakedesign
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "quakedesign"
-EVERYWHERE = {f"quakedesign.{name}" for name in ("errors", "rationals", "input", "output", "temporary", "text", "bounds")}
+EVERYWHERE = {
+    f"quakedesign.{name}" for name in ("errors", "rationals", "input", "output", "temporary", "text", "bounds")
+}
 BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "loop", "certificates", "simulation")
 MAY_IMPORT = {
     "fault": (),

@@ -101,6 +101,20 @@ def test_other_errors_pass(capsys):
     assert capsys.readouterr().err == ""
 
 
+GENERATED = """
+from quakedesign.interruption import ending
+with ending():
+    exec("import signal; signal.raise_signal(signal.SIGTERM)")
+"""
+
+
+def test_the_exit_code_is_that_of_the_signal_even_within_generated_code(start, tmp_path):
+    (tmp_path / "program.py").write_text(GENERATED)
+    process = start("-m", "program")
+    _, err = process.communicate(timeout=10)
+    assert (process.returncode, err) == (143, "quakedesign: terminated; nothing was written.\n")
+
+
 SWALLOWS = """
 import time
 from quakedesign.interruption import ending
