@@ -20,7 +20,7 @@ def test_every_proof_of_the_published_gains_is_a_file_that_checks(tmp_path):
     assert facts["peaks"] is None
     out = tmp_path / "k.json"
     paths = judged.save(out)
-    names = {"stability", "friction-slope", "low-beta", "high-beta", "inverse-optimal", "held", "held-1"}
+    names = {"stability", "friction-slope", "low-beta", "high-beta", "inverse-optimal", "held", "held-1", "held-2"}
     assert set(paths) == names
     assert paths["stability"] == str(out)
     verdicts = {verdict for verdict, _ in check_files([tmp_path / p for p in paths.values()]).values()}
