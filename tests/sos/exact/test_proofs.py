@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quakedesign.sos.exact.definiteness import nonnegative_definite, positive_definite
-from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares, holds
-from quakedesign.sos.exact.squares import Square, in_echelon_form
+from quakedesign.sos.exact.definiteness import full_matrix, nonnegative_definite, positive_definite
+from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares, holds, identity_holds
+from quakedesign.sos.exact.squares import Square, as_element, in_echelon_form
 from quakedesign.sos.exact.statement import statement
 
 ONE = Fraction(1)
@@ -149,3 +149,152 @@ def test_gram_products_are_non_negative_definite_and_minus_one_is_lost(rows):
     assert not nonnegative_definite(spoilt)
     if positive_definite(gram):
         assert len(rows) <= 3
+
+
+# ---------------------------------------------------------------- multipliers that are not positive prove nothing
+
+
+def in_x(polynomial, **options):
+    return statement(("x",), {(e,): Fraction(c) for e, c in polynomial.items()}, **options)
+
+
+X = {(1,): ONE}
+ALONE = Square(basis=((1,),), gram=(ONE,))
+UNIT = Square(basis=((0,),), gram=(ONE,))
+
+
+def test_a_multiplier_of_zero_proves_nothing():
+    assert not holds(in_x({0: -1}, multiplier={(0,): Fraction(0)}), SumOfSquares(squares=()))
+
+
+def test_one_positive_coefficient_does_not_make_a_multiplier():
+    """(1 - x^2)(1 - x^2) is a square, 1 - x^2 is negative at 2."""
+    asked = in_x({0: 1, 2: -1}, multiplier={(0,): ONE, (2,): -ONE})
+    square = Square(basis=({(0,): ONE, (2,): -ONE},), gram=(ONE,))
+    assert not holds(asked, SumOfSquares(squares=(square,)))
+
+
+def test_a_variable_that_is_not_positive_signs_no_multiplier():
+    """(1 + x)(1 + x) is a square, 1 + x is negative at -2, where -x >= 0."""
+    p = {0: 1, 1: 1}
+    asked = in_x(p, multiplier={(0,): ONE, (1,): ONE}, inequalities=({(1,): -ONE},))
+    square = Square(basis=({(0,): ONE, (1,): ONE},), gram=(ONE,))
+    assert not holds(asked, SumOfSquares(squares=(square,)))
+    there = in_x(p, multiplier={(0,): ONE, (1,): ONE}, inequalities=(X,))
+    assert holds(there, SumOfSquares(squares=(square,)))
+
+
+def test_a_multiplier_of_squares_must_hold_one_where_the_set_is_thin():
+    """x^2 (-1) = -1 x^2 on x^2 = 0, and the multiplier x^2 is no proof of -1 >= 0; nor is one with a weight."""
+    cofactors = ({(0,): -ONE},)
+    point = in_x({0: -1}, multiplier={(2,): ONE}, equalities=({(2,): ONE},))
+    assert not holds(point, SumOfSquares(squares=(), cofactors=cofactors, multiplier=(ALONE,)))
+    ball = statement(
+        ("x",), {(0,): -ONE}, equalities=({(2,): ONE},), inequalities=({(2,): ONE},), multiplier={(2,): ONE}
+    )
+    weighted = Square(product=(0,), basis=((0,),), gram=(ONE,))
+    assert not holds(ball, SumOfSquares(squares=(), cofactors=cofactors, multiplier=(weighted,)))
+
+
+def test_a_multiplier_of_several_squares_holds_with_one_among_them():
+    asked = in_x({2: 1}, multiplier={(0,): ONE, (2,): ONE}, equalities=({(1,): ONE},))
+    squares = (Square(basis=((1,), (2,)), gram=(ONE, Fraction(0), ONE)),)
+    assert holds(asked, SumOfSquares(squares=squares, cofactors=({},), multiplier=(UNIT, ALONE)))
+    assert holds(asked, SumOfSquares(squares=squares, cofactors=({},), multiplier=(ALONE, UNIT)))
+
+
+def test_every_square_of_a_multiplier_is_one():
+    """2*1 and -1*x^2 add up to 2 - x^2, which is negative at 2."""
+    multiplier = {(0,): Fraction(2), (2,): -ONE}
+    asked = in_x({0: 2, 2: -1}, multiplier=multiplier)
+    square = Square(basis=({(0,): Fraction(2), (2,): -ONE},), gram=(ONE,))
+    parts = (Square(basis=((0,),), gram=(Fraction(2),)), Square(basis=((1,),), gram=(-ONE,)))
+    for order in (parts, parts[::-1]):
+        assert not holds(asked, SumOfSquares(squares=(square,), multiplier=order))
+
+
+def test_every_square_of_a_proof_is_one():
+    """2x^2 - x^2 = x^2, but one part is no square."""
+    parts = (Square(basis=((1,),), gram=(Fraction(2),)), Square(basis=((1,),), gram=(-ONE,)))
+    for order in (parts, parts[::-1]):
+        assert not holds(in_x({2: 1}), SumOfSquares(squares=order))
+        assert not identity_holds(in_x({2: 1}), SumOfSquares(squares=order))
+
+
+def test_what_is_malformed_has_no_identity():
+    assert identity_holds(in_x({2: 1}), SumOfSquares(squares=(ALONE,)))
+    for square in (
+        Square(basis=((1,),), gram=(ONE, ONE)),
+        Square(basis=((1,), (1,)), gram=(ONE / 4, Fraction(1, 8), Fraction(1, 2))),  # x^2 in all
+        Square(product=(0,), basis=((1,),), gram=(ONE,)),
+        Square(basis=({(1,): -ONE},), gram=(ONE,)),  # the sign of an element is not free
+        Square(basis=((1, 0),), gram=(ONE,)),
+    ):
+        assert identity_holds(in_x({2: 1}), SumOfSquares(squares=(square,))) is False
+        assert holds(in_x({2: 1}), SumOfSquares(squares=(square,))) is False
+    empty = Square(basis=(), gram=())
+    assert identity_holds(in_x({2: 1}), SumOfSquares(squares=(ALONE, empty))) is False
+
+
+def test_an_identity_says_nothing_about_the_multiplier():
+    minus = in_x({2: -1}, multiplier={(0,): -ONE})
+    assert identity_holds(minus, SumOfSquares(squares=(ALONE,)))
+    assert not holds(minus, SumOfSquares(squares=(ALONE,)))
+
+
+def test_a_functional_must_be_negative_at_the_target():
+    """L = evaluation at 1 is non-negative on squares; at x it is 1, at -x it is -1, at zero nothing follows."""
+    at_one = Functional(values={(0,): ONE, (1,): ONE, (2,): ONE})
+    assert holds(in_x({1: -1}), at_one)
+    assert not holds(in_x({1: 1}), at_one)
+    assert not holds(in_x({1: 1, 0: -1}), at_one)
+
+
+def test_a_point_must_satisfy_every_condition():
+    asked = in_x({1: -1}, inequalities=(X, {(1,): -ONE, (0,): Fraction(2)}), equalities=({(2,): ONE, (1,): -ONE},))
+    assert holds(asked, Point(coordinates=(ONE,)))
+    assert not holds(asked, Point(coordinates=(Fraction(0),)))  # not negative
+    assert not holds(asked, Point(coordinates=(Fraction(3),)))
+    assert not holds(asked, Point(coordinates=(Fraction(1, 2),)))  # off the equality
+    below = in_x({1: 1}, inequalities=({(1,): ONE, (0,): ONE},))
+    assert holds(below, Point(coordinates=(-ONE,)))  # on the edge
+    assert not holds(below, Point(coordinates=(Fraction(-2),)))
+
+
+# ---------------------------------------------------------------- bases
+
+
+def value(square, at):
+    """b'Qb at a point, by numbers."""
+    elements = [b if isinstance(b, dict) else {b: ONE} for b in square.basis]
+    b = [sum(c * at[0] ** e[0] * at[1] ** e[1] for e, c in p.items()) for p in elements]
+    q = full_matrix(square.gram, len(b))
+    return sum(q[i][j] * b[i] * b[j] for i in range(len(b)) for j in range(len(b)))
+
+
+def test_echelon_form_keeps_the_square():
+    basis = (
+        {(1, 0): Fraction(2), (0, 1): ONE, (0, 0): ONE},
+        {(1, 0): ONE, (0, 1): -ONE},
+        {(1, 0): ONE, (0, 0): Fraction(3)},
+    )
+    crowded = Square(basis=basis, gram=tuple(map(Fraction, (5, 1, -1, 3, 1, 7))))
+    moved = in_echelon_form(crowded)
+    assert moved.basis != crowded.basis
+    assert in_echelon_form(moved) is moved
+    for at in ((1, 2), (-3, 1), (2, -5), (0, 1)):
+        assert value(moved, at) == value(crowded, at)
+
+
+def test_elements_with_fractions_are_multiplied_out():
+    """(x/2 + y/3)^2 = x^2/4 + xy/3 + y^2/9."""
+    p = {(2, 0): Fraction(1, 4), (1, 1): Fraction(1, 3), (0, 2): Fraction(1, 9)}
+    element = {(1, 0): Fraction(1, 2), (0, 1): Fraction(1, 3)}
+    assert holds(plain(p), SumOfSquares(squares=(Square(basis=(element,), gram=(ONE,)),)))
+    assert not holds(plain(p), SumOfSquares(squares=(Square(basis=(element,), gram=(Fraction(36),)),)))
+
+
+def test_a_monomial_with_coefficient_one_is_written_by_its_exponents():
+    assert as_element({(1, 0): ONE, (0, 1): Fraction(0)}) == (1, 0)
+    assert as_element({(1, 0): Fraction(2)}) == {(1, 0): 2}
+    assert as_element({(1, 0): ONE, (0, 1): ONE}) == {(1, 0): 1, (0, 1): 1}
