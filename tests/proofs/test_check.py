@@ -21,6 +21,7 @@ checker = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(checker)
 
 REMOVED = object()
+X1 = [["1", [], [["x", "1", "s"]]]]
 
 
 # ---------------------------------------------------------------- certificates made by hand
@@ -248,6 +249,28 @@ def nested_root():
     return document
 
 
+def nested_size():
+    """x' = -x |n|, n = x, V = x^2: -V' = 2u^2 w with w = u, and 2u^2 w - u^3 = u u^2 + 2u^2 (w - u)."""
+    document = relay()
+    document |= {"gains": {}, "lifts": {"n": X1}, "field": {"x": [["-1", [], [["x", "1", "s"], ["n", "1", "a"]]]]}}
+    document["witnesses"][1:] = [
+        witness(f"decrease {cell}", square([1, 0], [[1, 0]], "1"), equalities=[{"2,0": cofactor}])
+        for cell, cofactor in (("++", "2"), ("--", "-2"))
+    ]
+    return document
+
+
+def cubic_relay():
+    """x' = -2 sign(x), V = |x|^3: V - u^3/2 = u u^2/2 and -V' - u^2 = 6u^2 - u^2."""
+    document = relay()
+    document["V"] = [["1", [], [["x", "3", "a"]]]]
+    document["witnesses"] = [
+        witness("positive +", square([1], [[1]], "1/2")),
+        witness("decrease +", square([0], [[1]], "5")),
+    ]
+    return document
+
+
 def nested_sum():
     """x' = -2x - n, y' = -2y - n, n = x + y, V = x^2 + y^2: -V' = 4u^2 + 4w^2 + 2 (s u + r w) t z.
 
@@ -354,7 +377,7 @@ def inhomogeneous_rest():
 
 PROOFS = [relay, disturbed_relay, decay, oscillator, oscillator_on_cells, weighted_pair]
 PROOFS += [bounded_oscillator, bounded_pair]
-PROOFS += [rooted_relay, settling_relay, nested_root, nested_sum, nested_sign, driven]
+PROOFS += [rooted_relay, settling_relay, nested_root, nested_size, nested_sum, nested_sign, cubic_relay, driven]
 REFUTATIONS = [overpowered_relay, sliding_rest, inhomogeneous_rest]
 
 
@@ -715,6 +738,7 @@ UNUSUAL = ["4/2", "2/1", "-0", "0/1", "0/2", "2/0", "2/-1", "2/01", "02", "+2", 
 UNUSUAL += ["2.0", "2e0", "", "-", "/2", "--2", "2//1", "²", "٢", "1_0", "0x2", "NaN", "inf"]
 UNUSUAL += [LONG, f"1/{LONG}"]
 
+BOUNDS = {name: entry["bounds"]["y"] for name, entry in driven()["inputs"].items()}
 BROKEN = {
     # header
     "format 2": (relay, [("format", 2)], "format"),
@@ -785,6 +809,7 @@ BROKEN = {
     "zero number": (relay, [("field", "x", 0, 0, "0")], "nonzero"),
     "term of two": (relay, [("field", "x", 0, ["1", []])], "a list of 3"),
     "term as object": (relay, [("field", "x", 0, {})], "a list"),
+    "term of four": (relay, [("field", "x", 0, ["1", [], [], []])], "a list of 3"),
     "terms as object": (relay, [("field", "x", {})], "a list"),
     "unknown parameter": (relay, [("field", "x", 0, 1, ["q"])], "product of gains"),
     "state as parameter": (relay, [("field", "x", 0, 1, ["x"])], "product of gains"),
@@ -797,6 +822,7 @@ BROKEN = {
     "kind unknown": (relay, [("field", "x", 0, 2, [["x", "1", "b"]])], "kind"),
     "kind as list": (relay, [("field", "x", 0, 2, [["x", "1", ["s"]]])], "kind"),
     "factor of two": (relay, [("field", "x", 0, 2, [["x", "1"]])], "a list of 3"),
+    "factor of four": (relay, [("field", "x", 0, 2, [["x", "1", "s", "s"]])], "a list of 3"),
     "exponent integer": (relay, [("field", "x", 0, 2, [["x", 1, "s"]])], "string"),
     "exponent negative": (relay, [("field", "x", 0, 2, [["x", "-1", "s"]])], "power 0 to"),
     "exponent 25": (relay, [("field", "x", 0, 2, [["x", "25", "s"]])], "power 0 to"),
@@ -873,6 +899,11 @@ BROKEN = {
     "basis rational": (relay, [("witnesses", 0, "squares", 0, "basis", [["1"]])], "integers"),
     "basis negative": (relay, [("witnesses", 0, "squares", 0, "basis", [[-1]])], "integer"),
     "basis long": (relay, [("witnesses", 0, "squares", 0, "basis", [[1, 0]])], "basis"),
+    "basis of polynomials": (
+        relay,
+        [("witnesses", 0, "squares", 0, {"times": [0], "basis": [{"1": "2"}], "gram": ["1/8"]})],
+        "a list",
+    ),
     "basis of 201": (relay, [("witnesses", 0, "squares", 0, "basis", [[i] for i in range(201)])], "basis"),
     "gram short": (oscillator, [("witnesses", 0, "squares", 0, "gram", ["2", "1"])], "gram"),
     "gram full": (oscillator, [("witnesses", 0, "squares", 0, "gram", ["2", "1", "1", "1"])], "gram"),
@@ -898,6 +929,10 @@ BROKEN = {
     "root of zero": (rooted_relay, [("gains", "k", "0"), ("roots", "s", ["k", "0", "1"])], "positive number"),
     "root below its range": (rooted_relay, [("gains", "k", "1")], "contains the root"),
     "root above its range": (rooted_relay, [("gains", "k", "3")], "contains the root"),
+    "root above its number": (rooted_relay, [("roots", "s", ["k", "3/2", "8/5"])], "contains the root"),
+    "root below its number": (rooted_relay, [("roots", "s", ["k", "1", "7/5"])], "contains the root"),
+    "root with three ends": (rooted_relay, [("roots", "s", ["k", "7/5", "3/2", "2"])], "a list of 3"),
+    "root with one end": (rooted_relay, [("roots", "s", ["k", "7/5"])], "a list of"),
     "root negative": (rooted_relay, [("roots", "s", 1, "-7/5")], "contains the root"),
     "root both negative": (rooted_relay, [("roots", "s", ["k", "-2", "-1"])], "contains the root"),
     "root reversed": (rooted_relay, [("roots", "s", ["k", "7/5", "-3"])], "lower end first"),
@@ -949,6 +984,20 @@ BROKEN = {
     "input times state": (driven, [("field", "x", 2, 2, [["x", "1", "s"]])], "linear"),
     "constant push": (driven, [("field", "x", 2, 1, ["k"])], "linear"),
     "cubic field": (driven, [("field", "x", 0, 2, [["x", "3", "s"]])], "linear"),
+    "multiplier of a bound": (
+        driven,  # x (x^2/5) = x x^2/5
+        [("witnesses", 2, "multiplier", {"1": "1"}), ("witnesses", 2, "squares", 0, "times", [1])],
+        "1 on reals",
+    ),
+    "outputs in another order": (
+        driven,
+        [
+            ("outputs", {"y": X1, "z": X1}),
+            *[("inputs", name, "bounds", {"z": bound, "y": bound}) for name, bound in BOUNDS.items()],
+        ],
+        "order of the outputs",
+    ),
+    "set without decay": (driven, [("inputs", "u", "sets", 0, "decay", "0")], "positive"),
     "limit of zero": (driven, [("inputs", "u", "limits", ["0"])], "positive"),
     "three limits": (driven, [("inputs", "v", "limits", ["1", "1", "1"])], "1 to 2"),
     "share negative": (driven, [("inputs", "v", "sets", 0, "shares", ["7/2", "-1/2"])], "non-negative"),
@@ -973,6 +1022,11 @@ BROKEN = {
     "output of zero": (driven, [("outputs", "y", [])], "form of one degree"),
     # refutations
     "refutation with roots": (overpowered_relay, [("roots", {"s": ["k", "1", "2"]})], "empty"),
+    "refutation with lifts": (
+        overpowered_relay,
+        [("lifts", {"n": X1}), ("field", "x", 0, 2, [["n", "0", "s"]])],
+        "empty",
+    ),
     "refutation with V": (overpowered_relay, [("V", X2)], "unknown keys"),
     "refutation on reals": (
         overpowered_relay,
@@ -1006,6 +1060,45 @@ def test_a_broken_rule_is_refused_for_its_reason(case):
     make, steps, reason = BROKEN[case]
     assert verify(make()).verdict in ("proved", "refuted")
     assert reason in refusal(edited(make(), *steps))
+
+
+@pytest.mark.parametrize("ends", [("0", "2"), ("1", "2"), ("0", "3")])
+def test_roots_may_stand_at_the_ends_of_their_range(ends):
+    """x' = -s sign(x) with s = sqrt(1) or sqrt(4): the ends need not be the root; x' = 0 at s = 0 is not proved."""
+    low, high = ends
+    for number in ("1", "4"):
+        document = edited(rooted_relay(), ("gains", "k", number), ("roots", "s", ["k", low, high]))
+        contained = Fraction(low) ** 2 <= Fraction(number) <= Fraction(high) ** 2
+        assert ("contains the root" in refusal(document)) is not contained
+
+
+def test_an_exact_root_is_one_point():
+    """x' = -s sign(x) with s = sqrt(9/4) = 3/2: -V' - u = 2u; s = sqrt(1/4) = 1/2 leaves nothing."""
+    exact = edited(rooted_relay(), ("gains", "k", "9/4"), ("roots", "s", ["k", "3/2", "3/2"]))
+    exact["witnesses"][1:] = [witness("decrease + s=3/2", square([1], [[0]], "2"))]
+    assert verify(exact).verdict == "proved"
+    small = edited(exact, ("gains", "k", "1/4"), ("roots", "s", ["k", "1/2", "1/2"]), ("claims", "decrease", "1/2"))
+    small["witnesses"][1:] = [witness("decrease + s=1/2", square([1], [[0]], "1/2"))]
+    assert verify(small).verdict == "proved"
+
+
+@pytest.mark.parametrize(
+    ("number", "limit", "inside"), [("4", "1/2", True), ("4001/1000", "1/2", False), ("1/9", "3", True)]
+)
+def test_the_input_alone_stays_in_every_set(number, limit, inside):
+    """At most 1 for v^2 times its number where |v| is the limit; what else is wrong comes later."""
+    changed = edited(driven(), ("inputs", "v", "sets", 0, "V", 1, 0, number), ("inputs", "v", "limits", [limit, "1"]))
+    assert ("for the input alone" in refusal(changed)) is not inside
+
+
+def test_a_set_without_the_input_holds_any_limit():
+    """|u| <= 10 in driven: what is wrong with that comes later."""
+    assert "for the input alone" not in refusal(edited(driven(), ("inputs", "u", "limits", ["10"])))
+
+
+@pytest.mark.parametrize("ends", [["-3", "2"], ["2", "3"]])
+def test_a_parameter_may_stand_at_an_end_of_its_range(ends):
+    assert verify(edited(overpowered_relay(), ("uncertain", "d", ends))).verdict == "refuted"
 
 
 def test_a_field_of_two_degrees_is_refused_on_cells():
