@@ -2,7 +2,7 @@
 
 Usage: ``python proofs/check.py FILE...``. Every file gets one block: ``proved`` or ``refuted`` with the
 statement that was verified, or ``invalid`` with one reason. Exit code 0: all proved; 1: not all; 2: an
-argument cannot be read.
+argument cannot be read. Files of the kind ``guarantee`` need guarantee.py beside this file.
 
 A polynomial maps tuples of exponents to nonzero fractions. The sections are: reading, exact arithmetic and
 squares for both kinds of file; closed loops; plain polynomials; the command.
@@ -16,6 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
 from itertools import accumulate, chain, product
 from math import comb, lcm, prod
 from pathlib import Path
@@ -1338,6 +1339,8 @@ def check(text: str) -> Result:
     need(type(version) is int and version == 1, "format", "the integer 1", version)
     if "polynomial" in document:
         return check_polynomial(document, budget)
+    if "kind" in document:
+        return check_guarantee(document)
     kinds = {
         "refutation": ((*LOOP_KEYS, "refutation"), refute),
         "inputs": (BOUND_KEYS, bound),
@@ -1346,6 +1349,20 @@ def check(text: str) -> Result:
     keys, verify = kinds[next((key for key in kinds if key in document), "V")]
     read_object(document, "the file", keys)
     return verify(document, read_loop(document), budget)
+
+
+def check_guarantee(document: dict[str, Any]) -> Result:
+    """Verify a file of the kind ``guarantee``, by the module beside this one."""
+    need(document["kind"] == "guarantee", "kind", "guarantee", document["kind"])
+    specification = spec_from_file_location("guarantee", Path(__file__).with_name("guarantee.py"))
+    if specification is None or specification.loader is None or specification.origin is None:
+        raise OSError("guarantee.py must stand beside check.py")
+    module = sys.modules[specification.name] = module_from_spec(specification)
+    specification.loader.exec_module(module)
+    try:
+        return Result("proved", tuple(module.verify(document)))
+    except module.Refused as error:
+        raise Refused(str(error)) from None
 
 
 def read_file(name: str) -> str:

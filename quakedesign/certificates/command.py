@@ -7,6 +7,8 @@ from typing import Any
 
 from quakedesign.certificates.claim import Certificate, Verdict
 from quakedesign.certificates.files import certificate_of, read_json
+from quakedesign.certificates.guarantee import task_of
+from quakedesign.certificates.guarantee.files import is_guarantee, read_guarantee
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.meaning import meaning, require_degree_of_slip
 from quakedesign.certificates.premises import (
@@ -50,6 +52,8 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
         raise CertificateError(f"certificate file must exist. Received {path}. Check the path.")
     try:
         raw = read_json(path)
+        if is_guarantee(raw):
+            return _guarantee(raw, fault)
         if is_about_polynomial(raw):
             verdict_of, said = _polynomial(raw)
             return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
@@ -59,6 +63,19 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
     except CertificateError as error:
         return f"invalid: {' '.join(str(error).split())}", []
     return str(verdict), [*statement(certificate), *more]
+
+
+def _guarantee(raw: Any, fault: Fault | None) -> tuple[str, list[str]]:
+    """Verdict on a file about a loop that runs, and whether its data are those of a fault."""
+    claim = read_guarantee(raw)
+    if claim.check() is not Verdict.PROVED:
+        raise CertificateError("the claims do not follow from the loop and the fault's data")
+    lines = [f"fault {claim.task.name}, by the data in the file", claim.sentence()]
+    if fault is not None:
+        if claim.task != task_of(fault, rate_limited=claim.task.change is not None):
+            raise CertificateError(f"the data are not those of {fault.name}")
+        lines.append(f"the data are those of {fault.name}, box {fault.box.name}")
+    return str(Verdict.PROVED), lines
 
 
 def _polynomial(raw: Any) -> tuple[str, list[str]]:

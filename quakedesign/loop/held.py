@@ -25,8 +25,8 @@ def held_loop(
 
     Order of events: at every multiple of T_s the law measures e1 and e2, finds p, and updates its states; p reaches the
     valve after the delay and stays for T_s; the pressure in the fault follows the valve with the lag. States, in this
-    order: e1, e2, the law's, the pressures on their way, the valve's (with a lag), the fault's; those of the law less
-    what they are while p = p* holds the fault at rest, pressures as b·(p − p*).
+    order: e1, e2, the law's, the pressures on their way, the valve's, with a lag what the fault's pressure is more than
+    the valve's; those of the law less what they are while p = p* holds the fault at rest, pressures as b·(p − p*).
 
     Inputs: ``acceleration`` a in e2' = s·e1 − w·e2 + βb(p − p*) + a [m/s²]; ``drift`` b·dp*/dt [m/s³]. Outputs:
     ``slip_error`` [m], ``slip_rate_error`` [m/s], ``push`` b·(p − p*) [m/s²].
@@ -53,22 +53,21 @@ def held_loop(
         )
     whole, part = delay // step, delay % step
     waiting = int(whole) + (1 if part else 0)
-    names = ("e1", "e2", *law.states, *(f"waiting{i}" for i in range(waiting)), *(("valve",) if lag else ()), "fault")
-    places = {name: i for i, name in enumerate(names)}
-    valve = places["valve" if lag else "fault"]
-    steady = _steady(law)
+    names = ("e1", "e2", *law.states, *(f"waiting{i}" for i in range(waiting)), "valve", *(("behind",) if lag else ()))
+    n, valve, steady = len(names), len(names) - (2 if lag else 1), _steady(law)
+    zero, one = Fraction(0), Fraction(1)
     return PeriodicLoop(
         states=names,
-        flow=_flow(len(names), model.slip, model.rate, model.gain / authority, valve, lag),
-        segments=_segments(law, authority, len(names), waiting, valve, step, part),
+        flow=_flow(n, model.slip, model.rate, model.gain / authority, valve, lag),
+        segments=_segments(law, authority, n, waiting, valve, step, part),
         inputs={
-            "acceleration": tuple(Fraction(i == 1) for i in range(len(names))),
-            "drift": (Fraction(0), Fraction(0), *(-v / authority for v in steady))
-            + (Fraction(-1),) * (len(names) - 2 - len(steady)),
+            "acceleration": tuple(Fraction(i == 1) for i in range(n)),
+            "drift": (zero, zero, *(-v / authority for v in steady), *[-one] * (waiting + 1), *([zero] if lag else [])),
         },
         outputs={
-            name: tuple(Fraction(i == place) for i in range(len(names)))
-            for name, place in (("slip_error", 0), ("slip_rate_error", 1), ("push", places["fault"]))
+            "slip_error": tuple(Fraction(i == 0) for i in range(n)),
+            "slip_rate_error": tuple(Fraction(i == 1) for i in range(n)),
+            "push": tuple(Fraction(i >= valve) for i in range(n)),
         },
     )
 
@@ -91,9 +90,10 @@ def _steady(law: LinearLaw) -> Row:
 def _flow(n: int, slip: Fraction, rate: Fraction, gain: Fraction, valve: int, lag: Fraction) -> Matrix:
     rows = [[Fraction(0)] * n for _ in range(n)]
     rows[0][1] = Fraction(1)
-    rows[1][0], rows[1][1], rows[1][n - 1] = slip, -rate, gain
+    rows[1][:2] = slip, -rate
+    rows[1][valve:] = [gain] * (n - valve)
     if lag:
-        rows[n - 1][valve], rows[n - 1][n - 1] = 1 / lag, -1 / lag
+        rows[n - 1][n - 1] = -1 / lag
     return tuple(map(tuple, rows))
 
 
@@ -111,10 +111,17 @@ def _segments(
     line = [*range(first, first + waiting), *([] if part else [valve])]
     for place, before in zip(reversed(line), [*reversed(line[:-1]), None], strict=True):
         jump[place] = asked if before is None else [Fraction(j == before) for j in range(n)]
-    sample = tuple(map(tuple, jump))
     if not part:
-        return (Segment(jump=sample, duration=step),)
-    arrival = tuple(
-        tuple(Fraction(j == (first + waiting - 1 if i == valve else i)) for j in range(n)) for i in range(n)
+        return (Segment(jump=_with_lag(jump, valve), duration=step),)
+    arrival = [[Fraction(j == (first + waiting - 1 if i == valve else i)) for j in range(n)] for i in range(n)]
+    return (
+        Segment(jump=tuple(map(tuple, jump)), duration=part),
+        Segment(jump=_with_lag(arrival, valve), duration=step - part),
     )
-    return Segment(jump=sample, duration=part), Segment(jump=arrival, duration=step - part)
+
+
+def _with_lag(jump: list[list[Fraction]], valve: int) -> Matrix:
+    """The fault's pressure stays where it is while the valve's jumps."""
+    for behind in range(valve + 1, len(jump)):
+        jump[behind] = [v + (j == valve) - w for j, (v, w) in enumerate(zip(jump[behind], jump[valve], strict=True))]
+    return tuple(map(tuple, jump))

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from itertools import accumulate, chain, pairwise
-from operator import mul
+from operator import add, mul
 from typing import Any
 
 from flint import arb, arb_mat, ctx, fmpq
@@ -72,9 +72,9 @@ class _Flow:
     response : list of arb_mat
         e^{Ahi}b at the ends of the pieces.
     curvature, slope : list of arb_mat
-        Enclosures of A²e^{Aσ}b and Ae^{Aσ}b on every piece.
-    bend : arb_mat
-        Enclosure of A²e^{Aσ} on the first piece.
+        Upper bounds of |A²e^{Aσ}b| and |Ae^{Aσ}b| on every piece.
+    square, within : arb_mat
+        A², and an upper bound of |e^{Aσ}| on the first piece: e^{Mh} with |A| off the diagonal and max(A, 0) on it.
     """
 
     jump: Any
@@ -84,31 +84,32 @@ class _Flow:
     response: list[Any]
     curvature: list[Any]
     slope: list[Any]
-    bend: Any
+    square: Any
+    within: Any
 
     @classmethod
     def of(cls, flow: Any, jump: Any, piece: Fraction, entry: Any) -> "_Flow":
         h = _ball(piece)
-        step, within = (flow * h).exp(), (flow * arb(0).union(h)).exp()
+        step, within = (flow * h).exp(), _absolute((_majorant(flow) * h).exp())
         response = list(accumulate([step] * _PIECES, lambda now, e: e * now, initial=entry))
-        near = [within * now for now in response[:-1]]
         return cls(
             jump=jump,
             step=step,
             whole=reduce(mul, [step] * _PIECES) * jump,
             piece=h,
             response=response,
-            curvature=[flow * (flow * now) for now in near],
-            slope=[flow * now for now in near],
-            bend=flow * flow * within,
+            curvature=[within * _absolute(flow * (flow * now)) for now in response[:-1]],
+            slope=[within * _absolute(flow * now) for now in response[:-1]],
+            square=flow * flow,
+            within=within,
         )
 
     def columns(self, later: Any) -> tuple[list[Any], Any]:
         """Weighted ends of the pieces, mapped by what comes later, and the remainders' entries."""
         half = self.piece / 2
         ends = [later * now * (half if i in (0, _PIECES) else self.piece) for i, now in enumerate(self.response)]
-        rest = reduce(_plus, (_absolute(later * bent) for bent in self.curvature))
-        return ends, rest * (self.piece**3 / 12)
+        rest = _absolute(later) * reduce(add, self.curvature)
+        return ends, _absolute(rest * (self.piece**3 / 12))
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +164,8 @@ def _gains(flows: list[_Flow], past: _Past, outputs: Any) -> list[list[Any]]:
             own = _since_jump(flow, outputs, k)
             total = [before[i * count + k] + own[i] for i in range(_PIECES + 1)]
             for i, (start, end) in enumerate(pairwise(total)):
-                bent = (_absolute(phases[i] * flow.bend) * units)[k, 0] + abs((outputs * flow.slope[i])[k, 0])
+                bent = (_absolute(phases[i] * flow.square) * flow.within * units)[k, 0]
+                bent += (_absolute(outputs) * flow.slope[i])[k, 0]
                 found[k].append(start.max(end) + bent * flow.piece**2 / 8)
     return found
 
@@ -180,7 +182,7 @@ def _before(flows: list[_Flow], past: _Past, rows: Any) -> list[Any]:
 def _since_jump(flow: _Flow, outputs: Any, k: int) -> list[Any]:
     """∫|ce^{Aσ}b|dσ from the jump to the end of every piece, from 0 on."""
     values = [abs((outputs * now)[k, 0]) for now in flow.response]
-    bent = [abs((outputs * now)[k, 0]) for now in flow.curvature]
+    bent = [(_absolute(outputs) * now)[k, 0] for now in flow.curvature]
     pieces = [
         (a + b) * flow.piece / 2 + c * flow.piece**3 / 12 for (a, b), c in zip(pairwise(values), bent, strict=True)
     ]
@@ -221,13 +223,16 @@ def _above(parts: list[Any]) -> Any:
     return arb_mat([list(row) for part in parts for row in part.tolist()])
 
 
+def _majorant(flow: Any) -> Any:
+    table = [[v.abs_upper() for v in row] for row in flow.tolist()]
+    for i in range(len(table)):
+        table[i][i] = arb(0).max(flow[i, i]).abs_upper()
+    return arb_mat(table)
+
+
 def _absolute(matrix: Any) -> Any:
     """Upper bounds of the absolute values, exact numbers."""
     return arb_mat([[v.abs_upper() for v in row] for row in matrix.tolist()])
-
-
-def _plus(a: Any, b: Any) -> Any:
-    return a + b
 
 
 def _row_sums(matrix: Any) -> list[Any]:

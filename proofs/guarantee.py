@@ -1,0 +1,614 @@
+"""Verify certificate files of the kind ``guarantee`` (FORMAT.md) with the Python standard library alone.
+
+From a fault's data, a controller's matrices and the order of events in a period to bounds of slip, slip rate and
+pressure for ever. Nothing is searched for: ranges follow from rational inequalities, and the bounds from upper sums of
+impulse responses in integers, multiples of 2^-BITS, each with a bound of its error. `check.py` calls `verify`.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise, product
+from math import comb
+from typing import Any
+
+BITS = 192
+PIECES = 8  # into which every flow between two events is cut
+DOUBLINGS = 12  # at most 4096 periods are summed
+SHARE = 256  # what is left of the past after those is below a 256th
+MAX_STATES, MAX_LAW_STATES, MAX_PERIODS, MAX_DEGREE = 20, 12, 8, 12
+MAX_WORK = 3 * 10**7  # products of integers
+LARGEST = 1 << 2 * BITS  # entries beyond 2^BITS
+HALVINGS = 7
+
+RATIONAL = re.compile(r"-?(0|[1-9][0-9]{0,399})(/[1-9][0-9]{0,399})?")
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
+FAULT = re.compile(r"\w[\w .+-]{0,59}")
+
+Row = list[Fraction]
+
+
+class Refused(Exception):
+    """The file is no valid certificate, for the reason given."""
+
+
+def need(condition: bool, reason: str) -> None:
+    """Refuse the file unless the condition holds."""
+    if not condition:
+        raise Refused(reason)
+
+
+# ---------------------------------------------------------------- reading
+
+
+def keys(value: Any, where: str, *names: str) -> dict[str, Any]:
+    """Object with exactly these keys."""
+    need(type(value) is dict and set(value) == set(names), f"{where} must have exactly the keys {', '.join(names)}")
+    return value  # type: ignore[no-any-return]
+
+
+def number(value: Any, where: str) -> Fraction:
+    """Rational in canonical form."""
+    canonical = type(value) is str and RATIONAL.fullmatch(value) is not None
+    need(canonical, f'{where} must be a rational such as "-3/2", at most 400 digits above and below')
+    top, _, bottom = value.partition("/")
+    found = Fraction(int(top), int(bottom or 1))
+    need(str(found) == value, f"{where} must be in lowest terms")
+    return found
+
+
+def numbers(value: Any, where: str, *names: str) -> dict[str, Fraction]:
+    """Object of rationals with exactly these keys."""
+    return {name: number(v, f"{where}.{name}") for name, v in keys(value, where, *names).items()}
+
+
+def row(value: Any, where: str, length: int) -> Row:
+    """List of so many rationals."""
+    need(type(value) is list and len(value) == length, f"{where} must be a list of {length} rationals")
+    return [number(v, where) for v in value]
+
+
+def matrix(value: Any, where: str, height: int, width: int) -> list[Row]:
+    """List of rows."""
+    need(type(value) is list and len(value) == height, f"{where} must have {height} rows")
+    return [row(v, where, width) for v in value]
+
+
+# ---------------------------------------------------------------- from the fault to ranges
+
+
+def hull(values: Iterable[Fraction]) -> tuple[Fraction, Fraction]:
+    """Least and largest."""
+    found = list(values)
+    return min(found), max(found)
+
+
+def slope(shape: Row) -> Row:
+    """Derivative of a polynomial, lowest power first."""
+    return [n * c for n, c in enumerate(shape)][1:]
+
+
+def on_unit_interval(shape: Row) -> tuple[Fraction, Fraction]:
+    """Enclosure of a polynomial on [0, 1]: hull of its Bernstein coefficients on 2^HALVINGS parts."""
+    n = len(shape) - 1
+    parts = [[sum(Fraction(comb(i, j), comb(n, j)) * shape[j] for j in range(i + 1)) for i in range(n + 1)]]
+    for _ in range(HALVINGS):
+        finer = []
+        for part in parts:
+            triangle = [part]
+            while len(triangle[-1]) > 1:
+                triangle.append([(a + b) / 2 for a, b in pairwise(triangle[-1])])
+            finer += [[line[0] for line in triangle], [line[-1] for line in reversed(triangle)]]
+        parts = finer
+    return hull(Fraction(v) for part in parts for v in part)
+
+
+@dataclass
+class Task:
+    """Ranges of s, w and β, and what reference and disturbance put in; symbols of FORMAT.md, SI units."""
+
+    name: str
+    b: Fraction
+    s: tuple[Fraction, Fraction]
+    w: tuple[Fraction, Fraction]
+    beta: tuple[Fraction, Fraction]
+    rest: tuple[Fraction, Fraction]
+    reference_rate: Fraction
+    reference_force: Fraction
+    drift: Fraction
+    amplitude: Fraction
+    change: Fraction | None
+    slope_of_beta: Fraction
+    steady_beta: bool
+
+
+def read_task(document: dict[str, Any]) -> Task:
+    """Read fault, reference and disturbance, and derive."""
+    parts = ("name", "density", "shear_modulus", "length", "damping", "normal_stress", "spreads", "friction")
+    given = keys(document["fault"], "fault", *parts)
+    name = given["name"]
+    need(type(name) is str and FAULT.fullmatch(name) is not None, "fault.name must be a short text")
+    rho, modulus, size, eta, sigma = (number(given[k], f"fault.{k}") for k in parts[1:6])
+    spread = numbers(given["spreads"], "spreads", "stiffness", "damping", "authority")
+    mu = numbers(
+        given["friction"], "friction", "static", "least", "largest", "weakening", "strengthening", "rate_slope"
+    )
+    need(min(rho, modulus, size, sigma, mu["least"]) > 0, "density, modulus, length, stress and friction must be > 0")
+    need(min(eta, mu["weakening"], mu["strengthening"], mu["rate_slope"]) >= 0, "damping and slopes must be >= 0")
+    need(all(0 <= v < 1 for v in spread.values()), "spreads must be in [0, 1)")
+    need(mu["least"] <= mu["static"] <= mu["largest"], "static friction must lie between the bounds")
+    shape, target, duration = read_reference(document["reference"])
+    amplitude, change, grows = read_disturbance(document["disturbance"])
+
+    k, damping, area = (
+        (value * (1 - spread[kind]), value * (1 + spread[kind]))
+        for value, kind in (
+            (modulus / (rho * size**2), "stiffness"),
+            (eta / (rho * size**3), "damping"),
+            (1 / (rho * size), "authority"),
+        )
+    )
+    b = mu["least"] * area[0]
+    stress = effective_stress(mu, sigma, target, [(k_ - grows["slip"]) / n for k_, n in product(k, area)])
+    bent = hull(n * at * c for n in area for at in stress for c in (mu["weakening"], -mu["strengthening"]))
+    s = bent[0] - k[1] + grows["slip"], bent[1] - k[0] + grows["slip"]
+    sheared = area[1] * max(abs(v) for v in stress) * mu["rate_slope"]
+    w = damping[0] - sheared - grows["rate"], damping[1] + sheared - grows["rate"]
+    first = max(abs(v) for v in on_unit_interval(slope(shape))) * target / duration
+    second = max(abs(v) for v in on_unit_interval(slope(slope(shape)))) * target / duration**2
+    return Task(
+        name=name,
+        b=b,
+        s=s,
+        w=w,
+        beta=(Fraction(1), mu["largest"] * area[1] / b),
+        rest=(sigma - stress[1], sigma - stress[0]),
+        reference_rate=first,
+        reference_force=max(abs(v) for v in w) * first + second,
+        drift=max(abs(v) for v in s) * first,
+        amplitude=amplitude,
+        change=change,
+        slope_of_beta=max(mu["weakening"], mu["strengthening"]) * area[1] / b,
+        steady_beta=mu["rate_slope"] == 0,
+    )
+
+
+def read_reference(value: Any) -> tuple[Row, Fraction, Fraction]:
+    """Shape, target slip and operation time."""
+    given = keys(value, "reference", "shape", "target_slip", "operation_time")
+    listed = given["shape"]
+    need(type(listed) is list and 3 <= len(listed) <= MAX_DEGREE + 1, "shape must have 3 to 13 coefficients")
+    shape = row(listed, "shape", len(listed))
+    target, duration = (number(given[k], k) for k in ("target_slip", "operation_time"))
+    need(min(target, duration) > 0, "target slip and operation time must be > 0")
+    rate = slope(shape)
+    ends = shape[0] == 0 and sum(shape) == 1 and rate[0] == 0 and sum(rate) == 0
+    need(ends and on_unit_interval(rate)[0] >= 0, "the shape must rise from 0 to 1 with slope 0 at both ends")
+    return shape, target, duration
+
+
+def read_disturbance(value: Any) -> tuple[Fraction, Fraction | None, dict[str, Fraction]]:
+    """Bound, bound of the rate of change if there is one, and growths."""
+    named = (
+        ("amplitude", "change", "growths") if type(value) is dict and "change" in value else ("amplitude", "growths")
+    )
+    given = keys(value, "disturbance", *named)
+    amplitude = number(given["amplitude"], "amplitude")
+    change = number(given["change"], "change") if "change" in given else None
+    need(amplitude >= 0 and (change is None or change >= 0), "bounds of the disturbance must be >= 0")
+    return amplitude, change, numbers(given["growths"], "growths", "slip", "rate")
+
+
+def effective_stress(
+    mu: dict[str, Fraction], sigma: Fraction, target: Fraction, kappas: Row
+) -> tuple[Fraction, Fraction]:
+    """Range of (μ*σ' − κr)/μ for 0 ≤ r ≤ target: monotone in κ, in μ and, between the points tried, in r."""
+    tried = [Fraction(0), target]
+    for room, rate in ((mu["static"] - mu["least"], "weakening"), (mu["largest"] - mu["static"], "strengthening")):
+        if mu[rate] and room / mu[rate] <= target:
+            tried.append(room / mu[rate])
+    found = []
+    for r, kappa in product(tried, kappas):
+        load = mu["static"] * sigma - kappa * r
+        found.append(load / max(mu["least"], mu["static"] - mu["weakening"] * r))
+        found.append(load / min(mu["largest"], mu["static"] + mu["strengthening"] * r))
+    return hull(found)
+
+
+# ---------------------------------------------------------------- the loop
+
+
+@dataclass
+class Loop:
+    """Flow x' = Ax, then events (map, time until the next one), and the directions of both inputs."""
+
+    flow: list[Row]
+    events: list[tuple[list[Row], Fraction]]
+    outputs: list[Row]
+    acceleration: Row
+    drift: Row
+
+
+def read_loop(value: Any, task: Task) -> Loop:
+    """Build the error loop: e1, e2, the law's states, pressures on their way, valve, with a lag the fault's."""
+    given = keys(value, "loop", "step", "delay", "lag", "states", "update", "measured", "output", "feedback")
+    step, delay, lag = (number(given[k], k) for k in ("step", "delay", "lag"))
+    need(step > 0 and 0 <= delay <= MAX_PERIODS * step and lag >= 0, "step > 0, delay of 0 to 8 steps, lag >= 0")
+    names = given["states"]
+    sound = type(names) is list and len(names) <= MAX_LAW_STATES and all(type(v) is str for v in names)
+    need(sound and all(NAME.fullmatch(v) for v in names) and len(set(names)) == len(names), "states must be names")
+    n = len(names)
+    update, seen = matrix(given["update"], "update", n, n), matrix(given["measured"], "measured", n, 2)
+    output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2)
+    whole, part = delay // step, delay % step
+    waiting = int(whole) + (part > 0)
+    size = 2 + n + waiting + (lag > 0) + 1
+    need(size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
+    valve = 2 + n + waiting
+
+    flow = zeros(size)
+    flow[0][1] = Fraction(1)
+    flow[1][0], flow[1][1], flow[1][valve] = sum(task.s) / 2, -sum(task.w) / 2, sum(task.beta) / 2
+    if lag > 0:
+        flow[1][valve + 1], flow[valve + 1][valve + 1] = flow[1][valve], -1 / lag
+
+    asked = [task.b * v for v in (*feedback, *output)] + [Fraction(0)] * (size - 2 - n)
+    sample = unit(size)
+    for i in range(n):
+        sample[2 + i] = [*seen[i], *update[i]] + [Fraction(0)] * (size - 2 - n)
+    queue = [*range(2 + n, 2 + n + waiting), *([] if part else [valve])]
+    for i, place in enumerate(queue):
+        sample[place] = unit(size)[queue[i - 1]] if i else asked
+    events = [(sample, part or step)]
+    if part:
+        arrival = unit(size)
+        arrival[valve] = unit(size)[valve - 1]
+        events.append((arrival, step - part))
+    pressures = [Fraction(0)] * (2 + n) + [Fraction(-1)] * (waiting + 1) + [Fraction(0)] * (lag > 0)
+    drift = [*pressures[:2], *(-v / task.b for v in steady_states(update, output)), *pressures[2 + n :]]
+    push = [Fraction(i >= valve) for i in range(size)]
+    if lag > 0:  # the fault's pressure stays while the valve's jumps
+        moved = events[-1][0][valve]
+        events[-1][0][valve + 1] = [p - v for p, v in zip(push, moved, strict=True)]
+    return Loop(flow, events, [unit(size)[0], unit(size)[1], push], unit(size)[1], drift)
+
+
+def zeros(size: int) -> list[Row]:
+    """Square matrix of zeros."""
+    return [[Fraction(0)] * size for _ in range(size)]
+
+
+def unit(size: int) -> list[Row]:
+    """Unit matrix."""
+    return [[Fraction(i == j) for j in range(size)] for i in range(size)]
+
+
+def steady_states(update: list[Row], output: Row) -> Row:
+    """Some z with Fz = z and Cz = 1, by elimination."""
+    n = len(output)
+    table = [[v - (i == j) for j, v in enumerate(line)] + [Fraction(0)] for i, line in enumerate(update)]
+    table.append([*output, Fraction(1)])
+    found = [Fraction(0)] * n
+    pivots: list[tuple[int, Row]] = []
+    for column in range(n):
+        chosen = next((line for line in table if line[column]), None)
+        if chosen is None:
+            continue
+        table.remove(chosen)
+        chosen = [v / chosen[column] for v in chosen]
+        table = [[a - line[column] * c for a, c in zip(line, chosen, strict=True)] for line in table]
+        pivots.append((column, chosen))
+    need(not any(line[n] for line in table), "the law must be able to ask for a constant pressure without errors")
+    for column, line in reversed(pivots):
+        found[column] = line[n] - sum(line[j] * found[j] for j in range(column + 1, n))
+    return found
+
+
+# ---------------------------------------------------------------- integers with bounds of their errors
+
+
+@dataclass
+class Fixed:
+    """Matrix of integers in units of 2^-BITS; no entry is farther from the true one than `error` units."""
+
+    rows: list[list[int]]
+    error: int
+
+    def __mul__(self, other: "Fixed") -> "Fixed":
+        columns = list(zip(*other.rows, strict=True))
+        rows = [[sum(map(int.__mul__, line, column)) >> BITS for column in columns] for line in self.rows]
+        widest = max(sum(map(abs, line)) for line in self.rows) + self.error * len(columns and columns[0])
+        tallest = max((sum(map(abs, column)) for column in columns), default=0)
+        return bounded(Fixed(rows, (widest * other.error + tallest * self.error >> BITS) + 2))
+
+    def __add__(self, other: "Fixed") -> "Fixed":
+        rows = [[a + b for a, b in zip(*lines, strict=True)] for lines in zip(self.rows, other.rows, strict=True)]
+        return Fixed(rows, self.error + other.error)
+
+    def scaled(self, factor: Fraction) -> "Fixed":
+        """Times a number that is not negative."""
+        top, bottom = factor.numerator, factor.denominator
+        return bounded(Fixed([[v * top // bottom for v in line] for line in self.rows], self.error * top // bottom + 2))
+
+    def size(self) -> "Fixed":
+        """Upper bounds of the absolute values, exact."""
+        return Fixed([[abs(v) + self.error for v in line] for line in self.rows], 0)
+
+    def beside(self, *others: "Fixed") -> "Fixed":
+        """Columns of several matrices side by side."""
+        parts = (self, *others)
+        rows = [[v for line in lines for v in line] for lines in zip(*(p.rows for p in parts), strict=True)]
+        return Fixed(rows, max(p.error for p in parts))
+
+    def above(self, *others: "Fixed") -> "Fixed":
+        """Rows of several matrices, one after another."""
+        parts = (self, *others)
+        return Fixed([line for p in parts for line in p.rows], max(p.error for p in parts))
+
+    def sums(self) -> list[int]:
+        """Upper bounds of the sums of absolute values, row by row."""
+        return [sum(map(abs, line)) + self.error * len(line) for line in self.rows]
+
+
+def bounded(value: Fixed) -> Fixed:
+    """Refuse numbers that only an unstable or absurd loop can have."""
+    largest = max((max(map(abs, line), default=0) for line in value.rows), default=0)
+    need(max(largest, value.error) <= LARGEST, "the nominal loop must be stable, its numbers of ordinary size")
+    return value
+
+
+def fixed(rows: Sequence[Sequence[Fraction]]) -> Fixed:
+    """Nearest multiples below."""
+    return bounded(Fixed([[(v.numerator << BITS) // v.denominator for v in line] for line in rows], 1))
+
+
+def column(values: Sequence[Fraction]) -> Fixed:
+    """One column."""
+    return fixed([[v] for v in values])
+
+
+def exponential(flow: list[Row], time: Fraction) -> Fixed:
+    """e^{At} by a Taylor sum at t/2^j and squaring."""
+    norm, halvings = max(sum(map(abs, line)) for line in flow) * time, 0
+    need(norm <= 1 << 12, "the flow must change by a factor of ordinary size between two events")
+    while norm > Fraction(1, 2):
+        norm, halvings = norm / 2, halvings + 1
+    base = fixed([[v * time / 2**halvings for v in line] for line in flow])
+    term = total = fixed(unit(len(flow)))
+    for k in range(1, BITS // 2):
+        term = (term * base).scaled(Fraction(1, k))
+        total = total + term
+    # what is left out is below 2·2^-n/n!, n = BITS/2 terms: less than a unit
+    total = Fixed(total.rows, total.error + 1)
+    for _ in range(halvings):
+        total = total * total
+    return total
+
+
+# ---------------------------------------------------------------- L1 norms
+
+
+@dataclass
+class Flow:
+    """One event and the flow after it, cut into pieces, for one input."""
+
+    event: Fixed
+    piece: Fraction
+    step: Fixed
+    whole: Fixed
+    ends: list[Fixed]
+    slopes: list[Fixed]
+    bends: list[Fixed]
+    bend: Fixed
+    near: Fixed
+
+
+def cut(loop: Loop, entry: Row) -> list[Flow]:
+    """Impulse responses over every flow, and bounds of their first two derivatives on every piece."""
+    flows = []
+    generator = fixed(loop.flow)
+    for event, duration in loop.events:
+        h = duration / PIECES
+        step = exponential(loop.flow, h)
+        near = exponential(majorant(loop.flow), h).size()
+        ends, power = [column(entry)], fixed(unit(len(entry)))
+        for _ in range(PIECES):
+            ends.append(step * ends[-1])
+            power = step * power
+        slopes = [near * (generator * end).size() for end in ends[:-1]]
+        bends = [near * (generator * (generator * end)).size() for end in ends[:-1]]
+        jump = fixed(event)
+        flows.append(Flow(jump, h, step, power * jump, ends, slopes, bends, generator * generator, near))
+    return flows
+
+
+def majorant(flow: list[Row]) -> list[Row]:
+    """M with |e^{Aδ}| ≤ e^{Mδ} ≤ e^{Mh} for 0 ≤ δ ≤ h: absolute values, on the diagonal no negative ones."""
+    return [[max(v, Fraction(0)) if i == j else abs(v) for j, v in enumerate(line)] for i, line in enumerate(flow)]
+
+
+def pieces(flow: Flow, later: Fixed) -> Fixed:
+    """Columns whose sum of absolute values, after any row, bounds the integral over a flow that `later` follows."""
+    weights = [flow.piece / (2 if i in (0, PIECES) else 1) for i in range(PIECES + 1)]
+    ends = [(later * end).scaled(weight) for end, weight in zip(flow.ends, weights, strict=True)]
+    bent = flow.bends[0]
+    for other in flow.bends[1:]:
+        bent = bent + other
+    rest = (later.size() * bent).size().scaled(flow.piece**3 / 12).size()
+    corner = [i for i, (v,) in enumerate(rest.rows) if v]
+    diagonal = Fixed([[v if i == j else 0 for j in corner] for i, (v,) in enumerate(rest.rows)], 0)
+    return ends[0].beside(*ends[1:], diagonal)
+
+
+@dataclass
+class Past:
+    """All periods before: columns of many of them, and what bounds the rest."""
+
+    columns: Fixed
+    far: Fixed
+    left: Fixed
+
+    def of(self, rows: Fixed) -> list[int]:
+        """Bounds of the integrals for every row; equal rows are done once."""
+        once = list(dict.fromkeys(map(tuple, rows.rows)))
+        different = Fixed([list(line) for line in once], rows.error)
+        rest = (different * self.far).size() * self.left
+        sums = zip((different * self.columns).sums(), rest.rows, strict=True)
+        found = dict(zip(once, (near + far + rest.error for near, (far,) in sums), strict=True))
+        return [found[tuple(line)] for line in rows.rows]
+
+
+def past(flows: list[Flow], rows: int) -> Past:
+    """Sum 2^j periods until what is left is below a 256th of every unit row's sum."""
+    size = len(flows[0].event.rows)
+    later, columns = fixed(unit(size)), None
+    for flow in reversed(flows):
+        own = pieces(flow, later)
+        columns, later = own if columns is None else own.beside(columns), later * flow.whole
+    assert columns is not None
+    sums, period = columns.sums(), later
+    for _ in range(DOUBLINGS):
+        width = len(columns.rows[0])
+        need(2 * width * size * (size + rows) <= MAX_WORK, "the loop must forget its past sooner: it takes too long")
+        following = period * columns
+        sums = [a + b for a, b in zip(sums, following.sums(), strict=True)]
+        columns, period = columns.beside(following), period * period
+        left = period.size() * Fixed([[v] for v in sums], 0)
+        if all((v + left.error) * SHARE <= total for (v,), total in zip(left.rows, sums, strict=True)):
+            return Past(columns, period, Fixed([[v * SHARE // (SHARE - 1) + 1] for v in sums], 0))
+    raise Refused(f"the nominal loop must be stable, and seen to be within {2**DOUBLINGS} periods")
+
+
+def gains(loop: Loop, entry: Row) -> list[list[Fraction]]:
+    """Bounds of e1, e2 and the push for an input of size 1, on every piece of the period."""
+    flows, size = cut(loop, entry), len(loop.flow)
+    start = fixed(loop.outputs)
+    before = past(flows, len(flows) * (3 * (PIECES + 1) + size))
+    found: list[list[Fraction]] = [[], [], []]
+    for number_of, flow in enumerate(flows):
+        phases = [start]
+        for _ in range(PIECES):
+            phases.append(phases[-1] * flow.step)
+        stack = phases[0].above(*phases[1:], fixed(unit(size))) * flow.event
+        earlier = integral(flows[:number_of], before, stack)
+        units = Fixed([[v] for v in earlier[-size:]], 0)
+        for k in range(3):
+            since, ends = [0], [(start * end).sums()[k] for end in flow.ends]
+            bends, slopes = ([(start.size() * v).sums()[k] for v in part] for part in (flow.bends, flow.slopes))
+            for i in range(PIECES):
+                bent = bends[i]
+                area = Fraction(ends[i] + ends[i + 1]) * flow.piece / 2 + bent * flow.piece**3 / 12
+                since.append(since[-1] + int(area) + 1)
+            total = [earlier[3 * i + k] + since[i] for i in range(PIECES + 1)]
+            for i in range(PIECES):
+                bending = ((phases[i] * flow.bend).size() * flow.near).size() * units
+                bent = bending.sums()[k] + slopes[i]
+                found[k].append((max(total[i], total[i + 1]) + bent * flow.piece**2 / 8) / (1 << BITS))
+    return found
+
+
+def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:
+    """Bounds for rows that act after the given flows of this period, and before the event of the next."""
+    if not flows:
+        return before.of(rows)
+    own = (rows * pieces(flows[-1], fixed(unit(len(rows.rows[0]))))).sums()
+    return [a + b for a, b in zip(own, integral(flows[:-1], before, rows * flows[-1].whole), strict=True)]
+
+
+# ---------------------------------------------------------------- the theorem
+
+
+def bounds(task: Task, loop: Loop) -> tuple[Row, Fraction]:
+    """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee)."""
+    of_push, of_drift = gains(loop, loop.acceleration), gains(loop, loop.drift)
+    half = [(high - low) / 2 for low, high in (task.s, task.w, task.beta)]
+    m, n = (
+        max(sum(h * g for h, g in zip(half, at, strict=True)) for at in zip(*found, strict=True))
+        for found in (of_push, of_drift)
+    )
+    force, drift, coupling, shifted = inputs(task, half[2])
+    own, back = coupling * max(of_drift[1]), coupling * max(of_push[1])
+    need(own < 1, "the small gain of the disturbance's shift must be below 1")
+    small = m + n * back / (1 - own)
+    need(small < 1, f"the small gain must be below 1. It is {upper(small)}")
+    acceleration = (force + n * drift / (1 - own)) / (1 - small)
+    drift = (drift + back * acceleration) / (1 - own)
+    found = [
+        max(a * acceleration + d * drift for a, d in zip(*pair, strict=True))
+        for pair in zip(of_push, of_drift, strict=True)
+    ]
+    return [found[0], found[1], found[2] + shifted], small
+
+
+def inputs(task: Task, half_beta: Fraction) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+    """Bounds of the force and the drift, the coupling from e2 to the drift, and what the push is shifted by."""
+    if task.change is None:
+        return task.reference_force + task.amplitude, task.drift, Fraction(0), Fraction(0)
+    if not task.steady_beta:
+        middle = sum(task.beta) / 2
+        left = task.amplitude * half_beta / middle
+        return task.reference_force + left, task.drift + task.change / middle, Fraction(0), task.amplitude / middle
+    coupling = task.amplitude * task.slope_of_beta
+    return task.reference_force, task.drift + task.change + coupling * task.reference_rate, coupling, task.amplitude
+
+
+CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
+
+
+def verify(document: dict[str, Any]) -> list[str]:
+    """Verify the claims of a parsed file; the statement, line by line.
+
+    Raises
+    ------
+    Refused
+        When a rule is broken, or a claim does not follow.
+    """
+    keys(document, "the file", "format", "kind", "fault", "reference", "disturbance", "loop", "claims")
+    claims = numbers(document["claims"], "claims", *CLAIMS)
+    task = read_task(document)
+    loop = read_loop(document["loop"], task)
+    (slip, rate, push), small = bounds(task, loop)
+    low, high = task.rest[0] - push / task.b, task.rest[1] + push / task.b
+    found = dict(zip(CLAIMS, (slip, rate, rate + task.reference_rate, low, high), strict=True))
+    for name, value in found.items():
+        holds = value >= claims[name] if name == "least_pressure" else value <= claims[name]
+        need(holds, f"the claim {name} must follow from the rest. It does not")
+    return statement(document, task, claims, small)
+
+
+def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction], small: Fraction) -> list[str]:
+    """What was verified, in ASCII; bounds on their outer side."""
+    loop = document["loop"]
+    kind = f"|phi| <= {upper(task.amplitude)} m/s^2"
+    if task.change is not None:
+        kind += f", |phi'| <= {upper(task.change)} m/s^3, phi(0) = 0"
+    return [
+        f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction anything within its "
+        "bounds and slopes, continued to negative slip rates",
+        f"s in [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, w in [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, "
+        f"beta in [1, {upper(task.beta[1])}], b = {upper(task.b)} m^2/kg, derived",
+        f"law with {len(loop['states'])} states, every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s",
+        f"disturbance: {kind}; from rest, along the reference, for ever; small gain {upper(small)}",
+        f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",
+        f"|slip - reference| <= {upper(claims['slip_error'])} m, "
+        f"|slip rate - reference's| <= {upper(claims['slip_rate_error'])} m/s",
+        f"pressure from {lower(claims['least_pressure'])} Pa to {upper(claims['largest_pressure'])} Pa",
+    ]
+
+
+def upper(value: Fraction) -> str:
+    """Decimal with four digits that is not below the number."""
+    if value == 0:
+        return "0"
+    exponent = len(str(abs(value.numerator))) - len(str(value.denominator)) - 4
+    digits = -(-value // Fraction(10) ** exponent)
+    while abs(digits) >= 10**4:
+        exponent += 1
+        digits = -(-value // Fraction(10) ** exponent)
+    return f"{float(f'{digits}e{exponent}'):.4g}"
+
+
+def lower(value: Fraction) -> str:
+    """Decimal with four digits that is not above the number."""
+    return f"{-float(upper(-value)):.4g}"

@@ -1,0 +1,152 @@
+"""The file of a guarantee (proofs/FORMAT.md): read strictly, written whole."""
+
+import json
+import re
+from dataclasses import asdict
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held
+from quakedesign.certificates.guarantee.task import Friction, Task
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.loop import LinearLaw
+from quakedesign.output import write_whole
+from quakedesign.sos.exact.strict import NAME, listed, need, parse, read_rational, with_keys
+
+_ROCK = ("density", "shear_modulus", "length", "damping", "normal_stress")
+_SPREADS = ("stiffness", "damping", "authority")
+_FRICTION = ("static", "least", "largest", "weakening", "strengthening", "rate_slope")
+_TIMES = ("step", "delay", "lag")
+_FAULT = re.compile(r"\w[\w .+-]{0,59}")
+_MOST_COEFFICIENTS = 13
+_MOST_STATES = 20
+
+
+def is_guarantee(raw: Any) -> bool:
+    """Whether a parsed file is about a loop that runs."""
+    return isinstance(raw, dict) and raw.get("kind") == "guarantee"
+
+
+def guarantee_text(claim: Guarantee) -> str:
+    """Text of the file."""
+    task, held, law = claim.task, claim.held, claim.held.law
+    change = {} if task.change is None else {"change": str(task.change)}
+    document = {
+        "format": 1,
+        "kind": "guarantee",
+        "fault": {
+            "name": task.name,
+            **{name: str(getattr(task, name)) for name in _ROCK},
+            "spreads": dict(zip(_SPREADS, map(str, task.spreads), strict=True)),
+            "friction": {name: str(value) for name, value in asdict(task.friction).items()},
+        },
+        "reference": {
+            "shape": _texts(task.shape),
+            "target_slip": str(task.target_slip),
+            "operation_time": str(task.operation_time),
+        },
+        "disturbance": {
+            "amplitude": str(task.amplitude),
+            **change,
+            "growths": {"slip": str(task.growths[0]), "rate": str(task.growths[1])},
+        },
+        "loop": {
+            **{name: str(getattr(held, name)) for name in _TIMES},
+            "states": list(law.states),
+            "update": [_texts(row) for row in law.update],
+            "measured": [_texts(row) for row in law.measured],
+            "output": _texts(law.output),
+            "feedback": _texts(law.feedback),
+        },
+        "claims": {name: value.exact for name, value in _claims(claim.claims).items()},
+    }
+    return json.dumps(document, indent=1) + "\n"
+
+
+def save_guarantee(claim: Guarantee, path: str | Path) -> None:
+    """Write the file whole."""
+    write_whole(Path(path), guarantee_text(claim))
+
+
+def parse_guarantee(text: str) -> Guarantee:
+    """Guarantee from the text of a file; reading verifies nothing. Raises as `read_guarantee`."""
+    return read_guarantee(parse(text))
+
+
+def read_guarantee(raw: Any) -> Guarantee:
+    """Guarantee from a parsed file.
+
+    Raises
+    ------
+    CertificateError
+        When it breaks a rule of FORMAT.md.
+    """
+    with_keys(raw, {"format", "kind", "fault", "reference", "disturbance", "loop", "claims"})
+    need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
+    need(raw["kind"] == "guarantee", "kind must be guarantee")
+    try:
+        claim = Guarantee(task=_task(raw), held=_held(raw["loop"]), claims=_read_claims(raw["claims"]))
+        need(len(claim.held.loop(claim.task).states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
+    except ParameterError as error:
+        raise CertificateError(str(error)) from None
+    return claim
+
+
+def _task(raw: dict[str, Any]) -> Task:
+    fault = with_keys(raw["fault"], {"name", *_ROCK, "spreads", "friction"})
+    reference = with_keys(raw["reference"], {"shape", "target_slip", "operation_time"})
+    given = raw["disturbance"]
+    limited = isinstance(given, dict) and "change" in given
+    with_keys(given, {"amplitude", "growths"} | ({"change"} if limited else set()))
+    growths = with_keys(given["growths"], {"slip", "rate"})
+    spreads, friction = with_keys(fault["spreads"], set(_SPREADS)), with_keys(fault["friction"], set(_FRICTION))
+    need(isinstance(fault["name"], str) and _FAULT.fullmatch(fault["name"]) is not None, "name must be a short text")
+    return Task(
+        name=fault["name"],
+        **{name: read_rational(fault[name]) for name in _ROCK},
+        spreads=(*(read_rational(spreads[name]) for name in _SPREADS),),  # type: ignore[arg-type]
+        friction=Friction(**{name: read_rational(friction[name]) for name in _FRICTION}),
+        shape=_rationals(reference["shape"], "shape", _MOST_COEFFICIENTS),
+        target_slip=read_rational(reference["target_slip"]),
+        operation_time=read_rational(reference["operation_time"]),
+        amplitude=read_rational(given["amplitude"]),
+        change=read_rational(given["change"]) if limited else None,
+        growths=(read_rational(growths["slip"]), read_rational(growths["rate"])),
+    )
+
+
+def _held(raw: Any) -> Held:
+    with_keys(raw, {*_TIMES, "states", "update", "measured", "output", "feedback"})
+    names = listed(raw["states"], "states", _MOST_STATES)
+    need(all(isinstance(n, str) and NAME.fullmatch(n) for n in names), "states must be names")
+    law = LinearLaw(
+        states=tuple(names),
+        update=tuple(_rationals(row, "update", len(names)) for row in listed(raw["update"], "update", len(names))),
+        measured=tuple(_rationals(row, "measured", 2) for row in listed(raw["measured"], "measured", len(names))),
+        output=_rationals(raw["output"], "output", len(names)),
+        feedback=_rationals(raw["feedback"], "feedback", 2),
+    )
+    return Held(law=law, **{name: read_rational(raw[name]) for name in _TIMES})
+
+
+def _read_claims(raw: Any) -> Claims:
+    names = set(Claims.__dataclass_fields__)
+    values = {name: read_rational(value) for name, value in with_keys(raw, names).items()}
+    return Claims(
+        least_pressure=LowerBound(values.pop("least_pressure")),
+        **{name: UpperBound(value) for name, value in values.items()},
+    )
+
+
+def _claims(claims: Claims) -> dict[str, Any]:
+    return {name: getattr(claims, name) for name in Claims.__dataclass_fields__}
+
+
+def _texts(values: tuple[Fraction, ...]) -> list[str]:
+    return [str(v) for v in values]
+
+
+def _rationals(raw: Any, what: str, most: int) -> tuple[Fraction, ...]:
+    return tuple(read_rational(v) for v in listed(raw, what, most))

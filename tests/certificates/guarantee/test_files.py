@@ -1,0 +1,201 @@
+"""The file of a guarantee: both checkers, which share no code, accept it and refuse every forgery."""
+
+import copy
+import importlib.util
+import json
+import time
+from dataclasses import replace
+from fractions import Fraction as F
+from pathlib import Path
+
+import pytest
+
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.command import check_files
+from quakedesign.certificates.guarantee import Held, guarantee, task_of
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, save_guarantee
+from quakedesign.errors import CertificateError
+from quakedesign.fault import load_fault
+from quakedesign.loop import disturbance_estimate, summed_integrals
+from quakedesign.loop.laws import Prediction
+
+PATH = Path(__file__).parents[3] / "proofs" / "check.py"
+SPECIFICATION = importlib.util.spec_from_file_location("guarantee_check", PATH)
+checker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(checker)
+
+STEP = F("0.184")
+ESTIMATE = disturbance_estimate(
+    (F(672300000), F(198900000)),
+    F("0.6"),
+    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_push=F("0.1596")),
+    F("2.282e-8"),
+)
+INTEGRALS = summed_integrals((F(696000000), F(253000000), F(602000000), F(216000000)), STEP)
+LOOPS = {
+    "estimate": Held(law=ESTIMATE, step=STEP),
+    "late": Held(law=ESTIMATE, step=STEP, delay=F("0.02")),
+    "integrals": Held(law=INTEGRALS, step=STEP),
+    "lagging": Held(law=ESTIMATE, step=F("0.1"), lag=F("0.03")),
+}
+
+
+def claim(name="estimate", rate_limited=False):
+    return guarantee(task_of(load_fault("real-fault"), rate_limited=rate_limited), LOOPS[name])
+
+
+def package(text):
+    try:
+        return str(parse_guarantee(text).check())
+    except CertificateError as error:
+        return f"invalid: {error}"
+
+
+def standalone(text):
+    try:
+        return checker.check(text).verdict
+    except checker.Refused as error:
+        return f"invalid: {error}"
+
+
+@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("rate_limited", [False, True])
+def test_both_checkers_accept_what_the_package_writes(name, rate_limited):
+    found = claim(name, rate_limited)
+    text = guarantee_text(found)
+    assert parse_guarantee(text) == found
+    began = time.process_time()
+    assert standalone(text) == "proved"
+    assert time.process_time() - began < 10
+    assert package(text) == "proved"
+
+
+def test_the_statement_says_the_slip_rate_of_this_fault():
+    found = claim()
+    lines = checker.check(guarantee_text(found)).statement
+    assert f"the slip rate of this fault never exceeds {float(found.claims.peak_slip_rate):.4g} m/s" in lines
+
+
+CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_one_percent_less_is_refused_by_both(name):
+    raw = json.loads(guarantee_text(claim()))
+    raw["claims"][name] = str(F(raw["claims"][name]) * F(99, 100))
+    text = json.dumps(raw)
+    assert name in standalone(text)
+    assert package(text) == "undecided"
+
+
+WORSE = [
+    (("disturbance", "amplitude"), F(21, 20)),
+    (("fault", "friction", "largest"), F(21, 20)),
+    (("fault", "friction", "weakening"), F(21, 20)),
+    (("fault", "friction", "least"), F(19, 20)),
+    (("fault", "normal_stress"), F(21, 20)),
+    (("loop", "step"), F(21, 20)),
+    (("loop", "feedback", 0), F(3, 2)),
+    (("loop", "feedback", 1), F(4, 3)),
+    (("loop", "measured", 1, 1), F(4, 3)),
+    (("loop", "output", 1), F(4, 3)),
+    (("loop", "update", 1, 0), F(4, 3)),
+]
+
+
+@pytest.mark.parametrize(
+    ("place", "factor"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else ""
+)
+def test_worse_data_under_the_same_claims_are_refused_by_both(place, factor):
+    raw = json.loads(guarantee_text(claim()))
+    holder = raw
+    for key in place[:-1]:
+        holder = holder[key]
+    holder[place[-1]] = str(F(holder[place[-1]]) * factor)
+    text = json.dumps(raw)
+    assert standalone(text).startswith("invalid")
+    assert package(text) != "proved"
+
+
+def places(value, path=()):
+    """Every place in a JSON value."""
+    yield path
+    for key, inner in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
+        yield from places(inner, (*path, key))
+
+
+def changed(raw, path, new):
+    raw = copy.deepcopy(raw)
+    holder = raw
+    for key in path[:-1]:
+        holder = holder[key]
+    if new is None:
+        del holder[path[-1]]
+    else:
+        holder[path[-1]] = new
+    return raw
+
+
+RAW = json.loads(guarantee_text(claim()))
+PATHS = [path for path in places(RAW) if path and path != ("fault", "name")]
+
+
+@pytest.mark.parametrize("new", [None, "x", "1/0", "2/4", 0.5, True, [], {}, -1], ids=repr)
+def test_entries_of_another_kind_are_refused_by_both_at_every_place(new):
+    for path in PATHS:
+        if new == "x" and path[:2] == ("loop", "states") and len(path) == 3:
+            continue  # a state may have the name x
+        text = json.dumps(changed(RAW, path, new))
+        assert standalone(text).startswith("invalid"), path
+        assert package(text).startswith("invalid"), path
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("fault", "density"), "0"),
+        (("fault", "length"), "-5000"),
+        (("fault", "spreads", "authority"), "1"),
+        (("fault", "friction", "least"), "0"),
+        (("fault", "friction", "static"), "1/10"),
+        (("fault", "friction", "weakening"), "-1"),
+        (("reference", "shape"), ["0", "1"]),
+        (("reference", "shape"), ["0", "0", "9", "-8"]),
+        (("reference", "target_slip"), "0"),
+        (("disturbance", "amplitude"), "-1"),
+        (("loop", "step"), "0"),
+        (("loop", "step"), "9" * 390),
+        (("loop", "step"), "1/" + "9" * 390),
+        (("loop", "delay"), "-1"),
+        (("loop", "delay"), "100"),
+        (("loop", "lag"), "-1"),
+        (("loop", "lag"), "1/" + "9" * 390),
+        (("loop", "feedback"), ["9" * 390, "0"]),
+        (("loop", "output"), ["0", "0"]),
+        (("loop", "states"), ["a", "a"]),
+    ],
+)
+def test_hostile_values_are_refused_by_both_in_bounded_time(path, value):
+    text = json.dumps(changed(RAW, path, value))
+    began = time.process_time()
+    assert standalone(text).startswith("invalid")
+    assert package(text) != "proved"
+    assert time.process_time() - began < 10
+
+
+def test_the_command_checks_files_and_compares_with_a_fault(tmp_path):
+    path = tmp_path / "guarantee.json"
+    save_guarantee(claim(), path)
+    ((verdict, lines),) = check_files([path], "real-fault").values()
+    assert verdict == "proved"
+    assert "the data are those of real-fault, box paper" in lines
+    ((verdict, _),) = check_files([path], "lab-fault").values()
+    assert verdict == "invalid: the data are not those of lab-fault"
+
+
+def test_what_is_claimed_too_low_is_undecided_by_itself():
+    found = claim()
+    assert (
+        replace(found, claims=replace(found.claims, slip_error=found.claims.slip_error / 2)).check()
+        is Verdict.UNDECIDED
+    )
