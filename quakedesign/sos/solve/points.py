@@ -2,59 +2,18 @@
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import chain
 
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, evaluate
 from quakedesign.sos.exact.proofs import Point, holds
 from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.solve.arrays import Arrays
 from quakedesign.sos.solve.faces import simplest
+from quakedesign.sos.solve.inside import by_value, inwards, lowest_samples
 
 _SEED = 20240607
 _FAR = 1e6  # from there on a minimum is taken to be at infinity
 _SIMPLE = (Fraction(0), Fraction(1), Fraction(-1), Fraction(1, 2), Fraction(2))
-
-
-class Arrays:
-    """A polynomial as arrays, for values and gradients at many points."""
-
-    def __init__(self, polynomial: Polynomial, variables: int) -> None:
-        import numpy as np
-
-        self.exponents = np.array(list(polynomial), dtype=np.int64).reshape(-1, variables)
-        self.coefficients = np.array([float(c) for c in polynomial.values()])
-
-    def __call__(self, x) -> float:
-        """Value at a point."""
-        import numpy as np
-
-        return float(self.coefficients @ np.prod(np.asarray(x)[None, :] ** self.exponents, axis=1))
-
-    def gradient(self, x):
-        """Gradient at a point."""
-        import numpy as np
-
-        x = np.asarray(x)
-        result = np.zeros(len(x))
-        for i in range(len(x)):
-            lower = self.exponents.copy()
-            factor = lower[:, i] * self.coefficients
-            lower[:, i] = np.maximum(lower[:, i] - 1, 0)
-            result[i] = factor @ np.prod(x[None, :] ** lower, axis=1)
-        return result
-
-    def hessian(self, x):
-        """Matrix of second derivatives at a point."""
-        import numpy as np
-
-        x, size = np.asarray(x), len(x)
-        result = np.zeros((size, size))
-        for i in range(size):
-            for j in range(i, size):
-                factor = self.exponents[:, i] * (self.exponents[:, j] - (i == j)) * self.coefficients
-                lower = self.exponents.copy()
-                lower[:, i] -= 1
-                lower[:, j] -= 1
-                result[i, j] = result[j, i] = factor @ np.prod(x[None, :] ** np.maximum(lower, 0), axis=1)
-        return result
 
 
 def polished_zeros(statement: Statement, candidates: Sequence[Sequence[float]]) -> list[list[float]]:
@@ -164,8 +123,10 @@ def _constrained(statement: Statement, hints, starts: int) -> Iterator[list[floa
     limits += [("eq", Arrays(h, size)) for h in statement.equalities]
     constraints = [{"type": kind, "fun": g, "jac": g.gradient} for kind, g in limits]
     random = np.random.default_rng(_SEED)
+    lowest = lowest_samples(statement)
+    yield from lowest
     begin = [
-        *map(np.asarray, hints),
+        *map(np.asarray, (*hints, *lowest)),
         *(random.standard_normal(size) * s for s in (0.3, 1.0, 3.0) for _ in range(starts // 3)),
     ]
     for v in begin:
@@ -192,18 +153,20 @@ def negative_point(
     statement: Statement, candidates: Sequence[Sequence[float]], scale: Sequence[Fraction]
 ) -> Point | None:
     """Point of the set where the polynomial is negative, with small fractions; None if no candidate leads to one."""
-    import numpy as np
-
-    p = Arrays(statement.polynomial, len(statement.variables))
-    ranked = sorted(
-        candidates, key=lambda x: p(x) / (1 + float(np.abs(x).max())) ** max(degree(statement.polynomial), 1)
-    )
-    for x in ranked[:12]:
-        for coordinates in _near(statement, x, scale):
+    for x in by_value(statement, candidates)[:12]:
+        for coordinates in chain(_near(statement, x, scale), _inside(statement, x, scale)):
             point = Point(coordinates=coordinates)
             if holds(statement, point):
                 return point
     return None
+
+
+def _inside(statement: Statement, x: Sequence[float], scale: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
+    """Rational points beside a point of the boundary, rounded by less than they are inside it."""
+    if statement.inequalities and not statement.equalities:
+        for moved, distance in inwards(statement, x):
+            size = max(1e-2, *map(abs, moved))
+            yield from (rationalised(moved, scale, distance / size / share) for share in (2, 8, 32))
 
 
 def _near(statement: Statement, x: Sequence[float], scale: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
