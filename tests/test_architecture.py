@@ -45,6 +45,7 @@ MAY_IMPORT = {
     "output": (),
     "bounds": (),
 }
+PROVING = ("controllers", "certificates", "synthesis", "loop")
 SOLVERS = {"cvxpy", "clarabel", "scs", "osqp", "ecos", "mosek", "scipy", "control", "casadi"}
 HEAVY = {
     *("sympy", "numpy", "scipy", "cvxpy", "clarabel", "casadi", "control", "matplotlib", "pint", "pydantic"),
@@ -219,3 +220,33 @@ def test_the_public_names_are_all_there():
     assert re.fullmatch(r"\d+\.\d+\.\d+", quakedesign.__version__)
     with pytest.raises(AttributeError, match="no attribute"):
         quakedesign.nothing  # noqa: B018
+
+
+def declared_friction(tree):
+    """Bounds and slopes that are read from the friction law of a fault itself."""
+    pairs = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign):
+            target, value = node.targets[0], node.value
+            both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            pairs += zip(target.elts, value.elts, strict=False) if both else [(target, value)]
+    laws = {ast.unparse(target) for target, value in pairs if is_law(value)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and node.attr in ("bounds", "slip_slope", "rate_slope"):
+            if is_law(node.value) or ast.unparse(node.value) in laws:
+                yield ast.unparse(node)
+
+
+def is_law(node):
+    return re.fullmatch(r".*fault\.friction(\.exact\(\))?", ast.unparse(node)) is not None
+
+
+@pytest.mark.parametrize("path", [p for p in SOURCES if room(module_name(p)) in PROVING], ids=module_name)
+def test_proofs_use_confirmed_bounds_of_friction_only(path):
+    """What a law declares is checked against its expression by `friction_bounds`; no proof reads it elsewhere."""
+    assert list(declared_friction(ast.parse(path.read_text()))) == []
+
+
+def test_declared_friction_is_found():
+    text = "law, x = fault.friction.exact(), 1\na = law.slip_slope\nb = self.fault.friction.bounds\nc = box.bounds"
+    assert sorted(declared_friction(ast.parse(text))) == ["law.slip_slope", "self.fault.friction.bounds"]

@@ -7,7 +7,7 @@ from functools import cache, lru_cache
 import sympy as sp
 
 from quakedesign.certificates.claim import Certificate, require
-from quakedesign.certificates.matched import only_weakens, static_friction
+from quakedesign.certificates.matched import static_friction
 from quakedesign.certificates.premises import (
     Premise,
     Range,
@@ -22,6 +22,7 @@ from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, rational, to_sympy
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.balls import enclose, upper_bound
+from quakedesign.symbolic.friction_bounds import friction_bounds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,14 +63,14 @@ class Sectors:
 def sectors(fault: Fault) -> Sectors:
     """Sector bounds of a fault over its uncertainty box, exact or rounded outwards."""
     ranges, b = plant_ranges(fault), least_authority(fault)
-    law, disturbance = fault.friction.exact(), fault.disturbance
+    friction, disturbance = friction_bounds(fault.friction), fault.disturbance
     stress, positive = effective_stress(fault)
     load = ranges[plant.N_hat][1] * stress
-    slip_chord = load * _fraction(law.slip_slope)
-    rate_chord = load * _fraction(law.rate_slope)
+    slip_chord = load * friction.slip_slope
+    rate_chord = load * friction.rate_slope
     slip_growth, rate_growth = (rational(g) for g in (disturbance.slip_growth, disturbance.rate_growth))
     k, eta = ranges[plant.k_hat], ranges[plant.eta_hat]
-    one_sided = positive and only_weakens(fault)
+    one_sided = positive and friction.weakens
     slip = ((Fraction(0) if one_sided else -slip_chord) - k[1] + slip_growth, slip_chord - k[0] + slip_growth)
     rate = (eta[0] - rate_chord - rate_growth, eta[1] + rate_chord - rate_growth)
     nominal = {name: _fraction(v) for name, v in plant.plant_values(fault).items()}
@@ -97,7 +98,7 @@ def effective_stress(fault: Fault) -> tuple[Fraction, bool]:
     numerator = sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r)
     target = rational(fault.reference.target_slip)
     least = sp.Max(
-        to_sympy(friction_range(fault)[0]), start - to_sympy(_fraction(fault.friction.exact().slip_slope)) * _r
+        to_sympy(friction_range(fault)[0]), start - to_sympy(friction_bounds(fault.friction).slip_slope) * _r
     )
     box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)} | {_r: (Fraction(0), target)}
     stress = upper_bound(numerator / least, box, pieces=400)
@@ -196,9 +197,9 @@ def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]
 
 def _friction_at(fault: Fault, slip: Range) -> Range:
     """Friction at rest at a slip, anywhere between its bounds and its slope bound from the static value."""
-    (low, high), start = friction_range(fault), static_friction(fault)
-    most = _fraction(fault.friction.exact().slip_slope) * slip[1]
-    return max(low, start - most), start if only_weakens(fault) else min(high, start + most)
+    friction, start = friction_bounds(fault.friction), static_friction(fault)
+    most = friction.slip_slope * slip[1]
+    return max(friction.least, start - most), start if friction.weakens else min(friction.most, start + most)
 
 
 def _end(end) -> Fraction:

@@ -12,6 +12,7 @@ from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.balls import upper_bound
+from quakedesign.symbolic.friction_bounds import friction_bounds
 
 Range = tuple[Fraction, Fraction]
 
@@ -33,9 +34,9 @@ class Errors:
 
 
 def friction_range(fault: Fault) -> Range:
-    """μ_res and μ_max [-], exact."""
-    low, high = (_fraction(v) for v in fault.friction.exact().bounds)
-    return low, high
+    """μ_res and μ_max [-], exact, confirmed by enclosure of the law."""
+    found = friction_bounds(fault.friction)
+    return found.least, found.most
 
 
 def plant_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
@@ -138,30 +139,19 @@ def _reference_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
 
 def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
     """Ranges of all that h' and its sensitivities depend on, but the errors: friction in its bounds and slopes."""
-    law, disturbance = fault.friction.exact(), fault.disturbance
-    slip_slope, rate_slope = (_fraction(sp.sympify(v)) for v in (law.slip_slope, law.rate_slope))
+    friction, disturbance = friction_bounds(fault.friction), fault.disturbance
     value, change = (rational(v) for v in (disturbance.largest_explicit, disturbance.largest_rate))
     growth = rational(disturbance.slip_growth), rational(disturbance.rate_growth)
     return plant_ranges(fault) | {
         stage: (Fraction(0), Fraction(1)),
         plant.friction_value: friction_range(fault),
-        plant.slip_slope: (-slip_slope, Fraction(0) if only_weakens(fault) else slip_slope),
-        plant.rate_slope: (-rate_slope, rate_slope),
+        plant.slip_slope: (-friction.slip_slope, Fraction(0) if friction.weakens else friction.slip_slope),
+        plant.rate_slope: (-friction.rate_slope, friction.rate_slope),
         plant.phi: (-value, value),
         plant.phi_t: (-change, change),
         plant.phi_1: (growth[0], growth[0]),
         plant.phi_2: (growth[1], growth[1]),
     }
-
-
-def only_weakens(fault: Fault) -> bool:
-    """Whether the friction law is known not to grow with slip, from the sign of its derivative; False when in doubt.
-
-    All friction of the box then shares that: its chords in slip have one sign.
-    """
-    slip, rate = sp.symbols("x v", nonnegative=True)
-    slope = sp.sympify(fault.friction.exact().coefficient(slip, rate)).diff(slip)
-    return bool(slope.replace(sp.Heaviside, lambda *_: sp.Dummy(nonnegative=True)).is_nonpositive)
 
 
 def static_friction(fault: Fault) -> Fraction:

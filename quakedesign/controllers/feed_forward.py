@@ -9,6 +9,7 @@ from quakedesign.errors import UnknownNameError
 from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
+from quakedesign.symbolic.friction_bounds import friction_bounds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,12 +72,12 @@ def _centred(fault: Fault, divisor: Fraction) -> FeedForward:
     They differ from the nominal ones since h = (…)/β with an uncertain β, and since friction that weakens with slip
     takes from the spring; the stiffness is negative where it takes more than the spring has.
     """
-    law, middle, box = fault.friction.exact(), plant.plant_values(fault), fault.box
-    least, most = (_fraction(v) for v in law.bounds)
+    friction, middle, box = friction_bounds(fault.friction), plant.plant_values(fault), fault.box
+    least, most = friction.least, friction.most
     authority = _fraction(middle[plant.N_hat])
     inverse = divisor / (most * authority * (1 + box.authority)), divisor / (least * authority * (1 - box.authority))
     k, eta = _fraction(middle[plant.k_hat]), _fraction(middle[plant.eta_hat])
-    weakening = _fraction(middle[plant.sigma]) * divisor * most * _fraction(law.slip_slope) / least**2
+    weakening = _fraction(middle[plant.sigma]) * divisor * most * friction.slip_slope / least**2
     stiffness = k * (1 + box.stiffness) * inverse[1], k * (1 - box.stiffness) * inverse[1] - weakening
     damping = eta * (1 - box.damping) * inverse[0], eta * (1 + box.damping) * inverse[1]
     return FeedForward(name="centred", stiffness=_middle(stiffness), damping=_middle(damping), inertia=_middle(inverse))

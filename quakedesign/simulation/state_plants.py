@@ -12,7 +12,7 @@ from quakedesign.fault.checks import require_nonnegative, require_positive
 from quakedesign.rationals import rational
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_casadi
-from quakedesign.symbolic.state_plant import loading_rate, rate, state_symbols
+from quakedesign.symbolic.state_plant import loading_rate, rate, state_symbols, without_overflow
 
 slip, stretch = sp.symbols("slip stretch", real=True)
 log_rate = sp.Symbol("u", real=True)
@@ -153,18 +153,6 @@ class SpringSlider:
 def rational_number(value: Any) -> sp.Rational:
     """Exact SymPy number of a float."""
     return sp.Rational(str(rational(float(value))))
-
-
-def without_overflow(friction: sp.Expr) -> sp.Expr:
-    """The same friction with arsinh z = L + log(1 + √(1 + e^(−2L))), L = log z: z of the regularised law is e^(μ/a)."""
-
-    def of_logarithm(z: sp.Expr) -> sp.Expr:
-        positive = {x: sp.Symbol(x.name, positive=True) for x in z.free_symbols}
-        back = {new: old for old, new in positive.items()}
-        logarithm = sp.expand_log(sp.log(z.subs(positive)), force=True).subs(back)
-        return logarithm + sp.log(1 + sp.sqrt(1 + sp.exp(-2 * logarithm)))
-
-    return friction.replace(sp.asinh, of_logarithm)
 
 
 def spring_acceleration() -> sp.Expr:

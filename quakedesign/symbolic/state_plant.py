@@ -272,3 +272,15 @@ def is_steady(law: FrictionLaw) -> bool:
     at = dict(zip(variables[2:], law.steady_state(rate), strict=True))
     resting = [g.subs(at) for g in parts[1:]] + [f.diff(plant.x1) for f in parts]
     return all(f == 0 or sp.simplify(f) == 0 for f in resting)
+
+
+def without_overflow(friction: sp.Expr) -> sp.Expr:
+    """The same friction with arsinh z = L + log(1 + √(1 + e^(−2L))), L = log z: z of the regularised law is e^(μ/a)."""
+
+    def of_logarithm(z: sp.Expr) -> sp.Expr:
+        positive = {x: sp.Symbol(x.name, positive=True) for x in z.free_symbols}
+        back = {new: old for old, new in positive.items()}
+        logarithm = sp.expand_log(sp.log(z.subs(positive)), force=True).subs(back)
+        return logarithm + sp.log(1 + sp.sqrt(1 + sp.exp(-2 * logarithm)))
+
+    return friction.replace(sp.asinh, of_logarithm)

@@ -15,10 +15,10 @@ from quakedesign.certificates.matched import (
     largest_matched_rate,
     largest_sensitivities,
     least_authority,
-    only_weakens,
     static_friction,
 )
 from quakedesign.fault.friction import FrictionLaw, friction_law
+from quakedesign.symbolic.friction_bounds import friction_bounds
 
 REAL = qd.load_fault("real-fault")
 
@@ -66,13 +66,13 @@ def hardening():
 def test_the_laws_of_the_package_only_weaken(name):
     scale = {"critical_rate": 0.1} if "rate" in name else {"critical_slip": 0.1}
     fault = replace(REAL, friction=friction_law(name)(residual=0.2, drop=0.1, **scale))
-    assert only_weakens(fault)
+    assert friction_bounds(fault.friction).weakens
     assert static_friction(fault) == F(3, 10)
 
 
 def test_the_chords_of_a_hardening_law_are_inside_the_sectors():
     fault, rng = hardening(), np.random.default_rng(1)
-    assert not only_weakens(fault)
+    assert not friction_bounds(fault.friction).weakens
     k, N, stress = 30e9 / 2500 / 5000**2, 1 / (2500 * 5000), 50e6
     found = sectors(fault)
     low, high = rest_pressure(fault, (F(0), F(3, 4)))

@@ -16,11 +16,12 @@ from functools import cached_property
 from itertools import pairwise, product
 from math import comb
 
-from quakedesign.certificates.matched import friction_range, only_weakens, static_friction
+from quakedesign.certificates.matched import static_friction
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.loop import Model
 from quakedesign.rationals import fraction_of, rational
+from quakedesign.symbolic.friction_bounds import friction_bounds
 
 Range = tuple[Fraction, Fraction]
 _HALVINGS = 7
@@ -233,7 +234,7 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
         For friction with a state, or a disturbance of the class ``rate`` that does not start at 0.
     """
     fault.require_memoryless("a guarantee")
-    law, given, box = fault.friction.exact(), fault.disturbance, fault.box
+    law, given, box = friction_bounds(fault.friction), fault.disturbance, fault.box
     if rate_limited and given.constant:
         raise ParameterError(
             "the class rate needs a disturbance that starts at 0. Received a constant one of "
@@ -243,8 +244,6 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
 
     stage = sp.Symbol("s")
     shape = sp.Poly(fault.reference.shape(stage), stage).all_coeffs()[::-1]
-    least, largest = friction_range(fault)
-    slope, rate_slope = (fraction_of(sp.nsimplify(v, rational=True)) for v in (law.slip_slope, law.rate_slope))
     return Task(
         name=fault.name,
         density=rational(fault.density),
@@ -255,11 +254,11 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
         spreads=(box.stiffness, box.damping, box.authority),
         friction=Friction(
             static=static_friction(fault),
-            least=least,
-            largest=largest,
-            weakening=slope,
-            strengthening=Fraction(0) if only_weakens(fault) else slope,
-            rate_slope=rate_slope,
+            least=law.least,
+            largest=law.most,
+            weakening=law.slip_slope,
+            strengthening=Fraction(0) if law.weakens else law.slip_slope,
+            rate_slope=law.rate_slope,
         ),
         shape=tuple(fraction_of(sp.Rational(c)) for c in shape),
         target_slip=rational(fault.reference.target_slip),

@@ -11,8 +11,9 @@ from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import plant_ranges
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
-from quakedesign.rationals import nearest, rational
+from quakedesign.rationals import fraction_of, nearest, rational
 from quakedesign.symbolic import plant
+from quakedesign.symbolic.friction_bounds import friction_bounds
 from quakedesign.synthesis.linear.analysis.common_quadratic import CommonQuadratic, robust_stability, sector_loop
 from quakedesign.synthesis.linear.analysis.frequency import characteristic, circle_limit, slip_limit, stable_quartic
 from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop, polytope_of
@@ -115,8 +116,7 @@ def friction_slope_margin(fault: Fault, controller: Controller) -> SlopeMargin |
 def nominal_slope(fault: Fault) -> Fraction:
     """s_max = N̂σ'_n·(largest chord slope of friction in slip) at zero pressure [1/s²]."""
     values = plant.plant_values(fault)
-    exact = values[plant.N_hat] * values[plant.sigma] * fault.friction.exact().slip_slope
-    return rational(exact)
+    return fraction_of(values[plant.N_hat] * values[plant.sigma]) * friction_bounds(fault.friction).slip_slope
 
 
 def _largest(prove: Callable[[Fraction], Certificate | None], limit: Fraction) -> tuple[Fraction, Certificate | None]:

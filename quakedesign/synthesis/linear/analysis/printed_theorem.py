@@ -15,6 +15,7 @@ from quakedesign.certificates.premises import least_authority, plant_ranges
 from quakedesign.fault import Fault, load_fault
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
+from quakedesign.symbolic.friction_bounds import friction_bounds
 from quakedesign.synthesis.linear.analysis.inverse_optimality import InverseOptimality, inverse_optimality
 from quakedesign.synthesis.linear.design.algebraic_riccati import solve_care
 from quakedesign.synthesis.linear.design.nondimensional import sound_bound
@@ -133,9 +134,7 @@ def printed_row(fault: Fault) -> Range:
         nominal = fraction_of(values[symbol])
         return max(ranges[symbol][1] - nominal, nominal - ranges[symbol][0])
 
-    slope: Any = fault.friction.exact().slip_slope
-    stress = ranges[plant.sigma][1]
-    weakening = fraction_of(slope) if slope else Fraction(0)
+    weakening, stress = friction_bounds(fault.friction).slip_slope, ranges[plant.sigma][1]
     b, growth = least_authority(fault), fault.disturbance
     first = spread(plant.k_hat) + weakening * stress * spread(plant.N_hat) + abs(rational(growth.slip_growth))
     return first / b, (spread(plant.eta_hat) + abs(rational(growth.rate_growth))) / b

@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-import sympy as sp
-
 from quakedesign.certificates.linear_premises import Sectors, rest_pressure, sectors
 from quakedesign.certificates.premises import least_authority, plant_ranges
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
+from quakedesign.symbolic.friction_bounds import friction_bounds
 
 Range = tuple[Fraction, Fraction]
 _ZERO: Range = (Fraction(0), Fraction(0))
@@ -133,9 +132,9 @@ def uncertainty_bounds(fault: Fault, *, loading_rate: float | str = 0) -> Uncert
 
 def _terms(fault: Fault, found: Sectors, ranges, values, drift: Fraction) -> list[tuple[str, str, Range]]:
     """Name, what it acts on, and range in x2' of every term of b·h."""
-    law, disturbance = fault.friction.exact(), fault.disturbance
+    friction, disturbance = friction_bounds(fault.friction), fault.disturbance
     load = ranges[plant.N_hat][1] * found.largest_effective_stress
-    slip_chord, rate_chord = (load * _fraction(sp.sympify(v)) for v in (law.slip_slope, law.rate_slope))
+    slip_chord, rate_chord = (load * slope for slope in (friction.slip_slope, friction.rate_slope))
     k, eta = ranges[plant.k_hat], ranges[plant.eta_hat]
     lowest = found.slip[0] + k[1] - rational(disturbance.slip_growth)  # 0 where σ' − p* stays positive
     growth = [rational(v) for v in (disturbance.slip_growth, disturbance.rate_growth)]
@@ -150,8 +149,3 @@ def _terms(fault: Fault, found: Sectors, ranges, values, drift: Fraction) -> lis
         ("drift of the far end", "nothing", (Fraction(0), drift)),
         ("disturbance at rest", "nothing", (-shaking, shaking) if shaking else _ZERO),
     ]
-
-
-def _fraction(value: sp.Expr) -> Fraction:
-    exact = sp.nsimplify(value, rational=True)
-    return fraction_of(exact)

@@ -1,0 +1,181 @@
+"""Bounds and chord slopes of a friction law that proofs may use: what it declares, checked against its expression."""
+
+from collections.abc import Callable, Iterator
+from contextlib import nullcontext
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from math import inf
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.fault import FrictionLaw
+from quakedesign.rationals import fraction_of, rational
+from quakedesign.symbolic.intervals import EVERYTHING, Box
+from quakedesign.symbolic.maximum import Excess, Undecided, upper_limit
+from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, off_kinks
+from quakedesign.symbolic.state_plant import without_overflow
+
+SLACK = Fraction(1, 10**9)  # relative; what is declared as a float may be rounded inward by less
+_DIGITS, _ROUNDING = 50, Fraction(1, 10**45)
+_UNITS = {"slip": "m", "rate": "m/s"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrictionBounds:
+    """What holds of a friction law for every slip and slip rate, and of its continuation too.
+
+    Attributes
+    ----------
+    least, most : Fraction
+        Bounds of the friction coefficient [-], 0 < least.
+    slip_slope : Fraction
+        Largest chord slope in slip [1/m]; with state, along a motion that carries the state with it.
+    rate_slope : Fraction
+        Largest chord slope in slip rate [s/m], at a fixed state.
+    weakens : bool
+        Whether friction is proved not to grow with slip.
+    """
+
+    least: Fraction
+    most: Fraction
+    slip_slope: Fraction
+    rate_slope: Fraction
+    weakens: bool
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Friction on a range of slip, slip rate and state, and its slopes there."""
+
+    friction: sp.Expr
+    slip_slope: sp.Expr
+    rate_slope: sp.Expr
+    box: Box
+
+
+@lru_cache(maxsize=256)
+def friction_bounds(law: FrictionLaw) -> FrictionBounds:
+    """Bounds and chord slopes of a law, proved by interval arithmetic on its `coefficient` and `extended`.
+
+    What a law declares is returned where it is confirmed, or what is confirmed where that is larger by less than one
+    part in 1e9. `coefficient` counts for slip ≥ 0 and slip rates ≥ 0 within `working_rates`, with states between the
+    steady ones of these; `extended` for all slips and slip rates.
+
+    Raises
+    ------
+    ParameterError
+        When the law exceeds what it declares, or may lose all friction.
+    UnsupportedError
+        When that cannot be decided.
+    """
+    exact = law.exact()
+    courses = list(_courses(law, exact))
+    low, high = exact.bounds
+    found = FrictionBounds(
+        least=-_confirmed(law, courses, "the lower of its bounds", -_outward(low, up=False), lambda c: [-c.friction]),
+        most=_confirmed(law, courses, "the upper of its bounds", _outward(high, up=True), lambda c: [c.friction]),
+        slip_slope=_confirmed(
+            law, courses, "slip_slope", _outward(exact.slip_slope, up=True), lambda c: [c.slip_slope, -c.slip_slope]
+        ),
+        rate_slope=_confirmed(
+            law, courses, "rate_slope", _outward(exact.rate_slope, up=True), lambda c: [c.rate_slope, -c.rate_slope]
+        ),
+        weakens=all(upper_limit(c.slip_slope, c.box, Fraction(0), Fraction(0)) == 0 for c in courses),
+    )
+    if found.least <= 0:
+        raise ParameterError(
+            f"friction of {law.name} must stay positive. Its lower bound is {float(found.least):.4g}. "
+            "Raise the residual friction; without friction a pressure has no effect."
+        )
+    return found
+
+
+def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_Course]:
+    """The law within its domain, and its continuation where it has no state."""
+    slip, rate = sp.symbols("slip rate", nonnegative=True)
+    states = sp.symbols([*law.state_names], positive=True)
+    low, high = (end if abs(end) == inf else rational(end) for end in law.working_rates)
+    box = {slip: (Fraction(0), inf), rate: (max(Fraction(0), low), high)}
+    ends = [[rational(value) for value in law.steady_state(end)] for end in law.working_rates] if states else []
+    box |= {state: (min(pair), max(pair)) for state, *pair in zip(states, *ends, strict=True)} if states else {}
+    friction = _continuous(law, exact.coefficient(slip, rate, *states))
+    friction = without_overflow(friction) if states else friction
+    changes = exact.state_rates(slip, rate, *states)
+    carried = sum((_slope(friction, x) * dx / rate for x, dx in zip(states, changes, strict=True)), sp.Integer(0))
+    yield _Course(friction, _slope(friction, slip) + sp.expand(carried), _slope(friction, rate), box)
+    if not states:
+        slip, rate = sp.symbols("slip rate", real=True)
+        friction = _continuous(law, exact.extended(slip, rate))
+        box = {slip: EVERYTHING, rate: EVERYTHING}
+        yield _Course(friction, _slope(friction, slip), _slope(friction, rate), box)
+
+
+def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
+    """Friction, if it has no jumps, which no slope would tell of."""
+    found = sp.sympify(friction)
+    signs = [power for power in found.atoms(SignedPower) if power.args[1] == 0]
+    if signs or found.has(sp.sign, sp.Heaviside, sp.DiracDelta):
+        raise UnsupportedError(f"nothing can be proved with {law.name}, whose friction may jump. Write a steep ramp.")
+    return found
+
+
+def _slope(friction: sp.Expr, variable: sp.Symbol) -> sp.Expr:
+    with off_kinks() if friction.has(SignedPower, AbsolutePower) else nullcontext():
+        return friction.diff(variable)
+
+
+def _confirmed(
+    law: FrictionLaw,
+    courses: list[_Course],
+    what: str,
+    declared: Fraction,
+    parts: Callable[[_Course], list[sp.Expr]],
+) -> Fraction:
+    """A bound that a law declares, if none of the parts exceeds it."""
+    found = declared
+    for course in courses:
+        for part in parts(course):
+            try:
+                answer = upper_limit(part, course.box, declared, SLACK * abs(declared))
+            except UnsupportedError as error:
+                raise UnsupportedError(f"nothing can be proved with {law.name}: {error}") from None
+            if isinstance(answer, Excess):
+                raise ParameterError(_disagreement(law, what, declared, answer))
+            if isinstance(answer, Undecided):
+                raise UnsupportedError(_undecided(law, what, declared, answer))
+            found = max(found, answer)
+    return found
+
+
+def _disagreement(law: FrictionLaw, what: str, declared: Fraction, answer: Excess) -> str:
+    at = ", ".join(f"{x} {float(value):.4g} {_UNITS.get(str(x), '')}".rstrip() for x, value in answer.at.items())
+    return (
+        f"{what} of {law.name} must bound its friction. Declared {float(abs(declared)):.6g}, but "
+        f"{'at ' + at if at else 'everywhere'} it is {float(abs(answer.value)):.6g}. Correct what the law declares."
+    )
+
+
+def _undecided(law: FrictionLaw, what: str, declared: Fraction, answer: Undecided) -> str:
+    def told(end: Fraction | float) -> str:
+        return f"{float(min(end, Fraction(10) ** 300)):.3g}" if end < inf else "inf"
+
+    at = ", ".join(f"{x} from {told(low)} to {told(high)}" for x, (low, high) in answer.where.items())
+    return (
+        f"nothing can be proved with {law.name}: {what}, declared as {float(abs(declared)):.6g}, is not confirmed for "
+        f"{at or 'any slip'}. Write the law in another form, or hold the slip with Min."
+    )
+
+
+def _outward(value: object, *, up: bool) -> Fraction:
+    """A declared number, rounded outwards where it is irrational."""
+    number = sp.sympify(value)
+    if number.is_Rational:
+        return fraction_of(number)
+    if number.is_Float:
+        return rational(float(number))
+    if not number.is_finite:
+        raise ParameterError(f"bounds and slopes of a friction law must be finite numbers. Received {number}.")
+    near = rational(str(sp.N(number, _DIGITS)))
+    return near + abs(near) * (_ROUNDING if up else -_ROUNDING)
