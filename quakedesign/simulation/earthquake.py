@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
+from math import pi
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Disturbance, Fault
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.outcome import OutcomeCriterion
@@ -14,10 +15,12 @@ from quakedesign.simulation.schemes import simulation_scheme
 from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.symbolic import derive
 
-NUDGE = 3.2e-15
+NUDGE = 1e-9  # of the largest change of friction: far above rounding, far below what the peak depends on
 FOLDINGS = 90
 PERIODS = 100
-FINENESS = 0.02
+ENDING = 30, 10  # e-foldings and natural periods, of a fault that grows much faster than it swings
+FINENESS = 2e-3  # a step passes a kink of friction with an error of its square
+STILL = 1e3  # times the slip rate that the nudge alone gives: less is no growth
 
 
 def natural_earthquake(
@@ -28,7 +31,10 @@ def natural_earthquake(
     compiled: bool | None = None,
     plant: str = "smooth",
 ) -> Trajectory:
-    """Let an uncontrolled fault go, under a constant acceleration of 3.2e-15 m/s² and a constant pressure.
+    """Let an uncontrolled fault go, under a constant pressure and, if it is unstable, a tiny constant acceleration.
+
+    The acceleration is a share of 1e-9 of the largest change of friction, and the step so short, that the peak of the
+    slip rate depends on neither of them in its first six digits.
 
     Parameters
     ----------
@@ -42,13 +48,16 @@ def natural_earthquake(
     Returns
     -------
     Trajectory
-        Over 90 e-foldings of the unstable eigenvalue, or 100 natural periods of a stable fault; steps of at most
-        0.02/ω_n. Of the metrics only `peak_slip_rate`, `steps` and `seconds` are given.
+        Over 90 e-foldings of the unstable eigenvalue, or 30 of them and 10 natural periods if that is longer, or 100
+        natural periods of a stable fault, which stays at rest; steps of at most 2e-3/ω_n. Of the metrics only
+        `peak_slip_rate`, `steps` and `seconds` are given.
 
     Raises
     ------
     ParameterError
         For a pressure that is not below the effective normal stress.
+    SimulationError
+        When the fault is unstable and yet does not move.
     """
     fault.require_memoryless("the natural earthquake")
     if not abs(pressure) < fault.effective_normal_stress:
@@ -56,15 +65,23 @@ def natural_earthquake(
             f"pressure must be below the effective normal stress ({fault.effective_normal_stress!r} Pa) in size. "
             f"Received {pressure!r} Pa."
         )
-    nudged = fault.with_disturbance(Disturbance(constant=NUDGE))
+    growth = derive(fault).eigenvalues[0].real
+    nudge = _nudge(fault) if growth > 0 else 0.0
+    nudged = fault.with_disturbance(Disturbance(constant=nudge))
     step = min(fault.sampling_time, FINENESS / fault.natural_frequency)
-    setting = Setting.of(nudged, step, _duration(fault), 2000, 0.0)
+    setting = Setting.of(nudged, step, _duration(fault, growth), 2000, 0.0)
     recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
     criterion = OutcomeCriterion.of(fault, natural_peak(fault) if pressure else None)
     found = run(recorder, setting, integrator("dormand-prince"), criterion, progress=progress, compiled=compiled)
-    if pressure or not derive(fault).unstable:
+    if pressure or growth <= 0:
         return found
-    return replace(found, criterion=OutcomeCriterion.of(fault, found.metrics.peak_slip_rate))
+    peak = found.metrics.peak_slip_rate  # none where the run diverges
+    if peak is not None and peak <= STILL * nudge / growth:
+        raise SimulationError(
+            f"{fault.name} is unstable (eigenvalue {growth:.4g} 1/s), but its simulation does not move: its peak is "
+            f"{peak!r} m/s. Rounding may drown its friction; check the numbers of the law."
+        )
+    return replace(found, criterion=OutcomeCriterion.of(fault, peak))
 
 
 def natural_peak(fault: Fault) -> float | None:
@@ -77,9 +94,15 @@ def _peak(fault: Fault) -> float | None:
     return natural_earthquake(fault, compiled=False).criterion.natural_peak
 
 
-def _duration(fault: Fault) -> float:
-    """Time [s] in which an instability has grown from nothing and ended."""
-    from math import pi
+def _nudge(fault: Fault) -> float:
+    """Acceleration [m/s²] that is small beside the forces of an event."""
+    low, high = fault.friction.bounds
+    return NUDGE * (high - low) * fault.authority * fault.effective_normal_stress
 
-    growth = derive(fault).eigenvalues[0].real
-    return FOLDINGS / growth if growth > 0 else PERIODS * 2 * pi / fault.natural_frequency
+
+def _duration(fault: Fault, growth: float) -> float:
+    """Time [s] in which an instability has grown from nothing and ended."""
+    period = 2 * pi / fault.natural_frequency
+    if growth <= 0:
+        return PERIODS * period
+    return max(FOLDINGS / growth, ENDING[0] / growth + ENDING[1] * period)

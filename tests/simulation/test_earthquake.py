@@ -3,9 +3,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from quakedesign.errors import ParameterError
-from quakedesign.fault import load_fault
-from quakedesign.simulation import natural_earthquake
+from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.fault import friction_law, load_fault
+from quakedesign.simulation import earthquake, natural_earthquake
 
 REAL = load_fault("real-fault")
 
@@ -37,7 +37,7 @@ def test_injected_fluid_makes_it_larger():
 def test_a_stable_fault_stays():
     stable = dataclasses.replace(REAL, friction=dataclasses.replace(REAL.friction, drop=0.0))
     run = natural_earthquake(stable)
-    assert run.metrics.peak_slip_rate < 1e-14
+    assert run.metrics.peak_slip_rate == 0
     assert run.time[-1] == pytest.approx(200 * np.pi / REAL.natural_frequency, rel=1e-3)
 
 
@@ -45,3 +45,66 @@ def test_a_stable_fault_stays():
 def test_a_pressure_that_opens_the_fault_is_refused(pressure):
     with pytest.raises(ParameterError, match="effective normal stress"):
         natural_earthquake(REAL, pressure)
+
+
+LAB = load_fault("lab-fault")
+LINEAR = friction_law("linear-slip-weakening")(residual=0.4, drop=0.17, critical_slip=2.5e-3)
+LAWS = {
+    "exponential": LAB,
+    "linear": dataclasses.replace(LAB, friction=LINEAR),
+    "rate": dataclasses.replace(
+        LAB, friction=friction_law("slip-rate-weakening")(residual=0.4, drop=0.17, critical_rate=0.02)
+    ),
+}
+
+
+def weakening_then_residual(fault):
+    """Peak slip rate [m/s] of linear weakening out of unstable rest: two linear oscillators, joined at the kink.
+
+    Before it x'' = s²x − η̂x' with s² = N̂σ'Δμ/d_c − k̂ along the unstable eigenvector x' = λx; after it
+    x'' = N̂σ'Δμ − k̂x − η̂x'. The peak is where x'' = 0.
+    """
+    k, eta, law = fault.specific_stiffness, fault.specific_damping, fault.friction
+    drop = fault.authority * fault.effective_normal_stress * law.drop
+    growth = -eta / 2 + np.sqrt(eta**2 / 4 + drop / law.critical_slip - k)
+    slow, fast = np.roots([1, eta, k])
+    offset, rate = law.critical_slip - drop / k, growth * law.critical_slip
+    a = (rate - fast * offset) / (slow - fast)
+    b = offset - a
+    peak = np.log(-b * fast**2 / (a * slow**2)) / (slow - fast)
+    return float(np.real(a * slow * np.exp(slow * peak) + b * fast * np.exp(fast * peak)))
+
+
+def test_linear_weakening_in_the_laboratory_peaks_where_two_oscillators_meet():
+    run = natural_earthquake(LAWS["linear"])
+    assert run.metrics.peak_slip_rate == pytest.approx(weakening_then_residual(LAWS["linear"]), rel=5e-7)
+    assert run.slip[-1] == pytest.approx(LAWS["linear"].rest_slip, rel=1e-6)
+
+
+@pytest.mark.parametrize("fault", [LAWS["exponential"], LAWS["linear"]], ids=["exponential", "linear"])
+def test_the_peak_depends_neither_on_the_nudge_nor_on_the_step(monkeypatch, fault):
+    """To the six digits that are printed."""
+    peaks = {f"{natural_earthquake(fault).metrics.peak_slip_rate:.6g}"}
+    for name, value in (("NUDGE", 1e-10), ("NUDGE", 7e-9), ("FINENESS", 1.3e-3), ("FINENESS", 9e-4)):
+        with monkeypatch.context() as changed:
+            changed.setattr(earthquake, name, value)
+            peaks.add(f"{natural_earthquake(fault).metrics.peak_slip_rate:.6g}")
+    assert len(peaks) == 1
+
+
+def test_every_law_without_state_has_an_earthquake_where_it_is_unstable():
+    for fault in LAWS.values():
+        assert natural_earthquake(fault).metrics.peak_slip_rate > 1e-3
+
+
+def test_fast_weakening_is_simulated_until_the_slow_spring_has_unloaded():
+    """Weakening over 1 µm grows a hundred times faster than the fault swings; the rest is at (μ_max − μ_res)σ'A/k."""
+    brittle = dataclasses.replace(LAB, friction=dataclasses.replace(LAB.friction, critical_slip=1e-6))
+    run = natural_earthquake(brittle)
+    assert run.slip[-1] == pytest.approx(0.17 * 1e5 * 0.1 / 225.5e3, rel=1e-6)
+
+
+def test_an_unstable_fault_that_does_not_move_is_a_defect(monkeypatch):
+    monkeypatch.setattr(earthquake, "NUDGE", 1e-22)
+    with pytest.raises(SimulationError, match=r"lab-fault is unstable .* but its simulation does not move"):
+        natural_earthquake(LAWS["linear"])
