@@ -280,7 +280,12 @@ fastest_rate = "1 m/s"
 """
     path = tmp_path / "state.toml"
     path.write_text(text[:start] + law + text[end:])
-    assert run(capsys, "fault", str(path))[0] == 0
+    code, told, _ = run(capsys, "fault", str(path))
+    assert code == 0
+    assert "magnitude and slip of an event depend on its history" in told
+    assert "rest slip" not in told
+    found = json.loads(run(capsys, "fault", str(path), "--json")[1])
+    assert [found[name] for name in ("seismic_moment", "magnitude", "rest_slip")] == [None] * 3
     for command in (("design", str(path), "--out", str(tmp_path / "out")), ("simulate", str(path))):
         code, _, err = run(capsys, *command)
         assert code == 2

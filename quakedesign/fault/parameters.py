@@ -136,23 +136,32 @@ class Fault:
 
     @property
     def stress_drop(self) -> float:
-        """Δτ = (μ_max − μ_res)σ'_n [Pa]."""
+        """Δτ = (μ_max − μ_res)σ'_n [Pa]; nan for friction with a state, whose drop is that of an event."""
+        if self.friction.state_names:
+            return math.nan
         low, high = self.friction.bounds
         return (high - low) * self.effective_normal_stress
 
     @property
     def seismic_moment(self) -> float:
-        """M0 = L³Δτ [N·m], eq. magnitude."""
+        """M0 = L³Δτ [N·m], eq. magnitude; nan for friction with a state: see `moment_of`."""
         return self.length**3 * self.stress_drop
 
     @property
     def magnitude(self) -> float:
-        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity without a stress drop."""
-        return 2 / 3 * math.log10(self.seismic_moment) - 6.07 if self.seismic_moment > 0 else -math.inf
+        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity without a stress drop, nan as `seismic_moment`."""
+        return magnitude(self.seismic_moment)
+
+    def moment_of(self, slip: float) -> float:
+        """M0 = GAD [N·m] of an event that slips by D [m]: L³Δτ with the stress that the spring loses."""
+        return self.shear_modulus * self.area * slip
 
     @cached_property
     def rest_slip(self) -> float:
-        """Slip [m] at which the fault comes to rest next: the stable root of the statics; 0 for a stable fault."""
+        """Slip [m] at which the fault comes to rest next: the stable root of the statics; 0 for a stable fault.
+
+        nan for friction with a state, which has no strength of its own at rest.
+        """
         from quakedesign.fault.statics import rest_slip
 
         return rest_slip(self)
@@ -178,6 +187,11 @@ def require_plant(**numbers: float) -> None:
                 require_positive(compression if name == "effective_normal_stress" else "", **{name: value})
             require_ordinary(**{name: value})
     problems.refuse()
+
+
+def magnitude(seismic_moment: float) -> float:
+    """M_w = ⅔log10(M0) − 6.07 [-] of a seismic moment [N·m], eq. magnitude; minus infinity of none."""
+    return -math.inf if seismic_moment <= 0 else 2 / 3 * math.log10(seismic_moment) - 6.07
 
 
 def require_fault(fault: Fault) -> Fault:

@@ -1,5 +1,6 @@
 """Where a fault that starts to slip comes to rest."""
 
+from math import nan
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -13,11 +14,11 @@ def rest_slip(fault: "Fault") -> float:
     """Smallest positive slip [m] where the excess of load over strength turns from driving to resisting.
 
     The excess is (μ(0) − μ(x))σ'_n A − kx at zero pressure (statics of eq. shift). All roots lie below
-    (μ_max − μ_min)σ'_n A/k. A fault whose origin is stable stays where it is; so does one whose friction has a state,
-    because it has no strength of its own at rest.
+    (μ_max − μ_min)σ'_n A/k. A fault whose origin is stable stays where it is; friction with a state has no strength
+    of its own at rest, and nan is returned.
     """
     if fault.friction.state_names:
-        return 0.0
+        return nan
     import mpmath
     import sympy as sp
 

@@ -1,6 +1,7 @@
 """What a fault is, in numbers and in sentences."""
 
 from fractions import Fraction
+from math import isfinite
 from typing import Any
 
 from quakedesign.bounds import LowerBound
@@ -22,9 +23,9 @@ def fault_dict(fault: Fault) -> dict[str, Any]:
         "source": fault.source,
         "natural_frequency": fault.natural_frequency,
         "damping_ratio": fault.damping_ratio,
-        "seismic_moment": fault.seismic_moment,
-        "magnitude": fault.magnitude if fault.stress_drop > 0 else None,
-        "rest_slip": fault.rest_slip,
+        "seismic_moment": _known(fault.seismic_moment),
+        "magnitude": _known(fault.magnitude),
+        "rest_slip": _known(fault.rest_slip),
         "unstable": model.unstable,
         "reasons": list(model.reasons),
         "eigenvalues": [[z.real, z.imag] for z in model.eigenvalues],
@@ -45,14 +46,11 @@ def fault_sentences(fault: Fault) -> list[str]:
     """The same for people."""
     model = derive(fault)
     poles = ", ".join(f"{z.real:.4g}{z.imag:+.4g}i" if z.imag else f"{z.real:.4g}" for z in model.eigenvalues)
-    magnitude = f"{fault.magnitude:.2f}" if fault.stress_drop > 0 else "none (no stress drop)"
     state = "unstable: " + "; ".join(model.reasons) if model.unstable else "stable without control"
     return [
         f"mass {fault.mass:.4g} kg, stiffness {fault.stiffness:.4g} N/m, natural frequency "
         f"{fault.natural_frequency:.4g} rad/s, damping ratio {fault.damping_ratio:.4g}",
-        f"seismic moment {fault.seismic_moment:.4g} N·m, magnitude {magnitude}",
-        f"next rest slip {fault.rest_slip:.4g} m, target slip {fault.reference.target_slip:.4g} m in "
-        f"{fault.reference.operation_time:.6g} s{beyond_rest(fault)}",
+        *_event(fault),
         f"{state}; eigenvalues {poles} 1/s",
         sampling_sentence(sampling_adequacy(fault)),
         *([need_sentence(needed)] if (needed := needed_pressure(fault)) else []),
@@ -77,3 +75,21 @@ def sampling_sentence(found: SamplingAdequacy) -> str:
         f"T_s = {found.step:.4g} s {judged}: times the unstable pole, {found.pole:.4g} 1/s {where}, it is "
         f"{found.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
     )
+
+
+def _known(value: float) -> float | None:
+    """A number, if there is one."""
+    return value if isfinite(value) else None
+
+
+def _event(fault: Fault) -> list[str]:
+    """What an earthquake of the fault is, as far as it is known without simulating one, and the task."""
+    task = f"target slip {fault.reference.target_slip:.4g} m in {fault.reference.operation_time:.6g} s"
+    if fault.friction.state_names:
+        said = "stress drop, magnitude and slip of an event depend on its history: simulate a cycle (simulate_state)"
+        return [said, task]
+    magnitude = f"{fault.magnitude:.2f}" if fault.stress_drop > 0 else "none (no stress drop)"
+    return [
+        f"seismic moment {fault.seismic_moment:.4g} N·m, magnitude {magnitude}",
+        f"next rest slip {fault.rest_slip:.4g} m, {task}{beyond_rest(fault)}",
+    ]

@@ -74,6 +74,25 @@ class StateTrajectory(Recording):
 
         return np.diff(self.onsets)
 
+    @property
+    def event_slips(self) -> "np.ndarray":
+        """Slip [m] of every event that has ended: from its onset until the slip rate is back at `onset_rate`.
+
+        Between the instants of `time` by straight lines. `Fault.moment_of` makes it a seismic moment.
+        """
+        import numpy as np
+
+        below = self.slip_rate <= self.onset_rate
+        falls = np.flatnonzero(~below[:-1] & below[1:])
+        ends = [next((i for i in falls if self.time[i + 1] > onset), None) for onset in self.onsets]
+        at = [self._slip_at_rate(int(i)) for i in ends if i is not None]
+        return np.array(at) - np.interp(self.onsets[: len(at)], self.time, self.slip)
+
+    def _slip_at_rate(self, i: int) -> float:
+        """Slip [m] at which the slip rate falls through `onset_rate`, between the instants i and i + 1."""
+        (fast, slow), (before, after) = self.slip_rate[i : i + 2], self.slip[i : i + 2]
+        return before + (after - before) * (fast - self.onset_rate) / (fast - slow)
+
     def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
         """Values, long name and SI unit of every signal, by name."""
         found = {name: (getattr(self, name), *described) for name, described in SIGNALS.items()}

@@ -7,7 +7,8 @@ from itertools import product
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault import Disturbance, load_fault
+from quakedesign.fault import Disturbance, friction_law, load_fault
+from quakedesign.fault.parameters import magnitude
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
 PLANT = ("density", "shear_modulus", "length", "damping", "effective_normal_stress")
@@ -51,6 +52,23 @@ def test_everything_per_unit_mass_follows_from_density_and_length():
     assert REAL.specific_damping == pytest.approx(1.6)
     assert REAL.damping_ratio == pytest.approx(1.6 / (2 * math.sqrt(0.48)))
     assert REAL.stress_drop == pytest.approx(5e6)
+
+
+def test_friction_with_a_state_has_no_drop_of_its_own():
+    """The ends of its working range say nothing about an event; the moment of a slip is G A D."""
+    aging = friction_law("rate-and-state-aging")(
+        reference_coefficient=0.6,
+        direct_effect=0.01,
+        evolution_effect=0.015,
+        critical_slip=0.01,
+        reference_rate=1e-6,
+        slowest_rate=1e-12,
+        fastest_rate=1.0,
+    )
+    fault = replace(REAL, friction=aging)
+    assert all(math.isnan(v) for v in (fault.stress_drop, fault.seismic_moment, fault.magnitude, fault.rest_slip))
+    assert fault.moment_of(0.1) == pytest.approx(30e9 * 5000**2 * 0.1)
+    assert magnitude(fault.moment_of(0.1)) == pytest.approx(2 / 3 * math.log10(7.5e16) - 6.07)
 
 
 def test_without_a_stress_drop_there_is_no_earthquake():

@@ -17,6 +17,7 @@ from scipy.special import lambertw
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import load_fault
 from quakedesign.fault.friction import friction_law
+from quakedesign.fault.parameters import magnitude
 from quakedesign.simulation import SpringSlider, simulate_state, velocity_step
 from quakedesign.symbolic import state_plant
 
@@ -289,6 +290,10 @@ def test_a_fault_has_earthquakes_years_apart():
         assert len(run.onsets) >= 3
         assert np.max(run.slip_rate) > 1e-3
         assert np.ptp(run.recurrence_intervals[1:]) < 1e-3 * run.recurrence_intervals[-1]
+        # what the spring loses in an event, and regains at the loading rate until the next one
+        regained = 1e-9 * run.recurrence_intervals[-1]
+        assert run.event_slips[-1] == pytest.approx(regained, rel=0.1)
+        assert 5.8 < magnitude(fault.moment_of(run.event_slips[-1])) < 5.9  # Hanks and Kanamori of G A D
     intervals = [run.recurrence_intervals[-1] for run in runs]
     assert intervals[0] == pytest.approx(intervals[1], rel=0.05)
 
