@@ -24,7 +24,15 @@ def grade(entry: "Entry") -> str:
     if entry.design.verdict is not Verdict.PROVED:
         return str(entry.design.verdict)
     missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _held(entry)
-    return f"proved, but {'; '.join(missing)}" if missing else "proved for this loop and task"
+    reach = f"proved, but {'; '.join(missing)}" if missing else "proved for this loop and task"
+    return f"{reach}; UNSTABLE if p is held over T_s" if _unstable_if_held(entry) else reach
+
+
+def _unstable_if_held(entry: "Entry") -> bool:
+    """Whether a run with p acting at once hides what a sampled controller would do."""
+    if entry.run is None or entry.held is None:
+        return False
+    return entry.run.provenance["scheme"] == "continuous" and entry.held.runs.verdict is Verdict.REFUTED
 
 
 def _bounded(entry: "Entry", premise: Premise) -> bool:

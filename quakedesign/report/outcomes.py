@@ -2,6 +2,8 @@
 
 from quakedesign.simulation import Trajectory
 
+_NEGLIGIBLE = 1e-6
+"""Of the larger end of a range of pressures: a smaller end is said to be zero."""
 OUTCOME_COLUMNS = ("outcome", "peak rate [m/s]", "of natural")
 
 
@@ -31,7 +33,9 @@ def pressure_extremes(run: Trajectory) -> tuple[float, float] | None:
 
 def pressure_sentence(least: float, largest: float) -> str:
     """Range of a pressure [Pa], and whether it is withdrawal or injection."""
-    parts = [f"{value / 1e6 + 0.0:.3g} MPa{_way(value)}" for value in (least, largest)]
+    nothing = _NEGLIGIBLE * max(abs(least), abs(largest))
+    shown = (value if abs(value) > nothing else 0.0 for value in (least, largest))
+    parts = [f"{value / 1e6 + 0.0:.3g} MPa{_way(value)}" for value in shown]
     return f"pressure from {parts[0]} to {parts[1]}"
 
 

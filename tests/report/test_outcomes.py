@@ -1,0 +1,94 @@
+"""What a run is said to have come to, how far a proof reaches, and when a comparison is a positive answer."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from quakedesign.certificates import Verdict
+from quakedesign.certificates.premise import Premise
+from quakedesign.cli.design import positive
+from quakedesign.controllers import control_law
+from quakedesign.fault import load_fault
+from quakedesign.report import Entry, headline
+from quakedesign.report.grade import grade
+from quakedesign.report.outcomes import outcome_cells, outcome_sentence, pressure_sentence
+from quakedesign.simulation import simulate
+from quakedesign.synthesis import Design
+
+FAULT = load_fault(Path(__file__).parent.parent / "data" / "undersampled_fault.toml")
+LAW = control_law("cta").from_values(("7", "5", "2.3", "1.1"), divisor="27/260000000").scaled("0.000136822")
+FINE = Premise(name="along_reference", required=0.9, certified=1.0, unit="m/s^3")
+CHATTER = Premise(name="on_trajectory", required=1.0004, certified=1.0, unit="m/s^3", measured=True)
+MOVING = Premise(name="constant_reference", required=1.0, certified=0.0, unit="m/s")
+
+
+def entry(run, *premises, verdict=Verdict.PROVED, **more):
+    design = Design(
+        fault=FAULT, name="cta", verdict=verdict, controller=LAW, certificate=None, premises=tuple(premises)
+    )
+    return Entry(label="x", origin="designed", design=design, run=run, **more)
+
+
+@pytest.fixture(scope="module")
+def slow():
+    return simulate(FAULT, LAW, duration=100.0)
+
+
+@pytest.fixture(scope="module")
+def fine():
+    return simulate(FAULT, LAW, duration=100.0, step=0.01)
+
+
+def test_a_proved_design_whose_run_is_an_earthquake_is_no_positive_answer(slow, fine):
+    answers = [positive(SimpleNamespace(of=lambda _, run=run: (entry(run, FINE),))) for run in (slow, fine)]
+    assert answers == [False, True]
+
+
+def test_the_headline_says_outcome_and_pressure_before_the_verdict(slow):
+    parts = headline(entry(slow, FINE)).split("; ")
+    assert parts[0] == outcome_sentence(slow)
+    share = 100 * slow.outcome.share_of_natural
+    peak = slow.metrics.peak_slip_rate
+    assert parts[0] == f"earthquake: peak slip rate {peak:.3g} m/s, {share:.3g} % of the natural earthquake's 0.313 m/s"
+    assert parts[1].startswith("pressure from -")
+    assert "(withdrawal) to" in parts[1]
+    assert parts[2] == "proved in continuous time"
+    assert entry(slow).to_dict()["outcome"] == slow.outcome.to_dict()
+
+
+def test_cells_are_short_and_say_what_is_not_known(slow):
+    assert outcome_cells(None) == ("–", "–", "–")
+    kind, peak, share = outcome_cells(slow)
+    assert (kind, peak) == ("earthquake", f"{slow.metrics.peak_slip_rate:.2e}")
+    assert share.endswith(" %")
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [
+        ((-5.674e6, 2.5e4), "pressure from -5.67 MPa (withdrawal) to 0.025 MPa (injection)"),
+        ((0.0, 2e6), "pressure from 0 MPa to 2 MPa (injection)"),
+        ((-7.4e6, 2.9e-10), "pressure from -7.4 MPa (withdrawal) to 0 MPa"),
+        ((-0.0, 0.0), "pressure from 0 MPa to 0 MPa"),
+    ],
+)
+def test_the_sign_of_the_pressure_is_said(ends, said):
+    assert pressure_sentence(*ends) == said
+
+
+def test_verdicts_are_graded_by_what_the_proof_leaves_out(slow):
+    assert grade(entry(slow, FINE)) == "proved for this loop and task"
+    assert grade(entry(slow, FINE, CHATTER)) == "proved, but on_trajectory fails 1.01-fold"
+    assert grade(entry(slow, MOVING)) == "proved, but constant_reference fails (nothing is certified)"
+    assert grade(entry(slow, MOVING, peaks={"amplitude": "a bound"})) == "proved for this loop and task"
+    assert grade(entry(slow, FINE, growth_per_step=1.2)) == "proved, but UNSTABLE at the step used"
+    assert grade(entry(slow, FINE, verdict=Verdict.UNDECIDED)) == "undecided"
+    assert grade(entry(slow, FINE, verdict=Verdict.REFUTED)) == "refuted"
+
+
+def test_a_held_pressure_is_not_what_is_proved(slow):
+    held = simulate(FAULT, LAW, duration=1.0, scheme="implicit")
+    assert grade(entry(held, FINE)) == "proved, but p is held (implicit), which is not covered"
+    unstable = SimpleNamespace(runs=SimpleNamespace(verdict=Verdict.REFUTED))
+    assert grade(entry(slow, FINE, held=unstable)) == "proved for this loop and task; UNSTABLE if p is held over T_s"
