@@ -10,7 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.errors import CertificateError
-from quakedesign.sos.exact.strict import common_grid, parse, read_exponents, read_rational
+from quakedesign.sos.exact.strict import (
+    common_grid,
+    listed,
+    objected,
+    parse,
+    polynomial_text,
+    read_exponents,
+    read_polynomial,
+    read_rational,
+    read_rationals,
+    with_keys,
+)
 
 
 @given(st.fractions())
@@ -86,3 +97,81 @@ def test_a_common_denominator_is_bounded():
     common_grid([Fraction(1, p) for p in primes[:100]] * 50)
     with pytest.raises(CertificateError, match="common denominator"):
         common_grid([Fraction(1, p) for p in primes])
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ('{"a":1,"a":1}', "occurs twice"),
+        ('[{"b":{"a":1,"c":2,"a":3}}]', "occurs twice"),
+        ("[1.0]", "numbers must be"),
+        ("[1e3]", "numbers must be"),
+        ("[NaN]", "numbers must be"),
+        ("[-Infinity]", "numbers must be"),
+        ("[1000]", "out of range"),
+        ("[-100]", "out of range"),
+        ("[-0]", "out of range"),
+        ("[" + "9" * 5000 + "]", "out of range"),
+        ("[1", "not JSON"),
+    ],
+)
+def test_what_json_allows_and_the_format_does_not_is_refused(text, reason):
+    with pytest.raises(CertificateError, match=reason):
+        parse(text)
+
+
+def test_integers_of_three_digits_are_read():
+    assert parse('{"a":[0,7,10,999,-99],"b":{"a":""}}') == {"a": [0, 7, 10, 999, -99], "b": {"a": ""}}
+    assert parse("7") == 7
+    assert parse('""') == ""
+
+
+def test_depth_counts_what_is_open():
+    """Twelve open at once, but twenty in all."""
+    assert parse("[" + nested(11) + "," + nested(11) + "]") == [json.loads(nested(11))] * 2
+    with pytest.raises(CertificateError, match="deeper"):
+        parse("[" + nested(11) + "," + nested(12) + "]")
+
+
+def refused(read, *arguments, **options):
+    with pytest.raises(CertificateError):
+        read(*arguments, **options)
+    return True
+
+
+def test_keys_lengths_and_kinds_are_exact():
+    assert with_keys({"a": 1}, {"a"}) == {"a": 1}
+    assert all(refused(with_keys, raw, {"a"}) for raw in ({}, {"a": 1, "b": 2}, {"b": 1}, ["a"], {"a"}, None, "a"))
+    assert listed([1, 2], "x", 2) == listed([1, 2], "x", length=2) == listed([1, 2], "x") == [1, 2]
+    assert all(refused(listed, raw, "x", 2) for raw in ([1, 2, 3], (1, 2), {"a": 1}, "ab"))
+    assert all(refused(listed, raw, "x", length=2) for raw in ([1], [1, 2, 3]))
+    assert objected({"a": 1, "b": 2}, "x", 2) == {"a": 1, "b": 2}
+    assert all(refused(objected, raw, "x", 2) for raw in ({"a": 1, "b": 2, "c": 3}, [1], "ab"))
+
+
+def test_named_rationals_have_names():
+    assert read_rationals({"a_1": "1/2"}, "x", 1) == {"a_1": Fraction(1, 2)}
+    assert all(refused(read_rationals, raw, "x", 2) for raw in ({"1a": "1"}, {"a b": "1"}, {"a": 1}, {"a" * 41: "1"}))
+
+
+def test_polynomials_are_read_and_written():
+    text = {"0,0": "1", "2,10": "-1/3"}
+    assert read_polynomial(text, "x", 2, 2) == read_polynomial(text, "x", None, 2) == {
+        (0, 0): 1, (2, 10): Fraction(-1, 3)
+    }  # fmt: skip
+    assert polynomial_text(read_polynomial(text, "x", 2, 2)) == text
+    for raw in ({"0,0": "0"}, {"0": "1"}, {"0,0,0": "1"}, {"00,0": "1"}, {"0, 0": "1"}, {"-1,0": "1"}, {"1000,0": "1"}):
+        assert refused(read_polynomial, raw, "x", 2, 2)
+    assert refused(read_polynomial, text, "x", 2, 1)
+    assert refused(read_polynomial, {"0": "1", "0,1": "1"}, "x", None, 2)
+
+
+def test_exponents_reach_from_zero_to_the_largest():
+    assert read_exponents([0, 3], 2, 3) == (0, 3)
+    assert all(refused(read_exponents, raw, 2, 3) for raw in ([0, 4], [-1, 3], [False, 3]))
+
+
+def test_a_common_denominator_of_the_largest_length_is_read():
+    common_grid([Fraction(1, 2**13), Fraction(1, 2**16383)])  # of 16384 bits
+    assert refused(common_grid, [Fraction(1, 2**16384)])
+    assert refused(common_grid, [Fraction(1, 2**16383), Fraction(1, 3)])
