@@ -53,6 +53,10 @@ class CertificateError(QuakedesignError, ValueError):
     """A certificate file that is not one, or whose proof does not hold."""
 
 
+class WorkError(QuakedesignError, ArithmeticError):
+    """An exact check that takes more work than it may: it is undecided."""
+
+
 class SimulationError(QuakedesignError, RuntimeError):
     """A closed loop that cannot be integrated as asked."""
 

@@ -5,6 +5,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from quakedesign.certificates.checking import check
 from quakedesign.certificates.claim import Certificate, Verdict
 from quakedesign.certificates.files import certificate_of, read_json
 from quakedesign.certificates.guarantee import task_of
@@ -20,12 +21,13 @@ from quakedesign.certificates.premises import (
 )
 from quakedesign.certificates.response import Response
 from quakedesign.certificates.tracking import peaks_covered
-from quakedesign.errors import CertificateError
+from quakedesign.errors import CertificateError, WorkError
 from quakedesign.fault import Fault, load_fault
 from quakedesign.sos import Answer, Positivity
 from quakedesign.sos.exact.files import is_about_polynomial
 from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.words import sentences
+from quakedesign.sos.exact.work import limited
 from quakedesign.symbolic.terms import from_terms
 
 
@@ -58,8 +60,11 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
             verdict_of, said = _polynomial(raw)
             return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
         certificate = certificate_of(raw)
-        verdict = certificate.check()
+        with limited():
+            verdict = check(certificate)
         more = _covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []
+    except WorkError as error:
+        return f"undecided: {error}", []
     except CertificateError as error:
         return f"invalid: {' '.join(str(error).split())}", []
     return str(verdict), [*statement(certificate), *more]
@@ -82,8 +87,9 @@ def _polynomial(raw: Any) -> tuple[str, list[str]]:
     """Verdict on a file about a plain polynomial."""
     statement, proof = read_polynomial_file(raw)
     answer = Answer(statement=statement, proof=proof)
-    if not answer.check():
-        raise CertificateError("the proof does not decide the statement")
+    with limited():
+        if not answer.check():
+            raise CertificateError("the proof does not decide the statement")
     kind = "proved" if answer.verdict is Positivity.SOS else "refuted"
     return kind, [line for line in sentences(answer) if not line.endswith("exact arithmetic")]
 

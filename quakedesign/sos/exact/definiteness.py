@@ -6,6 +6,8 @@ from itertools import islice
 from math import lcm
 from typing import TypeVar
 
+from quakedesign.sos.exact.work import length, longest, spend
+
 Entry = TypeVar("Entry", int, Fraction)
 
 
@@ -41,8 +43,9 @@ def positive_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
     rows : sequence of n sequences of n Fraction
         Assumed symmetric; only then is the answer meaningful.
     """
-    integers, _ = over_common_denominator([value for row in rows for value in row])
     size = len(rows)
+    spend(size * size, longest(value for row in rows for value in row))
+    integers, _ = over_common_denominator([value for row in rows for value in row])
     return positive_definite_integers([integers[i * size : (i + 1) * size] for i in range(size)])
 
 
@@ -54,6 +57,8 @@ def positive_definite_integers(rows: Sequence[Sequence[int]]) -> bool:
     """
     from flint import fmpz_mat
 
+    bits = max((abs(v).bit_length() for row in rows for v in row), default=0)
+    spend(1 + len(rows) ** 4 * (bits + 10) // 100_000)  # modulo one prime after another, some nanoseconds each
     coefficients = reversed(fmpz_mat(rows).charpoly().coeffs())
     return all((-c if power % 2 else c) > 0 for power, c in enumerate(coefficients))
 
@@ -94,6 +99,8 @@ def _eliminates(block: list[list[Fraction]]) -> bool:
         pivot = block[k][k]
         if pivot < 0 or (pivot == 0 and any(block[k][j] for j in range(k + 1, size))):
             return False
+        if pivot:
+            spend(6 * (size - k) ** 2, max(length(v) for row in block[k:] for v in row[k:]))
         for i in range(k + 1, size) if pivot else ():
             factor = block[i][k] / pivot
             for j in range(k + 1, size) if factor else ():

@@ -8,6 +8,7 @@ from operator import add
 from typing import Any
 
 from quakedesign.rationals import fraction_of
+from quakedesign.sos.exact.work import expanded, length, longest, spend
 
 Exponents = tuple[int, ...]
 Polynomial = Mapping[Exponents, Fraction]
@@ -26,6 +27,7 @@ def element(polynomial: Polynomial, variables: int) -> Any:
     """Element of the ring."""
     from flint import fmpq
 
+    spend(len(polynomial), longest(polynomial.values()))  # all over one denominator
     entries = {e: fmpq(c.numerator, c.denominator) for e, c in polynomial.items() if c}
     return ring(variables).from_dict(entries)
 
@@ -41,8 +43,20 @@ def product(variables: int, factors: Iterable[Polynomial]) -> dict[Exponents, Fr
     others = [f for f in factors if f != one]
     if len(others) < 2:
         return dict(others[0]) if others else one
-    factors = others
-    return mapping(reduce(lambda left, right: left * element(right, variables), factors, ring(variables).constant(1)))
+    return mapping(reduce(multiplied, (element(f, variables) for f in others)))
+
+
+def multiplied(left: Any, right: Any) -> Any:
+    """Product of two elements of the ring, its work counted before."""
+    spend(len(left) * len(right), _height(left) + _height(right))
+    found = left * right
+    expanded(len(found))
+    return found
+
+
+def _height(polynomial: Any) -> int:
+    """Bits of the longest coefficient."""
+    return max((int(c.height_bits()) for c in polynomial.coeffs()), default=0)
 
 
 def constant(variables: int, value: Fraction = Fraction(1)) -> dict[Exponents, Fraction]:
@@ -81,6 +95,8 @@ def evaluate(polynomial: Polynomial, point: Sequence[Fraction]) -> Fraction:
     """Exact value at a rational point."""
     total = Fraction(0)
     for e, c in polynomial.items():
+        powers = sum(x * length(v) for x, v in zip(e, point, strict=True) if x)
+        spend(12, powers + length(c) + length(total))  # two operations on fractions, each six on integers
         total += c * monomial(point, e)
     return total
 

@@ -3,7 +3,9 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import prod
+from functools import reduce
+from math import comb
+from typing import Any
 
 from quakedesign.sos.exact.definiteness import nonnegative_definite
 from quakedesign.sos.exact.polynomial import (
@@ -14,12 +16,14 @@ from quakedesign.sos.exact.polynomial import (
     evaluate,
     mapping,
     monomials,
+    multiplied,
     ring,
     times,
 )
 from quakedesign.sos.exact.reduction import reduced_bases
 from quakedesign.sos.exact.squares import IntegerGram, Square, form, has_own_monomials, integer_gram, is_definite
 from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.work import expanded, length, longest, spend
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +148,7 @@ def _with_integers(squares: Iterable[Square]) -> list[tuple[Square, IntegerGram]
 def _target(statement: Statement):
     """multiplier · polynomial in the ring."""
     size = len(statement.variables)
-    return element(statement.multiplier, size) * element(statement.polynomial, size)
+    return multiplied(element(statement.multiplier, size), element(statement.polynomial, size))
 
 
 def _right_side(statement: Statement, squares: Iterable[tuple[Square, IntegerGram]], cofactors: Iterable[Polynomial]):
@@ -152,7 +156,7 @@ def _right_side(statement: Statement, squares: Iterable[tuple[Square, IntegerGra
     size = len(statement.variables)
     total = _sum(statement, squares)
     for q, h in zip(cofactors, statement.equalities, strict=True):
-        total += element(q, size) * element(h, size)
+        total += multiplied(element(q, size), element(h, size))
     return total
 
 
@@ -162,12 +166,17 @@ def _sum(statement: Statement, squares: Iterable[tuple[Square, IntegerGram]]):
     one = ring(size).constant(1)
     inequalities = [element(g, size) for g in statement.inequalities]
     total = 0 * one
+    products = dict[tuple[int, ...], Any]()
     for square, gram in squares:
         if square.product not in statement.products or not has_own_monomials(square.basis):
             raise ValueError(
                 "the product of a square is not one of the statement, or its basis is not in echelon form."
             )
-        total += prod((inequalities[i] for i in square.product), start=one) * form(square.basis, gram, size)
+        if square.product not in products:
+            products[square.product] = reduce(multiplied, (inequalities[i] for i in square.product), one)
+        total += multiplied(products[square.product], form(square.basis, gram, size))
+        spend(len(total))
+        expanded(len(total))
     return total
 
 
@@ -176,6 +185,10 @@ def _functional_holds(statement: Statement, proof: Functional) -> bool:
     if sum((c * value.get(e, 0) for e, c in statement.target.items()), start=Fraction(0)) >= 0:
         return False
     size = len(statement.variables)
+    for p in (value, statement.target, *statement.equalities, *statement.weights):
+        spend(len(p), longest(p.values()))
+    for h in statement.equalities:
+        spend(10 * comb(size + max(statement.degree - degree(h), 0), size) * len(h), longest(h.values()))
     for h in statement.equalities:
         for m in monomials(size, statement.degree - degree(h)):
             if sum((c * value.get(times(m, e), 0) for e, c in h.items()), start=Fraction(0)):
@@ -190,6 +203,8 @@ def localizing_matrix(
     weight: Polynomial, basis: Sequence[Exponents], values: Mapping[Exponents, Fraction]
 ) -> list[list[Fraction]]:
     """L(g·b bᵀ) (n × n) for one product g and a basis of monomials."""
+    bits = max(map(length, (*weight.values(), *values.values())), default=0)
+    spend(len(basis) ** 2 * len(weight), 2 * bits)
     rows = [[Fraction(0)] * len(basis) for _ in basis]
     for i, left in enumerate(basis):
         for j in range(i, len(basis)):

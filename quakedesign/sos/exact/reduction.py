@@ -14,6 +14,7 @@ from math import comb
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, times
 from quakedesign.sos.exact.statement import Statement, parity, residue
+from quakedesign.sos.exact.work import spend
 
 _MONOMIALS, _PAIRS = 2_000, 8_000_000
 
@@ -67,6 +68,7 @@ def _contributions(statement: Statement, alive):
     others: Counter[Exponents] = Counter()
     diagonal: dict[Exponents, set[tuple[int, Exponents, Fraction]]] = defaultdict(set)
     for k, (weight, basis) in enumerate(zip(statement.weights, alive, strict=True)):
+        spend(comb(len(basis) + 1, 2) * len(weight))
         elements = list(basis)
         for i, left in enumerate(elements):
             for e, c in weight.items():
@@ -96,6 +98,7 @@ def reach(statement: Statement) -> set[Exponents]:
     size = len(statement.variables)
     found = set[Exponents]()
     for h in statement.equalities:
+        spend(comb(size + max(statement.degree - degree(h), 0), size) * len(h))
         for m in monomials(size, statement.degree - degree(h)):
             found.update(times(m, e) for e in h)
     return found

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.definiteness import full_matrix, over_common_denominator, positive_definite_integers
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, ring, times
+from quakedesign.sos.exact.work import longest, spend
 
 Element = Exponents | Polynomial
 """Basis element: a monomial by its exponents, or a polynomial."""
@@ -58,6 +59,11 @@ def is_definite(gram: IntegerGram) -> bool:
     return len(gram.rows) > 0 and positive_definite_integers(gram.rows)
 
 
+def _bits(rows: Sequence[Sequence[int]]) -> int:
+    """Bits of the longest entry."""
+    return max((abs(v).bit_length() for row in rows for v in row), default=0)
+
+
 def has_own_monomials(basis: Sequence[Element]) -> bool:
     """Whether every element has a monomial with positive coefficient that no other has, so that each number counts."""
     if all(isinstance(b, tuple) for b in basis):
@@ -99,6 +105,7 @@ def form(basis: Sequence[Element], gram: IntegerGram, size: int):
         When the basis repeats a monomial, or is not one of as many variables.
     """
     support, (rows, denominator) = _in_monomials(basis, gram)
+    spend(len(support) * (len(support) + 1) // 2, _bits(rows))
     if any(len(e) != size for e in support):
         raise ValueError("an element of a basis has another number of variables.")
     total: dict[Exponents, int] = {}
@@ -121,6 +128,8 @@ def _in_monomials(basis: Sequence[Element], gram: IntegerGram) -> tuple[list[Exp
     from flint import fmpz_mat
 
     support = sorted({e for b in basis for e in as_polynomial(b)})
+    bits = longest(c for b in basis for c in as_polynomial(b).values())
+    spend(len(support) * len(basis) * (len(support) + len(basis)), bits + _bits(gram.rows))
     common = lcm(1, *(c.denominator for b in basis for c in as_polynomial(b).values()))
     coefficients = fmpz_mat([[int(as_polynomial(b).get(e, Fraction(0)) * common) for e in support] for b in basis])
     whole = coefficients.transpose() * fmpz_mat(gram.rows) * coefficients

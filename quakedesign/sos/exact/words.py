@@ -1,11 +1,13 @@
 """An answer in sentences."""
 
 from collections.abc import Sequence
+from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares
+from quakedesign.sos.exact.work import length
 
 _LONGEST = 200
 
@@ -61,7 +63,7 @@ def _reason(answer: Answer) -> list[str]:
         ]
     if isinstance(proof, Point):
         point = ", ".join(f"{n} = {v}" for n, v in zip(asked.variables, proof.coordinates, strict=True))
-        return [f"negative at {point}", f"value {_short(str(_value(answer, proof)))}"]
+        return [f"negative at {point}", f"value {_shown(_value(answer, proof))}"]
     return ["neither a rational proof nor a rational refutation was found; this says nothing about the polynomial"]
 
 
@@ -69,6 +71,14 @@ def _value(answer: Answer, point: Point) -> Fraction:
     from quakedesign.sos.exact.polynomial import evaluate
 
     return evaluate(answer.statement.polynomial, point.coordinates)
+
+
+def _shown(value: Fraction) -> str:
+    """A number as it is, or six digits of it on its upper side where it is long."""
+    if length(value) < 1000:
+        return _short(str(value))
+    upwards = Context(prec=6, rounding=ROUND_CEILING)
+    return f"at most {upwards.divide(Decimal(value.numerator), Decimal(value.denominator))}"
 
 
 def _short(text: str) -> str:

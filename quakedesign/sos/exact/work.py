@@ -1,0 +1,77 @@
+"""A budget of work for a check, counted in the arithmetic before it is done (proofs/FORMAT.md), never in time.
+
+Without `limited` around it nothing is counted: a search may take as long as it is let.
+"""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from fractions import Fraction
+from math import lcm
+
+from quakedesign.errors import WorkError
+
+STEPS = 3 * 10**7
+"""Most steps of one check; a step is an operation on two numbers of up to about a thousand bits."""
+TERMS = 20_000
+"""Most terms of a polynomial, read or expanded."""
+
+_left: ContextVar[int | None] = ContextVar("steps left", default=None)
+
+
+@contextmanager
+def limited(steps: int | None = None) -> Iterator[None]:
+    """Count the work inside, and refuse what is more than so many steps, `STEPS` unless told.
+
+    Raises
+    ------
+    WorkError
+    """
+    before = _left.set(STEPS if steps is None else steps)
+    try:
+        yield
+    finally:
+        _left.reset(before)
+
+
+def spend(steps: int, bits: int = 0) -> None:
+    """Count steps on integers of the given length, as division is quadratic in it.
+
+    Raises
+    ------
+    WorkError
+        When the budget is used up.
+    """
+    left = _left.get()
+    if left is None:
+        return
+    left -= steps * (1 + (bits * bits >> 20))
+    _left.set(left)
+    if left < 0:
+        raise WorkError(f"the check takes more than {STEPS} steps of exact arithmetic. Shorten terms or digits.")
+
+
+def length(number: Fraction) -> int:
+    """Bits of the longer one of numerator and denominator."""
+    return max(number.numerator.bit_length(), number.denominator.bit_length())
+
+
+def longest(numbers: Iterable[Fraction]) -> int:
+    """Bits of the longest of numbers over their common denominator, counting what it takes to find that."""
+    top, common = 0, 1
+    for number in numbers:
+        spend(1, common.bit_length() + number.denominator.bit_length())
+        common = lcm(common, number.denominator)
+        top = max(top, number.numerator.bit_length())
+    return top + common.bit_length()
+
+
+def expanded(terms: int) -> None:
+    """Refuse a polynomial of too many terms.
+
+    Raises
+    ------
+    WorkError
+    """
+    if _left.get() is not None and terms > TERMS:
+        raise WorkError(f"an expanded polynomial has more than {TERMS} terms. Split it.")

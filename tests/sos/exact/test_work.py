@@ -1,0 +1,127 @@
+"""A budget of work: what a file can cost is counted before it is done, and only while it is checked."""
+
+import json
+import random
+import time
+from fractions import Fraction as F
+
+import pytest
+
+from quakedesign.certificates.command import check_files
+from quakedesign.errors import WorkError
+from quakedesign.sos.exact.definiteness import nonnegative_definite, positive_definite
+from quakedesign.sos.exact.polynomial import evaluate, product
+from quakedesign.sos.exact.work import STEPS, TERMS, expanded, limited, longest, spend
+
+RANDOM = random.Random(5)
+
+
+def long():
+    return str(RANDOM.randrange(10**398, 10**399) | 1)
+
+
+def file(polynomial, proof, names="x", **more):
+    one = ",".join("0" * len(names))
+    whole = {
+        "format": 1, "variables": list(names), "polynomial": polynomial, "inequalities": [], "equalities": [],
+        "products": [[]], "degree": 999, "multiplier": {one: "1"},
+    }  # fmt: skip
+    return whole | proof | more
+
+
+def sos(*squares):
+    return {"sos": {"squares": list(squares), "cofactors": [], "multiplier": []}}
+
+
+def verdict(document, tmp_path):
+    path = tmp_path / "file.json"
+    path.write_text(json.dumps(document))
+    ((found, said),) = check_files([path]).values()
+    return found, said
+
+
+def grid(count, number=lambda: "1", step=1):
+    return {f"{step * i},{step * j}": number() for i in range(count) for j in range(count)}
+
+
+HOSTILE = {
+    "a thousand different denominators at a point": lambda: file(
+        {str(i): f"1/{long()}" for i in range(1000)}, {"negative": {"point": ["-1/3"]}}
+    ),
+    "high powers of long numbers": lambda: file(
+        {f"{i},{999 - i}": "1" for i in range(1000)},
+        {"negative": {"point": [f"{10**399 + 1}/{10**399 + 3}"] * 2}},
+        "xy",
+    ),
+    "a thousand different denominators in an identity": lambda: file(
+        {str(i): f"1/{long()}" for i in range(1000)}, sos({"product": [], "basis": [[0]], "gram": ["1"]})
+    ),
+    "a product of too many terms": lambda: file(grid(70), sos(), "xy", multiplier=grid(70, step=2)),
+    "many multiples of equalities": lambda: file(
+        {",".join("0" * 12): "-1"}, {"not-sos": {"functional": {",".join("0" * 12): "1"}}}, "abcdefghijkl",
+        equalities=[
+            {",".join("1" if i in (j, k) else "0" for i in range(12)): "1" for j in range(k, 12)} for k in range(9)
+        ],
+        degree=9,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", HOSTILE)
+def test_a_file_that_would_take_too_long_is_undecided_within_seconds(case, tmp_path):
+    start = time.process_time()
+    found, said = verdict(HOSTILE[case](), tmp_path)
+    assert found.startswith("undecided: ")
+    assert "steps of exact arithmetic" in found or f"more than {TERMS} terms" in found
+    assert said == []
+    assert time.process_time() - start < 20
+
+
+def test_a_value_of_more_digits_than_python_prints_is_shown_rounded(tmp_path):
+    document = file({str(i): f"-1/{long()}" for i in range(12)}, {"negative": {"point": ["3"]}})
+    found, said = verdict(document, tmp_path)
+    assert found == "refuted"
+    shown = next(line for line in said if line.startswith("value at most -"))
+    exact = sum(F(c) * F(3) ** int(e) for e, c in document["polynomial"].items())
+    assert exact <= F(shown.removeprefix("value at most ")) < exact * F(999, 1000)
+
+
+def test_nothing_is_counted_outside():
+    spend(10 * STEPS)
+    expanded(10 * TERMS)
+
+
+def test_a_budget_ends_where_it_is_used_up_and_the_outer_one_goes_on():
+    with limited(10):
+        spend(10)
+        with limited(3), pytest.raises(WorkError, match="steps of exact arithmetic"):
+            spend(4)
+        with pytest.raises(WorkError):
+            spend(1)
+
+
+def test_long_numbers_cost_the_square_of_their_length():
+    # 2048² = 4·2^20
+    with limited(16 * 5):
+        spend(16, 2**11)
+        with pytest.raises(WorkError):
+            spend(1)
+
+
+def test_the_common_denominator_counts():
+    assert longest([F(1, 2), F(1, 3), F(5, 7)]) == 3 + (2 * 3 * 7).bit_length()
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        lambda: evaluate({(i,): F(1, 10**300 + i) for i in range(40)}, [F(1, 3)]),
+        lambda: product(2, [{(i, j): F(1) for i in range(30) for j in range(30)}] * 2),
+        lambda: positive_definite([[F(1000 * (i == j) + 1) for j in range(60)] for i in range(60)]),
+        lambda: nonnegative_definite([[F(1, i + j + 1) for j in range(40)] for i in range(40)]),
+    ],
+)
+def test_every_kind_of_work_is_counted(work):
+    work()
+    with limited(200), pytest.raises(WorkError):
+        work()
