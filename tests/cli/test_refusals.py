@@ -6,6 +6,7 @@ import json
 import os
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -125,6 +126,18 @@ def test_a_design_whose_run_opens_the_fault_is_no_positive_answer(capsys, tmp_pa
     assert found["verdict"] == "proved"
     assert {"opening", "diverged"} & set(found["events"])
     assert code == 1
+
+
+@pytest.mark.slow
+def test_a_proved_design_that_is_faster_than_the_natural_earthquake_is_no_positive_answer(capsys):
+    path = Path(__file__).parent.parent / "data" / "undersampled_fault.toml"
+    code, out, _ = run(capsys, "compare", path, "--controller", "cta", "--json")
+    answer = json.loads(out)
+    (found,) = answer["controllers"].values()
+    assert code == 1
+    assert (found["verdict"], found["outcome"]["kind"]) == ("proved", "earthquake")
+    assert found["outcome"]["peak_slip_rate"] > answer["uncontrolled"]["outcome"]["peak_slip_rate"] > 0.3
+    assert found["headline"].startswith("earthquake: ")
 
 
 UNTIMELY = {
