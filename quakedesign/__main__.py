@@ -5,7 +5,7 @@ from quakedesign.interruption import ending
 
 def main() -> None:
     """Run the command line; an interruption is one line from the first import on."""
-    with ending():
+    with ending(process=True):
         from quakedesign.cli import main as run
 
         run()

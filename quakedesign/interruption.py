@@ -90,11 +90,16 @@ def remedy(text: str) -> None:
 
 
 @contextmanager
-def ending() -> Iterator[None]:
+def ending(*, process: bool = False) -> Iterator[None]:
     """Turn the signals of `SIGNALS`, unless they are ignored, into one line and `SystemExit` with 128 + signal.
 
     They raise `Interruption` in the block, so that it can put things in order. Whatever becomes of that, the
     command ends as was asked; what has not ended within `PATIENCE` is ended. A block in another one leaves them to it.
+
+    Parameters
+    ----------
+    process : bool
+        The process ends with the block: what comes later is too late to interrupt it, and is ignored.
     """
     global _ending
     if _ending is not None:
@@ -104,14 +109,14 @@ def ending() -> Iterator[None]:
     _ending = new = _Ending()
     sweep_system()
     try:
-        with new.concluded(), _received(new), new.concluded():
+        with new.concluded(), _received(new, process), new.concluded():
             yield
     finally:
         _ending = None
 
 
 @contextmanager
-def _received(by: _Ending) -> Iterator[None]:
+def _received(by: _Ending, last: bool) -> Iterator[None]:
     """Signals are received, and a thread sees them too while the main one is busy with foreign code."""
     if current_thread() is not main_thread():
         yield
@@ -128,7 +133,7 @@ def _received(by: _Ending) -> Iterator[None]:
         yield
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if last else handler)
         signal.set_wakeup_fd(woken)
         os.close(writer)
 

@@ -115,6 +115,21 @@ def test_the_exit_code_is_that_of_the_signal_even_within_generated_code(start, t
     assert (process.returncode, err) == (143, "quakedesign: terminated; nothing was written.\n")
 
 
+LATE = """
+import atexit, signal, sys
+from quakedesign.interruption import SIGNALS, ending
+atexit.register(lambda: [signal.raise_signal(number) for number in SIGNALS])
+with ending(process=True):
+    sys.exit(1)
+"""
+
+
+def test_a_signal_after_the_end_changes_nothing(start):
+    process = start("-c", LATE)
+    assert process.communicate(timeout=10) == ("", "")
+    assert process.returncode == 1
+
+
 SWALLOWS = """
 import time
 from quakedesign.interruption import ending
