@@ -1,9 +1,6 @@
 """Temporary folders of killed processes go at the next start, those of living ones stay."""
 
 import os
-import signal
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -34,20 +31,15 @@ SWAP = HOLDS + (
 
 
 @pytest.fixture
-def holder():
-    """Starts a process that stops in the middle of writing, and ends it in any case."""
-    started = []
+def holder(start):
+    """Starts a process that stops in the middle of writing."""
 
-    def start(program, target):
-        process = subprocess.Popen([sys.executable, "-c", program, str(target)], stdout=subprocess.PIPE, text=True)
-        started.append(process)
+    def begin(program, target):
+        process = start("-c", program, target)
         assert process.stdout.readline() == "there\n"
         return process
 
-    yield start
-    for process in started:
-        process.kill()
-        process.communicate()
+    return begin
 
 
 def left(folder):
@@ -66,8 +58,8 @@ def test_what_a_killed_process_left_goes_and_what_was_there_is_there(tmp_path, h
     assert len(left(tmp_path)) == 1
     require_room(target)
     assert len(left(tmp_path)) == 1, "the process lives"
-    process.send_signal(signal.SIGKILL)
-    process.wait()
+    process.kill()
+    process.communicate()
     require_room(target)
     assert os.listdir(tmp_path) == ["results"]
     assert (target if program is FILE else target / "old").read_text() == "old"

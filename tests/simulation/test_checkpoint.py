@@ -1,9 +1,5 @@
 """A run that is interrupted, at any moment and by any means, ends as if it had not been."""
 
-import os
-import signal
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -97,7 +93,7 @@ def test_memories_of_actuator_and_sensors_go_on_too(tmp_path):
     assert not np.array_equal(simulate(REAL, law, **setting, **other).slip, whole.slip)
 
 
-def test_a_killed_run_goes_on(tmp_path, monkeypatch):
+def test_a_killed_run_goes_on(start, tmp_path):
     """SIGKILL in the middle of writing again and again."""
     path = tmp_path / "run.checkpoint"
     program = (
@@ -107,12 +103,11 @@ def test_a_killed_run_goes_on(tmp_path, monkeypatch):
         "simulate(load_fault('real-fault'), published('real-fault')['cta'], duration=4000.0, samples=300,"
         f" compiled=False, progress=done, checkpoint={str(path)!r})\n"
     )
-    running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    running = start("-c", program)
     while float(running.stdout.readline()) < 0.3:
         pass
-    os.kill(running.pid, signal.SIGKILL)
-    running.wait()
-    running.stdout.close()
+    running.kill()
+    running.communicate()
     law = published("real-fault")["cta"]
     said = []
     resumed = simulate(REAL, law, checkpoint=path, progress=said.append, **SETTING)
