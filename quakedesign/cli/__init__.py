@@ -8,7 +8,7 @@ import warnings
 
 from cyclopts import CycloptsError
 
-from quakedesign.cli import campaign, design, figures, gain_map, loop, plant, polynomial, proof, synthesis
+from quakedesign.cli import campaign, design, figures, gain_map, guarantee, loop, plant, polynomial, proof, synthesis
 from quakedesign.cli.shared import app
 from quakedesign.errors import QuakedesignError
 from quakedesign.interruption import ending
@@ -20,6 +20,7 @@ __all__ = [
     "design",
     "figures",
     "gain_map",
+    "guarantee",
     "loop",
     "main",
     "plant",

@@ -2,12 +2,9 @@
 
 from fractions import Fraction
 
-import sympy as sp
-
 from quakedesign.errors import ParameterError
 from quakedesign.loop.laws import LinearLaw, Model
 from quakedesign.loop.periodic import Matrix, PeriodicLoop, Row, Segment
-from quakedesign.rationals import fraction_of, to_sympy
 
 MOST_PERIODS = 8
 
@@ -73,18 +70,27 @@ def held_loop(
 
 
 def _steady(law: LinearLaw) -> Row:
-    """States of a law that asks for 1 Pa without errors for ever."""
+    """States of a law that asks for 1 Pa without errors for ever: (F − I)z = 0 and Cz = 1, by elimination."""
     n = len(law.states)
-    left = sp.Matrix([[to_sympy(v - (i == j)) for j, v in enumerate(row)] for i, row in enumerate(law.update)])
-    whole = left.reshape(n, n).col_join(sp.Matrix(1, n, [to_sympy(v) for v in law.output]))
-    try:
-        solution, free = whole.gauss_jordan_solve(sp.Matrix([0] * n + [1]))
-    except ValueError:
+    rows = [[v - (i == j) for j, v in enumerate(row)] + [Fraction(0)] for i, row in enumerate(law.update)]
+    rows.append([*law.output, Fraction(1)])
+    pivots: list[tuple[int, list[Fraction]]] = []
+    for column in range(n):
+        pivot = next((row for row in rows if row[column]), None)
+        if pivot is not None:
+            rows.remove(pivot)
+            pivot = [v / pivot[column] for v in pivot]
+            rows = [[v - row[column] * p for v, p in zip(row, pivot, strict=True)] for row in rows]
+            pivots.append((column, pivot))
+    if any(row[n] for row in rows):
         raise ParameterError(
             "a law must be able to ask for a constant pressure without errors. Received one that cannot. "
             "Give it an integral or an estimate of the disturbance."
-        ) from None
-    return tuple(fraction_of(v) for v in solution.subs(dict.fromkeys(free, 0)))
+        )
+    found = [Fraction(0)] * n
+    for column, pivot in reversed(pivots):
+        found[column] = pivot[n] - sum((pivot[j] * found[j] for j in range(column + 1, n)), Fraction(0))
+    return tuple(found)
 
 
 def _flow(n: int, slip: Fraction, rate: Fraction, gain: Fraction, valve: int, lag: Fraction) -> Matrix:

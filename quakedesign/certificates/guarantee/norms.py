@@ -141,7 +141,7 @@ class _Past:
             if all(share < _ball(_SMALL) for share in shares):
                 return cls(columns, period, _as_column(sums) / (1 - _ball(_SMALL)))
         raise ParameterError(
-            f"the nominal loop must be stable. Received one that is not within {2**_MOST_DOUBLINGS} periods. "
+            f"the nominal loop must be stable. Received one that is not seen to be in {2**_MOST_DOUBLINGS} periods. "
             "Change the gains, or shorten T_s."
         )
 

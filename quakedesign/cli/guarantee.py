@@ -1,0 +1,88 @@
+"""The command about the loop that runs."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from quakedesign.cli.shared import ExactSeconds, Force, Gains, Json, app, new_file, print_json, print_lines
+from quakedesign.rationals import rational
+
+
+@app.command
+def guarantee(
+    fault: str,
+    /,
+    *,
+    controller: str = "elqr",
+    objective: Literal["tracking", "peak"] = "tracking",
+    gains: Gains = (),
+    step: ExactSeconds | None = None,
+    delay: ExactSeconds = "0",
+    lag: ExactSeconds = "0",
+    disturbance_class: Annotated[Literal["amplitude", "rate"], Parameter(name="--class")] = "amplitude",
+    box: str | None = None,
+    out: Path | None = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Prove how far slip, slip rate and pressure of the loop that runs can go: sampled, held, late, for ever.
+
+    For all friction and parameters of the box and every disturbance of a class, from rest, along the reference. Exit
+    code 0 only if proved.
+
+    Parameters
+    ----------
+    fault
+        Preset or path of a .toml file.
+    controller
+        elqr; sliding modes get none.
+    objective
+        Of a design: tracking, or peak for the smallest proved slip-rate error.
+    gains
+        k1 to k4 of an e-LQR whose integrals are summed once per sample; a law with an estimate of the disturbance is
+        designed unless given.
+    step
+        T_s, such as '184 ms' or 7/50 (s); the fault's unless given.
+    delay
+        From the measurement to the pressure at the valve.
+    lag
+        Time constant between the valve and the fault.
+    disturbance_class
+        amplitude: any disturbance as large as the fault's; rate: one that starts at 0 and is no faster either.
+    box
+        Uncertainty box: paper or ten-percent.
+    out
+        Certificate file to write.
+    force
+        Replace an existing file.
+    json
+        Print JSON.
+    """
+    from time import perf_counter
+
+    from quakedesign.certificates.guarantee import Guarantee
+    from quakedesign.certificates.guarantee.files import save_guarantee
+    from quakedesign.fault import load_fault
+    from quakedesign.synthesis.guaranteed import answer
+
+    new_file(out, "certificate file", force=force)
+    began = perf_counter()
+    found = answer(
+        load_fault(fault, box=box),
+        controller=controller,
+        gains=gains,
+        objective=objective,
+        step=None if step is None else rational(step, "step"),
+        delay=rational(delay, "delay"),
+        lag=rational(lag, "lag"),
+        disturbance_class=disturbance_class,
+    )
+    if out is not None and isinstance(found.found, Guarantee):
+        save_guarantee(found.found, out)
+    if json:
+        written = str(out) if out is not None and found.proved else None
+        print_json({**found.to_dict(), "certificate": written, "seconds": perf_counter() - began})
+    else:
+        print_lines(found.lines())
+    return 0 if found.proved else 1

@@ -1,0 +1,194 @@
+"""What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, Task, guarantee, task_of
+from quakedesign.controllers import control_law
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.loop import LinearLaw, summed_integrals
+from quakedesign.rationals import rational
+from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
+from quakedesign.synthesis.guaranteed.design import design_held
+
+CLASSES = ("amplitude", "rate")
+_SHORTER = Fraction(4, 5)
+_TRIALS = 24
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """Guarantee of one loop, or why there is none.
+
+    Attributes
+    ----------
+    fault : Fault
+    found : Guarantee or NoGuarantee
+    worst, worst_with_stick : WorstFound or None
+        Of a search on the same loop; None without a guarantee.
+    shorter : Guarantee or None
+        For a design without a guarantee at its step: one near the longest step that has one.
+    """
+
+    fault: Fault
+    found: Guarantee | NoGuarantee
+    worst: WorstFound | None = None
+    worst_with_stick: WorstFound | None = None
+    shorter: Guarantee | None = None
+
+    @property
+    def proved(self) -> bool:
+        """Whether there is a guarantee."""
+        return isinstance(self.found, Guarantee)
+
+    def lines(self) -> list[str]:
+        """For people: the sentence first, then what was seen."""
+        if not isinstance(self.found, Guarantee):
+            said = [f"none: {self.found.reason}"]
+            if self.shorter is not None:
+                said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
+            return said
+        said = [f"proved: {self.found.sentence()}"]
+        for name, seen in (("worst found", self.worst), ("worst found with stick", self.worst_with_stick)):
+            if seen is not None:
+                said.append(
+                    f"{name}: slip error {seen.slip_error:.3g} m, slip-rate error {seen.slip_rate_error:.3g} m/s"
+                )
+        if self._leaves_with_stick():
+            said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
+        return said
+
+    def _leaves_with_stick(self) -> bool:
+        if not isinstance(self.found, Guarantee) or self.worst_with_stick is None:
+            return False
+        claims, seen = self.found.claims, self.worst_with_stick
+        return seen.slip_error > claims.slip_error or seen.slip_rate_error > claims.slip_rate_error
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; exact numbers as texts."""
+        if not isinstance(self.found, Guarantee):
+            gain = self.found.small_gain
+            shorter = None if self.shorter is None else {"step": str(self.shorter.held.step), **_claims(self.shorter)}
+            return {
+                "verdict": "undecided",
+                "reason": self.found.reason,
+                "small_gain": None if gain is None else gain.exact,
+                "shorter": shorter,
+            }
+        bounds = self.found.bounds()
+        small = None if isinstance(bounds, NoGuarantee) else float(bounds.small_gain)
+        return {
+            "verdict": "proved",
+            "guarantee": self.found.sentence(),
+            **_claims(self.found),
+            "small_gain": small,
+            "worst_found": _seen(self.worst),
+            "worst_found_with_stick": _seen(self.worst_with_stick),
+            "step": str(self.found.held.step),
+            "law": _law(self.found.held.law),
+        }
+
+
+def answer(
+    fault: Fault,
+    *,
+    controller: str = "elqr",
+    gains: tuple[str, ...] = (),
+    objective: str = "tracking",
+    step: Fraction | None = None,
+    delay: Fraction = Fraction(0),
+    lag: Fraction = Fraction(0),
+    disturbance_class: str = "amplitude",
+) -> Answer:
+    """Guarantee of given e-LQR gains with summed integrals, or of a law that is designed for it.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : str
+        ``elqr``; no other law has an analysis under a held pressure yet.
+    gains : tuple of str
+        k1 … k4 of the e-LQR, run by the scheme ``explicit``; none to design a law with a disturbance estimate.
+    objective : str
+        ``tracking`` or ``peak``, of a design.
+    step : Fraction, optional
+        T_s [s]; the fault's unless given.
+    delay, lag : Fraction
+        [s].
+    disturbance_class : str
+        ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if disturbance_class not in CLASSES:
+        raise ParameterError(f"class must be one of {', '.join(CLASSES)}. Received {disturbance_class!r}.")
+    period = rational(fault.sampling_time) if step is None else step
+    if not Fraction(1, 10**9) <= period <= 10**9:
+        raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")
+    task = task_of(fault, rate_limited=disturbance_class == "rate")
+    if control_law(controller).loop_field().domain != "reals":
+        reason = f"no analysis of {controller} under a held pressure is known here. Use --controller elqr"
+        return Answer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
+    if gains:
+        law = summed_integrals(_four(gains), period)
+        return _with_worst(fault, guarantee(task, Held(law=law, step=period, delay=delay, lag=lag)))
+    found = design_held(task, period, objective=objective, delay=delay, lag=lag)
+    if isinstance(found, Guarantee):
+        return _with_worst(fault, found)
+    return Answer(fault=fault, found=found, shorter=_shorter(task, period, objective, delay, lag))
+
+
+def _with_worst(fault: Fault, found: Guarantee | NoGuarantee) -> Answer:
+    if isinstance(found, NoGuarantee):
+        return Answer(fault=fault, found=found)
+    return Answer(fault=fault, found=found, worst=worst_found(found), worst_with_stick=worst_found(found, sticks=True))
+
+
+def _shorter(task: Task, step: Fraction, objective: str, delay: Fraction, lag: Fraction) -> Guarantee | None:
+    """Guarantee at the longest of steps that shrink by a fifth, delay and lag as they are."""
+    for _ in range(_TRIALS):
+        step = _two_digits(step * _SHORTER)
+        if delay > 8 * step:
+            return None
+        if isinstance(design_held(task, step, objective="peak", delay=delay, lag=lag), Guarantee):
+            found = design_held(task, step, objective=objective, delay=delay, lag=lag)
+            return found if isinstance(found, Guarantee) else None
+    return None
+
+
+def _two_digits(value: Fraction) -> Fraction:
+    return Fraction(f"{float(value):.1e}")
+
+
+def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
+    if len(gains) != 4:
+        raise ParameterError(f"gains must be four numbers, k1 to k4. Received {len(gains)}. Leave them out to design.")
+    return tuple(rational(v, f"k{i}") for i, v in enumerate(gains, 1))
+
+
+def _claims(found: Guarantee) -> dict[str, Any]:
+    claims = found.claims
+    return {
+        "slip_error": claims.slip_error.exact,
+        "slip_rate_error": claims.slip_rate_error.exact,
+        "peak_slip_rate": claims.peak_slip_rate.exact,
+        "pressure": [claims.least_pressure.exact, claims.largest_pressure.exact],
+    }
+
+
+def _seen(worst: WorstFound | None) -> dict[str, float] | None:
+    return None if worst is None else {"slip_error": worst.slip_error, "slip_rate_error": worst.slip_rate_error}
+
+
+def _law(law: LinearLaw) -> dict[str, Any]:
+    return {
+        "states": list(law.states),
+        "update": [[str(v) for v in row] for row in law.update],
+        "measured": [[str(v) for v in row] for row in law.measured],
+        "output": [str(v) for v in law.output],
+        "feedback": [str(v) for v in law.feedback],
+    }

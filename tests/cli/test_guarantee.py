@@ -1,0 +1,91 @@
+"""The command about the loop that runs."""
+
+import json
+from fractions import Fraction as F
+
+import pytest
+
+from quakedesign.certificates.command import check_files
+from quakedesign.cli import main
+
+
+@pytest.fixture
+def call(capsys):
+    """Exit code, standard output and standard error."""
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(["guarantee", *arguments])
+        said = capsys.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return run
+
+
+def test_a_designed_loop_with_its_file(call, tmp_path):
+    path = tmp_path / "loop.json"
+    code, out, _ = call("real-fault", "--json", "--out", str(path))
+    found = json.loads(out)
+    assert (code, found["verdict"], found["certificate"]) == (0, "proved", str(path))
+    assert F(found["slip_rate_error"]) <= F(3, 10**4)
+    assert F(found["slip_error"]) <= F(6, 10**5)
+    assert F(found["slip_rate_error"]) < F(found["peak_slip_rate"]) < F(found["slip_rate_error"]) * F(11, 10)
+    assert F(found["pressure"][0]) < -14_000_000
+    assert F(found["pressure"][1]) > 14_000_000
+    assert 0 < found["small_gain"] < 1
+    for seen in ("worst_found", "worst_found_with_stick"):
+        assert 0 < found[seen]["slip_error"] <= F(found["slip_error"])
+        assert F(found["slip_rate_error"]) / 2 <= found[seen]["slip_rate_error"] <= F(found["slip_rate_error"])
+    assert check_files([path], "real-fault")[str(path)][0] == "proved"
+    code, _, err = call("real-fault", "--out", str(path))
+    assert code == 2
+    assert "must be new" in err
+
+
+GAINS = ("6.96e8", "2.53e8", "6.02e8", "2.16e8")
+
+
+def test_given_gains_for_people(call):
+    code, out, _ = call("real-fault", "--gains", *GAINS)
+    assert code == 0
+    assert out.startswith("proved: from rest, held over 0.184 s, for every disturbance |phi| <= 0.00032 m/s^2")
+    assert "worst found with stick" in out
+
+
+def test_gains_that_are_not_guaranteed_say_what_fails(call):
+    code, out, _ = call("real-fault", "--gains", *GAINS, "--delay", "150 ms", "--json")
+    found = json.loads(out)
+    assert (code, found["verdict"], found["shorter"]) == (1, "undecided", None)
+    assert found["reason"].startswith("small gain")
+    assert F(found["small_gain"]) >= 1
+
+
+def test_gains_that_do_not_hold_the_nominal_fault_either(call):
+    code, out, _ = call("real-fault", "--gains", "1", "1", "1", "1")
+    assert code == 1
+    assert out.startswith("none: the nominal loop must be stable")
+
+
+def test_sliding_modes_get_an_honest_none(call):
+    code, out, _ = call("real-fault", "--controller", "cta")
+    assert code == 1
+    assert out.startswith("none: ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("real-fault", "--gains", "1", "2"), "four numbers"),
+        (("real-fault", "--step", "0"), "step must be positive"),
+        (("real-fault", "--step", "1e-300"), "step must be positive"),
+        (("real-fault", "--gains", *GAINS, "--delay", "-1"), "delay"),
+        (("real-fault", "--delay", "9"), "delay"),
+        (("real-fault", "--gains", *GAINS, "--lag", "-1"), "lag"),
+        (("real-fault", "--class", "none"), "class"),
+        (("nowhere",), "fault must be"),
+    ],
+)
+def test_what_cannot_be_understood_is_one_line(call, arguments, words):
+    code, out, err = call(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
