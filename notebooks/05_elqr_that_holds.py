@@ -136,8 +136,8 @@ bad = {
     "rate": max((rate_limited(loop, c, size, speed, "slip_rate_error") for c in loop.corners()), key=lambda d: d.peak),
 }
 for kind, found in peaks.items():
-    most, known = float(found.peak_slip_rate), bad[kind].peak
-    print(f"{kind}: never faster than {most:.3g} m/s, proved; {known:.3g} m/s is reached by a bad disturbance (ratio {most / known:.2f})")
+    most, known = found.peak_slip_rate, bad[kind].peak
+    print(f"{kind}: never faster than {most:.3g} m/s, proved; {known:.3g} m/s is reached by a bad disturbance (ratio {float(most) / known:.2f})")
 print(f"earthquake without control: {natural_earthquake(fault).metrics.peak_slip_rate:.3g} m/s")
 
 # %%

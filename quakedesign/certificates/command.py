@@ -5,6 +5,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from quakedesign.bounds import UpperBound
 from quakedesign.certificates.checking import check
 from quakedesign.certificates.claim import Certificate, Verdict
 from quakedesign.certificates.files import certificate_of, read_json
@@ -113,8 +114,8 @@ def _covers(certificate: Certificate, fault: Fault) -> list[str]:
         if certified_lipschitz(certificate) <= 0:
             raise CertificateError("the certified range of d = h' must hold 0 inside to cover a fault")
         rate = largest_matched_rate(fault, divisor, zero)
-        least = float(rate / certified_lipschitz(certificate))
-        said.append(f"|h'| <= {float(rate):.4g} m/s^3 along the reference needs a scale of at least {least:.4g}")
+        least = UpperBound(rate / certified_lipschitz(certificate))
+        said.append(f"|h'| <= {UpperBound(rate):.4g} m/s^3 along the reference needs a scale of at least {least:.4g}")
     for name, (low, high) in ranges.items():
         if not loop.uncertain[name][0] <= low <= high <= loop.uncertain[name][1]:
             raise CertificateError(f"the certified range of {name} does not cover {fault.name}")

@@ -15,6 +15,7 @@ from typing import Any
 
 import sympy as sp
 
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Certificate
 from quakedesign.certificates.level_sets import LevelSets
 from quakedesign.certificates.matched import (
@@ -30,7 +31,7 @@ from quakedesign.certificates.matched import (
 from quakedesign.certificates.robustness import Robustness
 from quakedesign.controllers import SlidingMode
 from quakedesign.fault import Fault
-from quakedesign.rationals import float_above, float_below, fraction_of
+from quakedesign.rationals import fraction_of
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.balls import enclose, upper_bound
 
@@ -38,6 +39,7 @@ _STEPS = (-640, 160)
 """Range of n in V^{1/m} = (1 + (n mod 8)/8)·2^{n div 8} that is searched."""
 
 _PIECES = 40
+_NOWHERE = LowerBound(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,9 +50,9 @@ class Domain:
     ----------
     level : float
         Of V for the base gains; 0 when there is none.
-    slip_error, slip_rate_error : float
+    slip_error, slip_rate_error : UpperBound
         Bounds on |e1| [m] and |e2| [m/s] on it; not every such pair lies in it.
-    start_slip_error, start_slip_rate_error, start_perturbation : float
+    start_slip_error, start_slip_rate_error, start_perturbation : LowerBound
         Initial |e1| [m], |e2| [m/s] or |e3| [m/s²] that it admits, each while the other two are zero. For x = 0 and
         ξ = 0 the initial e3 is h(0).
     method : str
@@ -63,18 +65,18 @@ class Domain:
     """
 
     level: float
-    slip_error: float
-    slip_rate_error: float
-    start_slip_error: float = 0.0
-    start_slip_rate_error: float = 0.0
-    start_perturbation: float = 0.0
+    slip_error: UpperBound
+    slip_rate_error: UpperBound
+    start_slip_error: LowerBound = _NOWHERE
+    start_slip_rate_error: LowerBound = _NOWHERE
+    start_perturbation: LowerBound = _NOWHERE
     method: str = ""
     limited_by: str = ""
     feedforward: str = "none"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI."""
-        return asdict(self)
+        return {name: float(v) if isinstance(v, Fraction) else v for name, v in asdict(self).items()}
 
 
 @dataclass(frozen=True)
@@ -207,11 +209,11 @@ def _domain(question: Question, level: Fraction, method: str, limit: str) -> Dom
     first, second, *_, last = question.sets.starts(level)
     return Domain(
         level=float(level),
-        slip_error=float_above(errors.slip),
-        slip_rate_error=float_above(errors.rate),
-        start_slip_error=float_below(first),
-        start_slip_rate_error=float_below(second),
-        start_perturbation=float_below(last),
+        slip_error=UpperBound(errors.slip),
+        slip_rate_error=UpperBound(errors.rate),
+        start_slip_error=LowerBound(first),
+        start_slip_rate_error=LowerBound(second),
+        start_perturbation=LowerBound(last),
         method=method,
         limited_by=limit,
         feedforward=question.controller.feedforward.name,

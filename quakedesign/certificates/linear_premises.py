@@ -6,6 +6,7 @@ from functools import cache, lru_cache
 
 import sympy as sp
 
+from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Certificate, require
 from quakedesign.certificates.matched import static_friction
 from quakedesign.certificates.premises import (
@@ -233,22 +234,22 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
     return [
         Premise(
             name="control_coefficient",
-            required=float(needed.beta[1]),
-            certified=float(ranges["beta"][1]),
+            required=needed.beta[1],
+            certified=ranges["beta"][1],
             unit="-",
             proved=proved and ranges["beta"][0] <= needed.beta[0],
         ),
         Premise(
             name="friction_slope",
-            required=float(needed.slip[1]),
-            certified=float(ranges["s"][1]),
+            required=needed.slip[1],
+            certified=ranges["s"][1],
             unit="1/s^2",
             proved=proved and inside,
-            note=f"net chord in slip; effective stress up to {float(needed.largest_effective_stress):.4g} Pa",
+            note=f"net chord in slip; effective stress up to {UpperBound(needed.largest_effective_stress):.4g} Pa",
         ),
         Premise(
             name="constant_reference",
-            required=float(peak_rate),
+            required=peak_rate,
             certified=0.0,
             unit="m/s",
             note="certified about constant references; for a moving one see the certified peaks",
@@ -274,8 +275,8 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
     return [
         Premise(
             name="pressure_at_rest",
-            required=float(worst[0]),
-            certified=float(worst[1]),
+            required=abs(worst[0]),
+            certified=abs(worst[1]),
             unit="Pa",
             note="inside the limits of the law; the proof is about deviations that do not reach them",
         )

@@ -1,6 +1,10 @@
 """One condition under which a certificate speaks about a given loop."""
 
+import math
 from dataclasses import dataclass
+from fractions import Fraction
+
+from quakedesign.bounds import LowerBound, UpperBound
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -10,9 +14,9 @@ class Premise:
     Attributes
     ----------
     name : str
-    required : float
+    required : UpperBound
         What the loop asks for, in `unit`; a rigorous upper bound unless `measured`.
-    certified : float
+    certified : LowerBound
         What the certificate covers, in `unit`.
     unit : str
     proved : bool
@@ -24,19 +28,23 @@ class Premise:
     """
 
     name: str
-    required: float
-    certified: float
+    required: Fraction | float
+    certified: Fraction | float
     unit: str
     measured: bool = False
     proved: bool = True
     note: str = ""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "required", _bound(UpperBound, self.required))
+        object.__setattr__(self, "certified", _bound(LowerBound, self.certified))
+
     @property
-    def ratio(self) -> float | None:
-        """required/certified [-]; None where nothing is certified and something is required."""
+    def ratio(self) -> Fraction | float | None:
+        """required/certified [-], an `UpperBound`; None where nothing is certified and something is required."""
         if self.certified == 0:
-            return 0.0 if self.required == 0 else None
-        return self.required / self.certified
+            return UpperBound(0) if self.required == 0 else None
+        return _bound(UpperBound, self.required / self.certified)
 
     @property
     def holds(self) -> bool:
@@ -47,11 +55,16 @@ class Premise:
         """Keys of DESIGN.md and the unit."""
         return {
             "name": self.name,
-            "required": self.required,
-            "certified": self.certified,
-            "ratio": self.ratio,
+            "required": float(self.required),
+            "certified": float(self.certified),
+            "ratio": None if self.ratio is None else float(self.ratio),
             "holds": self.holds,
             "unit": self.unit,
             "measured": self.measured,
             "note": self.note,
         }
+
+
+def _bound(kind: type[UpperBound] | type[LowerBound], value: Fraction | float) -> Fraction | float:
+    """Bound on a number; one that is not finite, as of a run that diverges, stays as it is."""
+    return value if isinstance(value, float) and not math.isfinite(value) else kind(value)

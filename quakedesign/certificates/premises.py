@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from quakedesign.bounds import Enclosure, UpperBound
 from quakedesign.certificates.claim import Certificate, require
 from quakedesign.certificates.domain import Domain, Question, certified_domain, certified_lipschitz
 from quakedesign.certificates.level_sets import LevelSets
@@ -23,7 +24,6 @@ from quakedesign.certificates.robustness import robustness
 from quakedesign.controllers import SlidingMode
 from quakedesign.controllers.feed_forward import FEED_FORWARDS, FeedForward, feed_forward
 from quakedesign.fault import Fault
-from quakedesign.rationals import float_above
 
 __all__ = [
     "Domain",
@@ -137,10 +137,10 @@ def control_coefficient(fault: Fault, divisor: Fraction, certified: Range) -> Pr
     worst = max(high / certified[1], certified[0] / low)
     return Premise(
         name="control_coefficient",
-        required=float(worst * certified[1]),
-        certified=float(certified[1]),
+        required=worst * certified[1],
+        certified=certified[1],
         unit="-",
-        note=f"β from {float(low):.6g} to {float(high):.6g}; certified from {float(certified[0]):.6g}",
+        note=f"β from {Enclosure.of(low, high):.6g}; certified from {UpperBound(certified[0]):.6g}",
     )
 
 
@@ -153,8 +153,8 @@ def matched_rate_premise(
     note += _with(controller)
     return Premise(
         name=name,
-        required=float_above(required),
-        certified=float(against),
+        required=required,
+        certified=against,
         unit="m/s^3",
         proved=certified is not None,
         note=note if certified is not None else note + "; no certificate: compared with the limit that no V can exceed",
@@ -171,15 +171,15 @@ def _level_set(question: Question) -> Premise:
     fault, law = question.fault, question.controller
     level = question.sets.level(initial_perturbation(fault, law.divisor))
     errors = question.sets.errors(level)
-    start = f"rigorous on the level set of V that holds the start: |e1| <= {float(errors.slip):.2g} m, "
-    start += f"|e2| <= {float(errors.rate):.2g} m/s"
+    start = f"rigorous on the level set of V that holds the start: |e1| <= {UpperBound(errors.slip):.2g} m, "
+    start += f"|e2| <= {UpperBound(errors.rate):.2g} m/s"
     parts, rate = question.split(level), question.whole(level)
     share = sum(parts.values(), Fraction(0)) if parts else None
     if share is None or rate <= share:
         return matched_rate_premise(fault, law, "level_set", errors, certified_lipschitz(question.certificate), start)
     return Premise(
         name="level_set",
-        required=float_above(share),
+        required=share,
         certified=1.0,
         unit="-",
         note=start

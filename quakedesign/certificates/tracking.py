@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import sympy as sp
 
+from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Certificate, Loop, require
 from quakedesign.certificates.linear_premises import Sectors, sectors
 from quakedesign.certificates.meaning import SLIP_RATE_ERROR, meaning
@@ -135,7 +136,7 @@ def peaks_covered(certificate: Certificate, fault: Fault) -> list[str]:
     bounds = [response.total(name) for name, row in response.outputs.items() if meaning(loop, row) == SLIP_RATE_ERROR]
     if bounds:
         peak = reference_rates(fault).first + min(bounds)
-        said.append(f"the slip rate never exceeds {float(peak):.6g} m/s (from rest, p acting at once)")
+        said.append(f"the slip rate never exceeds {UpperBound(peak):.6g} m/s (from rest, p acting at once)")
     return said
 
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from itertools import takewhile
 from time import perf_counter
 from typing import Any
 
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Certificate, Loop, Verdict
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational
@@ -215,7 +215,7 @@ def _of_reach(name: str, gains: tuple[Number, ...], reach: Reach, ends: Ends, li
     )
     lines = [*_reach_lines(reach), *_nothing_lines(reach.certificate, kind, excluded), _limit_line(limit)]
     if scale is not None:
-        lines.append(f"the bound {lipschitz} needs gains scaled by lambda >= {_up(scale)}")
+        lines.append(f"the bound {lipschitz} needs gains scaled by lambda >= {UpperBound(scale)}")
     return reach.certificate, facts, lines
 
 
@@ -224,19 +224,20 @@ def _reach_lines(reach: Reach) -> list[str]:
     degrees = ", ".join(map(str, reach.degrees))
     if reach.value is None:
         return [f"nothing is proved with Lyapunov functions of degree {degrees}"]
-    said = f"largest {names[reach.quantity]}: {_down(reach.value)} (exactly {reach.value}), V of degree {reach.degree}"
+    value = f"{LowerBound(reach.value)} (exactly {reach.value})"
+    said = f"largest {names[reach.quantity]}: {value}, V of degree {reach.degree}"
     if reach.beyond is None and reach.sharp:
         return [said, "which is within 1e-4 of what no Lyapunov function can exceed"]
     if reach.beyond is None:
         return [said, "the search stopped there, as there seems to be no end"]
-    found = f"at {_up(reach.beyond)} the search finds none of degree {degrees}"
+    found = f"at {UpperBound(reach.beyond)} the search finds none of degree {degrees}"
     return [said, found if reach.sharp else f"{found}; in between it is not known"]
 
 
 def _limit_line(limit: Fraction | None) -> str:
     if limit is None:
         return "no necessary limit of |h'| is known for this law"
-    return f"necessary limit: from |h'| = {_up(limit)} on nothing can be proved of these gains"
+    return f"necessary limit: from |h'| = {UpperBound(limit)} on nothing can be proved of these gains"
 
 
 def _settling_facts(told: Settling | None) -> dict[str, Any] | None:
@@ -248,26 +249,11 @@ def _settling_facts(told: Settling | None) -> dict[str, Any] | None:
 
 def _settling_lines(told: Settling) -> list[str]:
     return [
-        f"decay: V' <= -k V^{1 - told.power} with k = {_down(told.decay)} 1/s for this V",
-        f"settles within {_up(told.factor)} V(0)^{told.power} s; from |e_i| <= {_down(told.start)} "
-        f"within {_up(Fraction(told.seconds))} s",
+        f"decay: V' <= -k V^{1 - told.power} with k = {LowerBound(told.decay)} 1/s for this V",
+        f"settles within {UpperBound(told.factor)} V(0)^{told.power} s; from |e_i| <= {LowerBound(told.start)} "
+        f"within {UpperBound(told.seconds)} s",
     ]
 
 
 def _text(value: Fraction | None) -> str | None:
     return None if value is None else str(value)
-
-
-def _down(value: Fraction) -> str:
-    """Six digits, not above the value."""
-    return rounded(value, ROUND_FLOOR)
-
-
-def _up(value: Fraction) -> str:
-    """Six digits, not below the value."""
-    return rounded(value, ROUND_CEILING)
-
-
-def rounded(value: Fraction, side: str) -> str:
-    """Six digits of an exact number on one side of it, ``decimal.ROUND_FLOOR`` or ``ROUND_CEILING``."""
-    return str(Context(prec=6, rounding=side).divide(Decimal(value.numerator), Decimal(value.denominator)))

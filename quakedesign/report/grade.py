@@ -1,6 +1,5 @@
 """How far a proof reaches: to the loop that ran and its task, or to which premise, and how far that fails."""
 
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from quakedesign.bounds import UpperBound
@@ -42,7 +41,7 @@ def _bounded(entry: "Entry", premise: Premise) -> bool:
 def _failing(premise: Premise) -> str:
     if premise.ratio is None or not premise.proved:
         return f"{premise.name} fails (nothing is certified)"
-    return f"{premise.name} fails {UpperBound(Fraction(premise.ratio)):.3g}-fold"
+    return f"{premise.name} fails {premise.ratio:.3g}-fold"
 
 
 def _held(entry: "Entry") -> list[str]:

@@ -111,7 +111,7 @@ def test_a_certified_bound_goes_with_the_scale(monkeypatch):
     assert (found.controller.scale, found.lipschitz) == (Fraction(1, 3), Fraction(3, 10))
     _, (premise,) = told(Choice(controller=law, lipschitz=Fraction(10**9)), duration=0.02)
     assert premise.holds
-    assert premise.ratio == premise.required / 1e9
+    assert premise.ratio == premise.required / 10**9
 
 
 def test_the_bound_of_a_proved_design_is_that_of_its_certificate():

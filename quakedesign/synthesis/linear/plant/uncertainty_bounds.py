@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.linear_premises import Sectors, rest_pressure, sectors
 from quakedesign.certificates.premises import least_authority, plant_ranges
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import fraction_of, rational
+from quakedesign.rationals import float_above, float_below, fraction_of, rational
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 
@@ -67,14 +68,14 @@ class UncertaintyBounds:
     def to_dict(self) -> dict:
         """Plain values, SI."""
         return {
-            "g1": float(self.sectors.row_bounds[0]),
-            "g2": float(self.sectors.row_bounds[1]),
-            "control": [float(v) for v in self.control],
-            "rest_pressure": [float(v) for v in self.rest_pressure],
-            "largest_effective_stress": float(self.sectors.largest_effective_stress),
-            "nonvanishing": float(self.nonvanishing),
+            "g1": float_above(self.sectors.row_bounds[0]),
+            "g2": float_above(self.sectors.row_bounds[1]),
+            "control": _outward(self.control),
+            "rest_pressure": _outward(self.rest_pressure),
+            "largest_effective_stress": float_above(self.sectors.largest_effective_stress),
+            "nonvanishing": float_above(self.nonvanishing),
             "contributions": [
-                {"name": c.name, "acts_on": c.acts_on, "range": [float(v) for v in c.range], "bound": float(c.bound)}
+                {"name": c.name, "acts_on": c.acts_on, "range": _outward(c.range), "bound": float_above(c.bound)}
                 for c in self.contributions
             ],
         }
@@ -85,12 +86,16 @@ class UncertaintyBounds:
         for c in self.contributions:
             column = sum((d.bound for d in self.contributions if d.acts_on == c.acts_on), Fraction(0))
             share = f"{float(c.bound / column):.1%}" if column else "-"
-            ends = " … ".join(f"{float(v):.4g}" for v in c.range)
+            ends = f"{LowerBound(c.range[0]):.4g} … {UpperBound(c.range[1]):.4g}"
             lines.append(
                 f"| {c.name} | {c.acts_on} | {ends} {_UNITS[c.acts_on][0]} | "
-                f"{float(c.bound):.4g} {_UNITS[c.acts_on][1]} | {share} |"
+                f"{UpperBound(c.bound):.4g} {_UNITS[c.acts_on][1]} | {share} |"
             )
         return "\n".join(lines) + "\n"
+
+
+def _outward(ends: Range) -> list[float]:
+    return [float_below(ends[0]), float_above(ends[1])]
 
 
 _UNITS = {"slip": ("1/s²", "Pa/m"), "slip rate": ("1/s", "Pa·s/m"), "nothing": ("m/s²", "Pa")}

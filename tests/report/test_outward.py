@@ -1,0 +1,103 @@
+"""Every certified number of a design that reaches a person or a file lies on the outer side of the exact one."""
+
+import json
+import re
+from fractions import Fraction as F
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates import Verdict
+from quakedesign.report.comparison import Entry
+from quakedesign.report.headlines import domain_sentence, headline
+from quakedesign.report.linear import held_sentence, peaks_sentence, verdict_lines
+from quakedesign.report.terminal import _line
+from quakedesign.synthesis.linear.analysis.verdict import judge
+
+LAB = qd.load_fault("lab-fault")
+NUMBER = r"(-?\d+(?:\.\d+)?(?:e[-+]\d+)?)"
+
+
+@pytest.fixture(scope="module")
+def linear():
+    return judge(LAB, qd.published("lab-fault")["elqr"], step="0.5e-3", peaks="rate")
+
+
+@pytest.fixture(scope="module")
+def sliding():
+    return qd.design(LAB, "cta")
+
+
+def outward(bound, text):
+    """Whether a printed number is on the outer side of a bound, and within a thousandth or its third digit."""
+    shown = F(text)
+    side = shown >= bound if isinstance(bound, UpperBound) else shown <= bound
+    return side and abs(shown - bound) <= abs(F(bound)) / 10
+
+
+def numbers(pattern, text):
+    found = re.search(pattern.replace("#", NUMBER), text)
+    assert found, f"{pattern} in {text}"
+    return found.groups()
+
+
+def test_every_certified_number_in_the_lines_about_a_linear_law(linear):
+    said = "\n".join(verdict_lines(linear))
+    found, held, peaks = linear.analysis, linear.held, linear.peaks
+    expected = {
+        "decay rate # 1/s certified": (found.decay.certified,),
+        "margin # certified; unstable from # on": (found.slope.certified, found.slope.limit),
+        r"beta down to # \(unstable from # on\) or up to # is": (found.span.low, found.span.low_limit, found.span.high),
+        "every T_s up to # s is proved": (held.largest_step,),
+        r"slip rate below # m/s \(slip error # m\)": (peaks.peak_slip_rate, peaks.total("slip_error")),
+    }
+    for pattern, bounds in expected.items():
+        shown = numbers(pattern, said)
+        assert all(outward(bound, text) for bound, text in zip(bounds, shown, strict=True)), pattern
+    assert held_sentence(held) in said
+    assert peaks_sentence({"rate": peaks}) in said
+
+
+def test_every_certified_float_in_the_facts_of_a_linear_law(linear):
+    facts, held = json.loads(json.dumps(linear.to_dict())), linear.held
+    longest = facts["held"]["largest_step"]
+    assert F(longest) <= held.largest_step < F(longest) * (1 + F(1, 10**15))
+    assert F(facts["held"]["refuted_step"]) >= held.refuted_step
+    for name, loop in held.constant.items():
+        assert F(facts["held"]["constant"][name]["largest_step"]) <= loop.largest_step
+    margin = linear.analysis.slope
+    assert F(facts["working_margin"]) <= margin.certified * margin.slope / margin.working_slope
+    assert F(facts["decay_rate"]) == linear.analysis.decay.certified
+    assert F(facts["peaks"]["peak_slip_rate"]) == linear.peaks.peak_slip_rate
+
+
+def test_every_premise_of_a_sliding_mode(sliding):
+    assert sliding.verdict is Verdict.PROVED
+    for premise in sliding.premises:
+        assert isinstance(premise.required, UpperBound)
+        assert isinstance(premise.certified, LowerBound)
+        required, certified, ratio = numbers("required #.*, certified #.*, ratio #", _line(premise))
+        assert F(required) >= premise.required
+        assert F(certified) <= premise.certified
+        assert F(ratio) >= F(premise.required) / F(premise.certified)
+        written = json.loads(json.dumps(premise.to_dict()))
+        assert F(written["required"]) >= premise.required
+        assert F(written["certified"]) <= premise.certified
+        assert F(written["ratio"]) >= F(premise.required) / F(premise.certified)
+        assert premise.holds == (F(premise.required) <= F(premise.certified))
+
+
+def test_headline_and_domain_of_a_sliding_mode(sliding):
+    said = headline(Entry(label="x", origin="designed", design=sliding, run=None))
+    failing = [p for p in sliding.premises if not p.holds]
+    shown = re.findall(rf"{NUMBER}-fold", said)
+    assert len(shown) == len(failing)
+    assert all(F(text) >= F(p.required) / F(p.certified) for text, p in zip(shown, failing, strict=True))
+    domain = sliding.domain
+    bounds = (domain.slip_error, domain.slip_rate_error, domain.start_slip_error, domain.start_slip_rate_error)
+    shown = re.findall(rf"\|e\d\| <= {NUMBER} m", domain_sentence(domain))
+    assert all(outward(bound, text) for bound, text in zip(bounds, shown, strict=True))
+    written = json.loads(json.dumps(domain.to_dict()))
+    assert F(written["slip_error"]) >= domain.slip_error
+    assert F(written["start_perturbation"]) <= domain.start_perturbation
