@@ -1,0 +1,472 @@
+"""Change the rooms that decide, one place at a time, and list the changes that no test notices.
+
+Usage: ``python tests/mutation.py MODULE.py... --tests TEST... [--results FILE]``. The tests are collected once and
+run once to learn which of them reaches which line. Every mutant then gets a forked child, in which the code of
+the functions is exchanged and the tests that reach the line run, quickest first, until one fails. Results are
+JSON lines: a mutant that was killed is not tried again, one that survived is, unless ``mutation_equivalents.toml``
+explains it by module, line, mutation and reason. Without tests the results so far are reported.
+
+Not mutated: annotations, strings, messages of errors, imports, and ``strict`` of ``zip``, which guards no input.
+"""
+
+import argparse
+import ast
+import copy
+import gc
+import importlib
+import json
+import os
+import pickle
+import re
+import resource
+import signal
+import sys
+import tempfile
+import time
+import tomllib
+import types
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from _pytest.runner import runtestprotocol
+from hypothesis import settings
+
+ROOT = Path(__file__).parent.parent
+EQUIVALENTS = Path(__file__).with_name("mutation_equivalents.toml")
+CALLS = 25  # of one function in one test that are followed line by line
+LONGEST = 4  # seconds that a test may take when lines are followed, else it is left out
+MEMORY = 6 * 2**30  # bytes of address space that a mutant may fill
+
+COMPARISONS = {
+    ast.Lt: (ast.LtE, ast.GtE),
+    ast.LtE: (ast.Lt, ast.Gt),
+    ast.Gt: (ast.GtE, ast.LtE),
+    ast.GtE: (ast.Gt, ast.Lt),
+    ast.Eq: (ast.NotEq,),
+    ast.NotEq: (ast.Eq,),
+    ast.Is: (ast.IsNot,),
+    ast.IsNot: (ast.Is,),
+    ast.In: (ast.NotIn,),
+    ast.NotIn: (ast.In,),
+}
+PAIRS = (ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.BitOr, ast.BitAnd), (ast.LShift, ast.RShift)
+OPERATORS = {a: b for pair in PAIRS for a, b in (pair, pair[::-1])} | {ast.FloorDiv: ast.Mult, ast.Pow: ast.Mult}
+OPERATORS |= {ast.Mod: ast.FloorDiv}
+NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
+
+
+def changed(node: ast.AST, **fields: object) -> ast.AST:
+    """Return a shallow copy with other fields."""
+    result = copy.copy(node)
+    for name, value in fields.items():
+        setattr(result, name, value)
+    return result
+
+
+def replaced(entries: list, index: int, *new: object) -> list:
+    """Return a list with one entry replaced or left out."""
+    return [*entries[:index], *new, *entries[index + 1 :]]
+
+
+def numbers_near(value: object) -> Iterator[object]:
+    """Yield what a constant is changed to."""
+    if isinstance(value, bool):
+        yield not value
+    elif isinstance(value, int):
+        yield from dict.fromkeys([value + 1, *([value - 1] if value else []), *([2 * value] if value > 2 else [])])
+    elif isinstance(value, float):
+        yield from (2 * value, value / 2)
+
+
+def variants(node: ast.AST, returns_bool: bool) -> Iterator[ast.AST]:
+    """Yield what can stand in the place of a node."""
+    match node:
+        case ast.Compare():
+            for i, operator in enumerate(node.ops):
+                for other in COMPARISONS[type(operator)]:
+                    yield changed(node, ops=replaced(node.ops, i, other()))
+        case ast.BoolOp():
+            yield changed(node, op=ast.Or() if isinstance(node.op, ast.And) else ast.And())
+            for i in range(len(node.values)):
+                rest = replaced(node.values, i)
+                yield changed(node, values=rest) if len(rest) > 1 else rest[0]
+        case ast.UnaryOp(op=ast.Not() | ast.USub()):
+            yield node.operand
+        case ast.BinOp() | ast.AugAssign() if type(node.op) in OPERATORS:
+            yield changed(node, op=OPERATORS[type(node.op)]())
+        case ast.Constant():
+            yield from (changed(node, value=value) for value in numbers_near(node.value))
+        case ast.Name(id=name) if name in NAMES:
+            yield changed(node, id=NAMES[name])
+        case ast.Slice():
+            yield from (changed(node, **{end: None}) for end in ("lower", "upper", "step") if getattr(node, end))
+        case ast.comprehension():
+            yield from (changed(node, ifs=replaced(node.ifs, i)) for i in range(len(node.ifs)))
+        case ast.Expr(value=ast.Call() | ast.YieldFrom()) | ast.Raise() | ast.Continue() | ast.Break():
+            yield ast.copy_location(ast.Pass(), node)
+        case ast.Return(value=ast.expr()) if returns_bool and not isinstance(node.value, ast.Constant):
+            yield from (changed(node, value=ast.copy_location(ast.Constant(flag), node)) for flag in (True, False))
+
+
+def forced(parent: ast.AST, name: str, node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the two fixed outcomes of a condition."""
+    if name == "test":
+        outcomes = (False,) if isinstance(parent, ast.While) else (True, False)
+        yield from (ast.copy_location(ast.Constant(flag), node) for flag in outcomes)
+
+
+def is_text(parent: ast.AST, name: str, index: int | None) -> bool:
+    """Tell whether a field holds annotations, messages or what else is not mutated."""
+    match parent:
+        case ast.Raise() | ast.keyword(arg="strict") | ast.arg():
+            return True
+        case ast.Call(func=ast.Name(id="need" | "require")):
+            return name == "args" and index != 0
+        case ast.Call(func=ast.Name(id="refuse" | "_refuse" | "_without")):
+            return name == "args"
+    return name in ("annotation", "returns", "decorator_list", "format_spec", "ctx")
+
+
+def places(parent: ast.AST, returns_bool: bool) -> Iterator[tuple[ast.AST, str, int | None, ast.AST, bool]]:
+    """Yield every node below another one with where it stands and whether its function returns a truth value."""
+    for name, value in ast.iter_fields(parent):
+        for index, node in enumerate(value) if isinstance(value, list) else [(None, value)]:
+            if not isinstance(node, ast.AST) or is_text(parent, name, index):
+                continue
+            flag = returns_bool
+            if isinstance(node, ast.FunctionDef):
+                flag = isinstance(node.returns, ast.Name) and node.returns.id == "bool"
+            yield parent, name, index, node, flag
+            yield from places(node, flag)
+
+
+@dataclass
+class Mutant:
+    """A changed statement of a module, compiled."""
+
+    path: str
+    lines: range
+    within: range  # lines of its statement, of the whole module where this is a constant
+    text: str
+    mutation: str
+    code: types.CodeType | None
+    names: list[str] = field(default_factory=list)  # that the statement assigns, none where it is a class
+    function: str = ""
+
+    def key(self) -> tuple[str, str, str]:
+        """Identify the mutant for as long as its line stays as it is."""
+        return str(Path(self.path).relative_to(ROOT)), self.text, self.mutation
+
+
+def mutants_of(path: Path, *, compiled: bool = True) -> Iterator[Mutant]:
+    """Change a module in one place at a time."""
+    source = path.read_text(encoding="utf-8")
+    rows = source.splitlines()
+    kinds = (ast.FunctionDef | ast.ClassDef, ast.Assign | ast.AnnAssign)  # constants last: any test may notice
+    for top in (top for kind in kinds for top in ast.parse(source).body if isinstance(top, kind)):
+        targets = top.targets if isinstance(top, ast.Assign) else [getattr(top, "target", None)]
+        names = [node.id for target in targets if target for node in ast.walk(target) if isinstance(node, ast.Name)]
+        names += [top.name] if isinstance(top, ast.FunctionDef) else []
+        tree = ast.Module([top], [])
+        for parent, name, index, node, flag in list(places(tree, False)):
+            for new in (*variants(node, flag), *forced(parent, name, node)):
+                at = node if hasattr(node, "lineno") else parent if hasattr(parent, "lineno") else node.target
+                mutation = f"{ast.unparse(node)} → {ast.unparse(new)}"
+                place = getattr(parent, name) if index is not None else parent
+                put, where = (place.__setitem__, index) if index is not None else (place.__setattr__, name)
+                put(where, new)
+                try:
+                    code = compile(ast.fix_missing_locations(tree), str(path), "exec") if compiled else None
+                finally:
+                    put(where, node)
+                lines = range(at.lineno, at.end_lineno + 1)
+                function = getattr(top, "name", "")
+                within = range(top.lineno, top.end_lineno + 1) if function else range(len(rows))
+                yield Mutant(str(path), lines, within, rows[at.lineno - 1].strip(), mutation, code, names, function)
+
+
+# ---------------------------------------------------------------- exchanging code
+
+
+def key_of(code: types.CodeType) -> tuple[str, int]:
+    """Identify a function in its module."""
+    return code.co_qualname, code.co_firstlineno
+
+
+def codes_in(code: types.CodeType) -> Iterator[types.CodeType]:
+    """Yield a code object and those within."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from codes_in(constant)
+
+
+def apply(mutant: Mutant, functions: list[types.FunctionType], modules: list[types.ModuleType]) -> None:
+    """Exchange the code and defaults of functions, or the values of names wherever they were imported."""
+    codes = {key_of(code): code for code in codes_in(mutant.code)}
+    for function in functions:
+        if key_of(function.__code__) in codes:
+            function.__code__ = codes[key_of(function.__code__)]
+    for home in [module for module in modules if getattr(module, "__file__", None) == mutant.path]:
+        scope = dict(vars(home))
+        if mutant.names:
+            exec(mutant.code, scope)
+        for name in mutant.names:
+            old, new = vars(home)[name], scope[name]
+            if isinstance(new, types.FunctionType) and isinstance(old, types.FunctionType):
+                old.__defaults__, old.__kwdefaults__ = new.__defaults__, new.__kwdefaults__
+            elif name != mutant.function:
+                for module in modules:
+                    if vars(module).get(name) is old:
+                        setattr(module, name, new)
+
+
+# ---------------------------------------------------------------- running tests
+
+
+def in_child(work, seconds: float) -> tuple[str, bytes]:
+    """Run work in a forked child; return how it ended, ``done`` or ``timeout``, and what it returned."""
+    with tempfile.TemporaryFile() as answer:
+        child = os.fork()
+        if child == 0:
+            os.setpgid(0, 0)
+            quiet = os.open(os.devnull, os.O_RDWR)
+            for stream in (1, 2) if seconds else ():
+                os.dup2(quiet, stream)
+            if seconds:
+                resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 1))
+                resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+                signal.alarm(10 * int(seconds) + 10)
+            try:
+                answer.write(work())
+                answer.flush()
+            finally:
+                os._exit(0)
+        _, status = os.waitpid(child, 0)
+        try:
+            os.killpg(child, signal.SIGKILL)  # what the tests have started
+        except (ProcessLookupError, PermissionError):
+            pass
+        answer.seek(0)
+        return "timeout" if os.WIFSIGNALED(status) else "done", answer.read()
+
+
+class TooLong(BaseException):
+    """A test takes longer than it may."""
+
+
+def stop(*_: object) -> None:
+    """Stop a test, as a signal handler."""
+    raise TooLong
+
+
+class Reached:
+    """Lines of some files that every test reaches, with the seconds that it takes."""
+
+    def __init__(self, paths: set[str]) -> None:
+        self.paths, self.calls, self.lines = paths, Counter(), defaultdict(set)
+
+    def __call__(self, frame, event, _):
+        """Follow the first calls of every function, as the interpreter's trace function."""
+        code = frame.f_code
+        if code.co_filename not in self.paths:
+            return None
+        self.calls[code] += 1
+        if self.calls[code] > CALLS:
+            return None
+        lines = self.lines[code.co_filename]
+        lines.add(frame.f_lineno)
+
+        def line(frame, event, _):
+            lines.add(frame.f_lineno)
+            return line
+
+        return line
+
+    def run(self, items) -> bytes:
+        """Run tests, each with its own fixtures."""
+        result = {}
+        signal.signal(signal.SIGVTALRM, stop)
+        for item in items:
+            signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
+            self.calls, self.lines, start = Counter(), defaultdict(set), time.process_time()
+            sys.settrace(self)
+            passed = passes(item)
+            sys.settrace(None)
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+            result[item.nodeid] = time.process_time() - start, passed, dict(self.lines)
+        return pickle.dumps(result)
+
+
+def passes(item) -> bool:
+    """Run one test with fixtures of its own."""
+    return not any(report.failed for report in runtestprotocol(item, log=False, nextitem=None))
+
+
+def first_failure(items) -> bytes:
+    """Run tests until one fails, and return its name."""
+    return next((item.nodeid for item in items if not passes(item)), "").encode()
+
+
+class Mutation:
+    """Replaces pytest's loop over the tests."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.options = options
+        self.paths = [path.resolve() for path in options.modules]
+        self.controlled: dict[tuple, bool] = {}
+        self.seconds: dict[str, float] = {}
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_collection(self) -> None:
+        """Take from random tests their deadline: a busy machine kills no mutant."""
+        settings.register_profile("patient", settings.get_profile("reproducible"), deadline=None)
+        settings.load_profile("patient")
+
+    def pytest_runtestloop(self, session) -> bool:
+        """Try every mutant that was not killed before."""
+        for path in self.paths:
+            if path.is_relative_to(ROOT / "quakedesign"):
+                importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+        objects = gc.get_objects()
+        by_path = defaultdict(list)
+        for entry in objects:
+            if isinstance(entry, types.FunctionType):
+                by_path[entry.__code__.co_filename].append(entry)
+        modules = [entry for entry in objects if isinstance(entry, types.ModuleType)]
+        del objects
+        gc.collect()
+        gc.freeze()  # what children need not look at
+        items = {item.nodeid: item for item in session.items}
+        reached = self.reached(session.items)
+        self.seconds = {name: seconds for name, (seconds, _, _) in reached.items()}
+        for name, (_, passed, _) in reached.items():
+            if not passed:
+                print(f"fails or takes too long without a mutation, left out: {name}")
+        past, known = read_results(self.options.results), explained()
+        kills: Counter[tuple[str, str, str]] = Counter()
+        with open(self.options.results, "a", encoding="utf-8") as stream:
+            for path in self.paths:
+                seen: Counter[tuple[str, str, str]] = Counter()
+                for mutant in mutants_of(path):
+                    key, count = mutant.key(), seen[mutant.key()]
+                    seen[key] += 1
+                    skipped = self.options.skip and re.search(self.options.skip, mutant.text)
+                    if skipped or key in known or past.get((*key, count), "survived") != "survived":
+                        continue
+                    names = self.choose(mutant, reached, kills)
+                    status, killer = self.try_out(mutant, by_path[mutant.path], modules, [items[n] for n in names])
+                    kills[mutant.path, mutant.function, killer] += 1
+                    row = [*key, count, mutant.lines[0], status, killer, len(names)]
+                    stream.write(json.dumps(row, ensure_ascii=False) + "\n")
+                    stream.flush()
+        return True
+
+    def reached(self, items) -> dict:
+        """Return seconds, success and lines of every test, from a file beside the results where tests are the same."""
+        stored = self.options.results.with_suffix(".reached")
+        if stored.exists():
+            result = pickle.loads(stored.read_bytes())
+            if result.keys() == {item.nodeid for item in items}:
+                return result
+        _, answer = in_child(lambda: Reached(set(map(str, self.paths))).run(items), 0)
+        stored.write_bytes(answer)
+        return pickle.loads(answer)
+
+    def try_out(self, mutant: Mutant, functions, modules, items) -> tuple[str, str]:
+        """Run tests on a mutant; a failure counts where the same tests succeed without it."""
+        limit = 2 + 2 * sum(self.seconds[item.nodeid] for item in items)
+
+        def work() -> bytes:
+            try:
+                apply(mutant, functions, modules)
+            except Exception as error:
+                return f"on import: {error!r}".encode()
+            return first_failure(items)
+
+        ending, answer = in_child(work, limit) if items else ("done", b"")
+        killer = answer.decode()
+        if ending == "done" and not killer:
+            return "survived", ""
+        suspects = tuple(item for item in items if ending == "timeout" or item.nodeid == killer)
+        if suspects not in self.controlled:
+            self.controlled[suspects] = in_child(lambda: first_failure(suspects), limit) == ("done", b"")
+        if not self.controlled[suspects]:
+            return "survived", "tests fail or are slow by themselves"
+        return ("timeout" if ending == "timeout" else "killed"), killer
+
+    def choose(self, mutant: Mutant, reached: dict, kills: Counter) -> list[str]:
+        """Return the tests that reach the mutant, the most promising ones first, within the time for one mutant."""
+        known = {name: paths.get(mutant.path, set()) for name, (_, passed, paths) in reached.items() if passed}
+        names = [name for name, lines in known.items() if lines.intersection(mutant.lines)]
+        if not mutant.function or not names:  # a constant, a default or a line that is not traced
+            names = [name for name, lines in known.items() if lines.intersection(mutant.within)]
+        reaching = {name: reached[name][0] / (1 + kills[mutant.path, mutant.function, name]) for name in names}
+        chosen, left = [], self.options.seconds
+        for name in sorted(reaching, key=reaching.__getitem__):
+            left -= reached[name][0]
+            if left >= 0:
+                chosen.append(name)
+        return chosen
+
+
+# ---------------------------------------------------------------- results
+
+
+def read_results(path: Path) -> dict[tuple[str, str, str, int], str]:
+    """Return the last result of every mutant."""
+    rows = [json.loads(row) for row in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
+    return {tuple(row[:4]): row[5] for row in rows}
+
+
+def explained() -> set[tuple[str, str, str]]:
+    """Return the mutants that no test can tell from the original."""
+    entries = tomllib.loads(EQUIVALENTS.read_text(encoding="utf-8"))["equivalent"]
+    return {(row["module"], row["line"], row["mutation"]) for row in entries}
+
+
+def report(options: argparse.Namespace) -> int:
+    """Print survivors without explanation, and the number of mutants by module and result."""
+    known, results, totals = explained(), read_results(options.results), defaultdict(Counter)
+    for path in options.modules:
+        seen: Counter[tuple[str, str, str]] = Counter()
+        for mutant in mutants_of(path.resolve(), compiled=False):
+            key = mutant.key()
+            status = results.get((*key, seen[key]), "not tried")
+            seen[key] += 1
+            if status in ("survived", "not tried") and key in known:
+                status = "equivalent"
+            if status == "survived":
+                print(f"{key[0]}:{mutant.lines[0]}: {mutant.text}\n    {mutant.mutation}")
+            totals[key[0]][status] += 1
+        for key in sorted(key for key in known - seen.keys() if ROOT / key[0] == path.resolve()):
+            print(f"explained, but no mutant any more: {key}")
+    for name, counts in totals.items():
+        print(f"{name}: {sum(counts.values())} mutants; {', '.join(f'{n} {s}' for s, n in sorted(counts.items()))}")
+    return int(any(counts["survived"] or counts["not tried"] for counts in totals.values()))
+
+
+def main() -> int:
+    """Run the tests on the mutants where tests are given, and report."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("modules", nargs="+", type=Path)
+    parser.add_argument("--tests", nargs="*", default=[], help="without them the results so far are reported")
+    parser.add_argument("--results", type=Path, default=Path(tempfile.gettempdir()) / "mutation.jsonl")
+    parser.add_argument("--select", default="", help="expression on the names of tests, as pytest -k")
+    parser.add_argument("--skip", help="regular expression for lines that are left for another run")
+    parser.add_argument("--seconds", type=float, default=10, help="of tests for one mutant")
+    options = parser.parse_args()
+    if options.tests:
+        flags = ["-o", "addopts=--import-mode=importlib", "-m", "not slow", "-q", "-s", "-p", "no:cacheprovider"]
+        flags += ["--assert=plain", "--tb=native"]
+        done = pytest.main([*flags, "-k", options.select, *options.tests], plugins=[Mutation(options)])
+        if done != 0:
+            return int(done)
+    return report(options)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

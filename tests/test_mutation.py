@@ -1,0 +1,61 @@
+"""The tool that mutates the deciding rooms changes one place at a time, and neither texts nor messages."""
+
+import ast
+import importlib.util
+import sys
+from pathlib import Path
+
+PATH = Path(__file__).with_name("mutation.py")
+SPECIFICATION = importlib.util.spec_from_file_location("mutation", PATH)
+tool = importlib.util.module_from_spec(SPECIFICATION)
+sys.modules["mutation"] = tool
+SPECIFICATION.loader.exec_module(tool)
+
+SOURCE = '''
+"""Text is not changed: 1 < 2."""
+LIMIT = 7
+
+
+def inside(value: int = 3) -> bool:
+    need(value < LIMIT, "a number", 5)
+    if value and not value % 2:
+        raise ValueError("not 4")
+    return value in range(1, LIMIT)
+'''
+
+MUTATIONS = [
+    "3 → 4",
+    "3 → 2",
+    "3 → 6",
+    "need(value < LIMIT, 'a number', 5) → pass",
+    "value < LIMIT → value <= LIMIT",
+    "value < LIMIT → value >= LIMIT",
+    "value and (not value % 2) → value or not value % 2",
+    "value and (not value % 2) → not value % 2",
+    "value and (not value % 2) → value",
+    "value and (not value % 2) → True",
+    "value and (not value % 2) → False",
+    "not value % 2 → value % 2",
+    "value % 2 → value // 2",
+    "2 → 3",
+    "2 → 1",
+    "raise ValueError('not 4') → pass",
+    "return value in range(1, LIMIT) → return True",
+    "return value in range(1, LIMIT) → return False",
+    "value in range(1, LIMIT) → value not in range(1, LIMIT)",
+    "1 → 2",
+    "1 → 0",
+    "7 → 8",
+    "7 → 6",
+    "7 → 14",
+]
+
+
+def test_code_is_changed_in_one_place_at_a_time(tmp_path):
+    module = tmp_path / "module.py"
+    module.write_text(SOURCE)
+    found = list(tool.mutants_of(module))
+    assert [mutant.mutation for mutant in found] == MUTATIONS
+    assert [mutant.text for mutant in found][-1] == "LIMIT = 7"
+    assert len({mutant.code for mutant in found}) == len(MUTATIONS)
+    assert ast.parse(module.read_text())
