@@ -1383,7 +1383,7 @@ def report(name: str) -> int:
     try:
         result = check(read_file(name))
     except (Refused, MemoryError) as error:
-        print(f"{ascii(name)[1:-1]}: invalid: {error or 'it needs too much memory'}")
+        print(f"{ascii(name)[1:-1]}: invalid: {str(error) or 'it needs too much memory'}")
         return 1
     except (OSError, ValueError) as error:
         reason = ascii(getattr(error, "strerror", None) or str(error))
