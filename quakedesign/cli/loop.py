@@ -127,10 +127,13 @@ def simulate(
 
 def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
     from quakedesign.report.needed_pressure import shortfall
+    from quakedesign.simulation.waiting import waiting
 
     metrics, energy = trajectory.metrics.to_dict(), trajectory.energy
+    begins = waiting(trajectory, fault)
     return {
         "outcome": trajectory.outcome.to_dict(),
+        "waiting": begins.to_dict() if begins else None,
         "shortfall": shortfall(trajectory, fault),
         "metrics": metrics,
         "units": {name: trajectory.metrics.unit(name) for name in metrics},

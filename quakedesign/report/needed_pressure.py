@@ -5,7 +5,7 @@ from quakedesign.certificates.linear_premises import equilibrium_pressure
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.report.outcomes import outcome_sentence, pressure_extremes, pressure_sentence
+from quakedesign.report.outcomes import outcome_sentence, pressure_extremes, pressure_sentence, waiting_sentence
 from quakedesign.simulation import Trajectory
 
 _MARGIN = 0.01
@@ -13,9 +13,10 @@ _MARGIN = 0.01
 
 
 def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
-    """Outcome of a run; least and largest pressure where it has a controller; why it had too little of it."""
+    """Outcome of a run, and of one that is too short when its event would begin; its pressure, and why too little."""
     extremes = pressure_extremes(run)
-    parts = [outcome_sentence(run), pressure_sentence(*extremes) if extremes else None, shortfall(run, fault)]
+    pressure = pressure_sentence(*extremes) if extremes else None
+    parts = [outcome_sentence(run), waiting_sentence(run, fault), pressure, shortfall(run, fault)]
     return [part for part in parts if part]
 
 

@@ -1,6 +1,8 @@
 """What is said of a run first: what it came to, and the pressure that it took."""
 
+from quakedesign.fault import Fault
 from quakedesign.simulation import Trajectory
+from quakedesign.simulation.waiting import waiting
 
 _NEGLIGIBLE = 1e-6
 """Of the larger end of a range of pressures: a smaller end is said to be zero."""
@@ -14,6 +16,17 @@ def outcome_sentence(run: Trajectory) -> str:
         return f"{found.kind} at {run.events['diverged']:.4g} s"
     opened = f" at {run.events['opening']:.4g} s (p >= σ')" if found.kind == "opened" else ""
     return f"{found.kind}{opened}: peak slip rate {found.peak_slip_rate:.3g} m/s, {_beside_natural(run)}"
+
+
+def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
+    """When the event of a run without control would begin that ends before; None for other runs."""
+    found = waiting(run, fault)
+    if found is None:
+        return None
+    said = f"the fault is unstable, but its event has not begun at {run.time[-1]:.4g} s"
+    if found.onset is None:
+        return f"{said}: nothing has pushed it forward; without --duration it is nudged"
+    return f"{said}: growing by {found.growth:.3g} 1/s it would at about {found.onset:.3g} s"
 
 
 def outcome_cells(run: Trajectory | None) -> tuple[str, ...]:
