@@ -1,4 +1,4 @@
-"""Random tests draw the same examples every time; every worker computes on one thread, as there is one per core."""
+"""Random tests draw the same examples every time, and are in no hurry; every worker computes on one thread."""
 
 import gc
 import os
@@ -12,7 +12,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
-settings.register_profile("reproducible", derandomize=True, print_blob=True)
+settings.register_profile("reproducible", derandomize=True, print_blob=True, deadline=None)
 settings.load_profile("reproducible")
 
 ROOT = Path(__file__).parent.parent
