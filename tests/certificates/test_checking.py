@@ -6,7 +6,9 @@ from fractions import Fraction as F
 import pytest
 import sympy as sp
 
-from quakedesign.certificates import Certificate, Witness, loop_of
+from quakedesign.certificates import Certificate, Loop, Witness, loop_of
+from quakedesign.certificates.checking import _check_equilibrium, _check_proof, _check_roots
+from quakedesign.certificates.claim import Equilibrium
 from quakedesign.certificates.obligations import claimed, different
 from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError
@@ -57,3 +59,134 @@ def test_an_interval_below_zero_or_turned_round_is_refused(low, high):
     loop = replace(good.loop, roots={"root": ("k", (F(low), F(high)))})
     with pytest.raises(CertificateError, match="does not hold the root"):
         replace(good, loop=loop).check(MODEL)
+
+
+# ---------------------------------------------------------------- every other condition by itself
+
+
+@pytest.mark.parametrize(("gain", "low", "high"), [("1", "0", "2"), ("1", "1", "1"), ("1", "0", "1"), ("4", "2", "9")])
+def test_ends_may_be_zero_or_the_root(gain, low, high):
+    loop = replace(proof("4", "2", "2").loop, gains={"k": F(gain)}, roots={"root": ("k", (F(low), F(high)))})
+    _check_roots(loop)
+
+
+def test_lifts_belong_on_cells():
+    loop = replace(proof("4", "2", "2").loop, lifts={"n": ()})
+    _check_roots(loop)
+    with pytest.raises(CertificateError, match="lifts belong on cells"):
+        _check_roots(replace(loop, domain="reals"))
+
+
+@pytest.mark.parametrize("claim", [F(0), F(-1)])
+def test_a_claim_that_is_not_positive_is_refused_though_every_witness_is_exact(claim):
+    with pytest.raises(CertificateError, match="a claim must be positive"):
+        proof("4", "2", "2", claim).check(MODEL)
+
+
+def test_the_claims_are_those_of_the_domain():
+    good = proof("4", "2", "2")
+    for claims in (
+        {"positive": F(1, 2)},
+        {"decrease": F(1, 100)},
+        good.claims | {"bound_y": F(1)},
+        good.claims | {"rate": F(1)},
+    ):
+        with pytest.raises(CertificateError, match="the claims must be"):
+            replace(good, claims=claims).check(MODEL)
+    rates = {"positive": F(1), "rate": F(1), "decay": F(1)}
+    with pytest.raises(CertificateError, match="the claims must be"):
+        _check_proof(replace(good, loop=replace(good.loop, domain="reals"), claims=rates))
+
+
+def test_a_proof_of_stability_has_no_inputs_and_its_function_nothing_uncertain():
+    good = proof("4", "2", "2")
+    with pytest.raises(CertificateError, match="without inputs"):
+        _check_proof(replace(good, loop=replace(good.loop, inputs={"u": (F(1),)})))
+    (term,) = good.lyapunov
+    with pytest.raises(CertificateError, match="must not depend"):
+        replace(good, lyapunov=(replace(term, parameters=("root",)),)).check(MODEL)
+
+
+def test_witnesses_are_those_of_the_obligations_in_order():
+    good = proof("4", "2", "2")
+    assert str(good.check(MODEL)) == "proved"
+    for witnesses in (
+        dict(reversed(good.witnesses.items())),
+        good.witnesses | {"more": next(iter(good.witnesses.values()))},
+        dict(list(good.witnesses.items())[1:]),
+        dict(list(good.witnesses.items())[:1]),
+        {},
+    ):
+        with pytest.raises(CertificateError, match=r"missing|no obligation needs"):
+            replace(good, witnesses=witnesses).check(MODEL)
+
+
+def test_the_field_is_compared_before_anything_is_decided():
+    other = replace(MODEL, field={x: -2 * root * SignedPower(x, sp.Rational(1, 2))})
+    with pytest.raises(CertificateError, match="the field is not that"):
+        proof("4", "2", "2").check(other)
+
+
+def resting(**parts):
+    """x' = -⌈x⌋⁰ + d rests at x = 1 where d = 1, and with half of each limit at 0."""
+    terms = (Term(F(-1), (), (("x", F(0), "s"),)), Term(F(1), ("d",), ()))
+    return Loop(**{
+        "law": "own", "gains": {}, "constants": {}, "states": {"x": 1}, "domain": "cells",
+        "uncertain": {"d": (F(-1), F(1))}, "field": {"x": terms},
+    } | parts)  # fmt: skip
+
+
+def rest(point=1, weights=None, **parameters):
+    given = {name: F(value) for name, value in ({"d": 1} | parameters).items()}
+    weights = {"+": F(1)} if weights is None else weights
+    return Equilibrium(parameters=given, point={"x": F(point)}, weights=weights)
+
+
+def test_an_equilibrium_by_hand():
+    _check_equilibrium(resting(), rest())
+    _check_equilibrium(resting(), rest(-1, {"-": F(1)}, d=-1))
+
+
+@pytest.mark.parametrize(
+    ("loop", "equilibrium", "reason"),
+    [
+        (resting(domain="reals"), rest(), "cells without lifts"),
+        (resting(lifts={"n": ()}), rest(), "cells without lifts"),
+        (resting(roots={"r": ("d", (F(1), F(1)))}), rest(), "cells without lifts"),
+        (resting(inputs={"u": (F(1),)}), rest(), "cells without lifts"),
+        (resting(), rest(0, {"+": F(0), "-": F(1)}, d=-1), "away from the origin"),
+        (resting(), replace(rest(), point={}), "away from the origin"),
+        (resting(), replace(rest(), point={"x": F(1), "y": F(1)}), "away from the origin"),
+        (resting(uncertain={"d": (F(-1), F(99, 100))}), rest(), "outside their ranges"),
+        (resting(uncertain={"d": (F(101, 100), F(2))}), rest(), "outside their ranges"),
+        (resting(), rest(e=1), "outside their ranges"),
+        (resting(), replace(rest(), parameters={}), "outside their ranges"),
+        (resting(), rest(weights={"+": F(1, 2)}), "convex weights"),
+        (resting(), rest(weights={"+": F(1), "-": F(0)}), "convex weights"),
+        (resting(), rest(weights={}), "convex weights"),
+        (resting(), rest(weights={"-": F(1)}), "convex weights"),
+        (resting(), rest(-1, {"-": F(1)}), "does not vanish"),
+        (resting(), rest(d=0), "does not vanish"),
+    ],
+)
+def test_what_is_no_equilibrium_is_refused_for_its_reason(loop, equilibrium, reason):
+    with pytest.raises(CertificateError, match=reason):
+        _check_equilibrium(loop, equilibrium)
+
+
+def test_weights_are_convex():
+    """y' = 2⌈x⌋⁰ on x = 0, y = 1 rests with half of each side; -1 and 2 also add up to 1, 0 and 1 do not rest."""
+    loop = resting(states={"x": 1, "y": 1}, uncertain={}, field={"x": (), "y": (Term(F(2), (), (("x", F(0), "s"),)),)})
+    point = {"x": F(0), "y": F(1)}
+
+    def resting_with(left, right):
+        weights = {"++": F(right), "-+": F(left)}
+        _check_equilibrium(loop, Equilibrium(parameters={}, point=point, weights=weights))
+
+    resting_with("1/2", "1/2")
+    with pytest.raises(CertificateError, match="does not vanish"):
+        resting_with(0, 1)
+    still = replace(loop, field={"x": (), "y": ()})
+    _check_equilibrium(still, Equilibrium(parameters={}, point=point, weights={"++": F(1), "-+": F(0)}))
+    with pytest.raises(CertificateError, match="convex weights"):
+        _check_equilibrium(still, Equilibrium(parameters={}, point=point, weights={"++": F(2), "-+": F(-1)}))

@@ -1,12 +1,13 @@
 """Every sign cell counts: loops without odd symmetry, in which no cell repeats another."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 
 import pytest
 import sympy as sp
 
-from quakedesign.certificates import Certificate, Witness, loop_of
-from quakedesign.certificates.obligations import Obligations, claimed, different
+from quakedesign.certificates import Certificate, Loop, Witness, loop_of
+from quakedesign.certificates.obligations import Obligations, _require_different, claimed, degree, different
 from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.proofs import Square
@@ -84,3 +85,224 @@ def test_there_are_two_cells_for_every_state(count):
     words = [cell.name for cell in Obligations(certificate.loop, certificate.lyapunov).sign_cells()]
     assert words == {1: ["+", "-"], 2: ["++", "+-", "-+", "--"]}[count]
     assert len(field.states) == count
+
+
+# ---------------------------------------------------------------- every condition by itself
+
+
+def power(coefficient, *factors, parameters=()):
+    return Term(F(coefficient), parameters, tuple((name, F(exponent), kind) for name, exponent, kind in factors))
+
+
+def own(*, states=("x",), domain="cells", **parts):
+    field = {state: (power(-1, (state, 1, "s")),) for state in states}
+    given = {"gains": {}, "constants": {}, "uncertain": {}, "field": field}
+    return Loop(law="own", states=dict.fromkeys(states, 1), domain=domain, **given | parts)
+
+
+def function(*factors, parameters=()):
+    return (power(1, *factors, parameters=parameters),)
+
+
+@pytest.mark.parametrize(
+    ("factors", "smooth"),
+    [
+        ([("x", 1, "s")], True),
+        ([("x", 2, "a")], True),
+        ([("x", "3/2", "a"), ("y", 1, "s")], True),
+        ([("x", 1, "a")], False),
+        ([("x", "1/2", "s")], False),
+        ([("x", "1/2", "a")], False),
+        ([("x", 0, "s")], False),
+        ([("y", 2, "a"), ("x", 1, "a")], False),
+    ],
+)
+def test_a_function_is_continuously_differentiable_in_every_factor(factors, smooth):
+    obligations = Obligations(own(states=("x", "y")), function(*factors))
+    if smooth:
+        assert obligations.derivative
+    else:
+        with pytest.raises(CertificateError, match="not continuously differentiable"):
+            _ = obligations.derivative
+
+
+def test_the_derivative_is_affine_in_what_has_a_range():
+    def derivative(*parameters):
+        field = {"x": (power(-1, ("x", 1, "s"), parameters=parameters),)}
+        loop = own(field=field, gains={"k": F(2)}, uncertain={"b": (F(1), F(2)), "d": (F(1), F(2))})
+        return Obligations(loop, function(("x", 2, "a"))).derivative
+
+    assert derivative("b", "d", "k", "k")
+    with pytest.raises(CertificateError, match="not affine in b"):
+        derivative("b", "d", "b")
+
+
+def test_every_vertex_is_there_once():
+    loop = own(uncertain={"a": (F(1), F(2)), "b": (F(3), F(3)), "c": (F(-1), F(0))})
+    names = [name for name, _ in Obligations(loop, ()).vertices()]
+    assert names == [f"a={a} b=3 c={c}" for a in (1, 2) for c in (-1, 0)]
+
+
+def test_on_the_reals_only_polynomials_are_taken():
+    loop = own(domain="reals")
+    assert Obligations(loop, function(("x", 2, "a"))).potential({"x": 1}) == {(2,): 1}
+    for bad in (("x", 3, "a"), ("x", 2, "s")):
+        with pytest.raises(CertificateError):
+            Obligations(loop, function(bad)).potential({"x": 1})
+    kinked = replace(loop, field={"x": (power(-1, ("x", 1, "a")),)})
+    with pytest.raises(CertificateError):
+        list(Obligations(kinked, function(("x", 2, "a"))).decrease("rate"))
+
+
+# ---------------------------------------------------------------- lifts
+
+
+def lifted(lifts, *factors, states=("x", "y"), **parts):
+    """Cells of a loop whose first rate has the given factors."""
+    field = {state: (power(-1, (state, 1, "s")),) for state in states}
+    field["x"] = (*field["x"], power(-1, *factors))
+    return Obligations(own(states=states, lifts=lifts, field=field, **parts), function(("x", 2, "a")))
+
+
+SUM = {"n": (power(1, ("x", 1, "s")), power("1/2", ("y", 1, "s")))}
+
+
+def test_a_lift_with_a_power_has_an_equality():
+    """t w = s u + r v/2; four cells have an interior for either sign, two for one."""
+    cells = {cell.name: cell for cell in lifted(SUM, ("n", 1, "s")).cells}
+    assert set(cells) == {"+++", "+-+", "+--", "-++", "-+-", "---"}
+    assert cells["+--"].equalities == ({(0, 0, 1): -1, (1, 0, 0): -1, (0, 1, 0): F(1, 2)},)
+    assert {cell.inequalities for cell in cells.values()} == {()}
+
+
+def test_a_lift_with_a_sign_alone_has_an_inequality():
+    cells = {cell.name: cell for cell in lifted(SUM, ("n", 0, "s")).cells}
+    assert set(cells) == {"+++", "+-+", "+--", "-++", "-+-", "---"}
+    assert cells["+--"].inequalities == ({(1, 0): -1, (0, 1): F(1, 2)},)
+    assert cells["+++"].inequalities == ({(1, 0): 1, (0, 1): F(1, 2)},)
+    assert {cell.equalities for cell in cells.values()} == {()}
+
+
+def test_a_small_condition_leaves_its_cell():
+    """x/3 - y/2: no coefficient reaches one."""
+    small = {"n": (power("1/3", ("x", 1, "s")), power("1/2", ("y", 1, "s")))}
+    assert "+++" in [cell.name for cell in lifted(small, ("n", 0, "s")).cells]
+
+
+def test_two_lifts_have_their_own_conditions():
+    """n = x + y/2 and m = x - y, with powers and with signs, and one of each."""
+    both = SUM | {"m": (power(1, ("x", 1, "s")), power(-1, ("y", 1, "s")))}
+    powers = {cell.name: cell for cell in lifted(both, ("n", 1, "s"), ("m", 1, "s")).cells}
+    assert powers["+++-"].equalities == (
+        {(0, 0, 1, 0): 1, (1, 0, 0, 0): -1, (0, 1, 0, 0): F(-1, 2)},
+        {(0, 0, 0, 1): -1, (1, 0, 0, 0): -1, (0, 1, 0, 0): 1},
+    )
+    signs = {cell.name: cell for cell in lifted(both, ("n", 0, "s"), ("m", 0, "s")).cells}
+    assert signs["+++-"].inequalities == ({(1, 0): 1, (0, 1): F(1, 2)}, {(1, 0): -1, (0, 1): 1})
+    assert set(powers) == set(signs) == {"++++", "+++-", "+-++", "+--+", "-++-", "-+--", "---+", "----"}
+    mixed = lifted(both, ("n", 0, "s"), ("m", 1, "s"))
+    assert mixed.with_variable == ("m",)
+    assert {cell.name for cell in mixed.cells} == set(powers)
+    one = next(cell for cell in mixed.cells if cell.name == "+++-")
+    assert one.equalities == ({(0, 0, 1): -1, (1, 0, 0): -1, (0, 1, 0): 1},)
+    assert one.inequalities == ({(1, 0, 0): 1, (0, 1, 0): F(1, 2)},)
+
+
+def test_a_lift_is_used_with_any_power_and_every_one_is_used():
+    twice = own(states=("x", "y"), lifts=SUM, field={
+        "x": (power(-1, ("n", 0, "s")),), "y": (power(-1, ("n", 1, "s")),),
+    })  # fmt: skip
+    assert Obligations(twice, ()).with_variable == ("n",)
+    with pytest.raises(CertificateError, match="occurs nowhere"):
+        _ = lifted(SUM | {"m": SUM["n"]}, ("n", 1, "s")).cells
+
+
+def test_an_argument_is_a_form_on_every_cell():
+    for terms in (
+        (power(1, ("x", 1, "s")), power(1, ("x", 1, "a"))),  # zero for x < 0
+        (power(1, ("x", 1, "s")), power(1, ("y", 2, "a"))),
+        (power(1),),
+    ):
+        with pytest.raises(CertificateError, match="no form of one positive degree"):
+            _ = lifted({"n": terms}, ("n", 1, "s")).cells
+
+
+def test_the_parameter_of_a_lift_is_one_number():
+    lift = {"n": (power(1, ("x", 1, "s"), parameters=("p",)),)}
+    for value, names in ((F(3), {"++", "--"}), (F(-3), {"+-", "-+"})):
+        point = lifted(lift, ("n", 1, "s"), states=("x",), uncertain={"p": (value, value)})
+        assert {cell.name for cell in point.cells} == names
+        gain = lifted(lift, ("n", 1, "s"), states=("x",), gains={"p": value})
+        assert {cell.name for cell in gain.cells} == names
+    with pytest.raises(CertificateError, match="a parameter with a range, p"):
+        _ = lifted(lift, ("n", 1, "s"), states=("x",), uncertain={"p": (F(1), F(2))}).cells
+    disregarded = {"n": (power(1, ("x", 1, "s")), power(1, ("x", 2, "a"), parameters=("c", "p")))}
+    cells = lifted(disregarded, ("n", 1, "s"), states=("x",), gains={"c": F(0)}, uncertain={"p": (F(1), F(2))}).cells
+    assert {cell.name for cell in cells} == {"++", "--"}
+
+
+def test_an_argument_vanishes_on_a_null_set_only():
+    """Of x, y, z and lifts n(x), m(y), l: x + n is zero on open sets, y + n and x y + x m are not."""
+    loop = own(states=("x", "y", "z"))
+    e = {name: tuple(int(i == k) for i in range(6)) for k, name in enumerate("xyznml")}
+
+    def check(**arguments):
+        Obligations(loop, ())._require_null_zeros(
+            {name: {e[part]: F(1) for part in parts} for name, parts in arguments.items()}
+        )
+
+    check(n="x", m="y", l="zm")
+    check(n="x", m="y", l="yn")
+    check(n="x", m="yn", l="zm")
+    check(n="x")
+    for bad in (
+        {"n": "x", "m": "xn"},
+        {"n": "x", "m": "n"},
+        {"n": "x", "m": "y", "l": "xn"},
+        {"n": "x", "m": "yn", "l": "ym"},
+        {"n": "x", "m": "yn", "l": "xm"},
+    ):
+        with pytest.raises(CertificateError, match="vanish on an open set"):
+            check(**bad)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "fine"),
+    [
+        ([], True),
+        ([{(1, 0): F(1), (0, 1): F(1)}], True),
+        ([{(1, 1): F(1)}], True),
+        ([{(2, 0): F(1)}], True),
+        ([{(1, 0): F(1), (0, 1): F(1)}, {(1, 0): F(1), (0, 1): F(2)}], True),
+        ([{(1, 0): F(1), (0, 1): F(3)}, {(1, 0): F(2), (0, 1): F(6)}], False),
+        ([{(1, 0): F(1), (0, 1): F(-3)}, {(1, 0): F(1, 2), (0, 1): F(-3, 2)}], False),
+        ([{(1, 0): F(1), (0, 1): F(3)}, {(1, 0): F(-1), (0, 1): F(-3)}], True),
+        ([{(1, 0): F(5)}], False),
+        ([{(1, 0): F(1), (0, 1): F(1)}, {(0, 1): F(2)}], False),
+    ],
+)
+def test_conditions_differ_from_each_other_and_from_variables(conditions, fine):
+    if fine:
+        _require_different(conditions, ["n", "m"])
+    else:
+        with pytest.raises(CertificateError, match="the signs n, m say the same twice"):
+            _require_different(conditions, ["n", "m"])
+
+
+def test_equal_signs_on_a_cell_are_refused_by_name():
+    double = {"n": SUM["n"], "m": tuple(replace(t, coefficient=2 * t.coefficient) for t in SUM["n"])}
+    with pytest.raises(CertificateError, match="the signs n, m say"):
+        _ = lifted(double, ("n", 0, "s"), ("m", 0, "s")).cells
+    assert lifted(double, ("n", 1, "s"), ("m", 0, "s")).cells
+
+
+# ---------------------------------------------------------------- degrees
+
+
+def test_forms_share_one_positive_degree():
+    assert degree([{(2, 0): F(1), (1, 1): F(1)}, {(0, 2): F(1)}], "V") == 2
+    for bad in ([{(2, 0): F(1), (1, 0): F(1)}], [{(1,): F(1)}, {(2,): F(1)}], [{(0, 0): F(1)}], [{}], []):
+        with pytest.raises(CertificateError, match="not homogeneous of one positive degree"):
+            degree(bad, "V")
+    with pytest.raises(CertificateError, match="vanishes on a cell"):
+        degree([{(1,): F(1)}, {}], "V")

@@ -8,7 +8,7 @@ import sympy as sp
 
 from quakedesign.certificates import Certificate, Witness, loop_of
 from quakedesign.certificates.obligations import Obligation, claimed, different
-from quakedesign.certificates.witnesses import proves
+from quakedesign.certificates.witnesses import proves, statement_of, width
 from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.proofs import Square
@@ -71,3 +71,79 @@ def test_a_loop_that_runs_away_is_not_proved_by_a_negative_multiplier():
         square = replace(turned[one.name].squares[0], gram=(value,))
         good[one.name] = replace(turned[one.name], squares=(square,))
     assert str(replace(certificate, loop=loop, witnesses=good).check(settling)) == "proved"
+
+
+# ---------------------------------------------------------------- every rule of a witness by itself
+
+
+def proved(polynomial, *squares, domain="cells", equalities=(), inequalities=(), **parts):
+    given = {"multiplier": {(0,) * len(next(iter(polynomial), (0,))): F(1)}, "conditions": len(inequalities)} | parts
+    one = Obligation("p", polynomial, tuple(equalities), tuple(inequalities))
+    return proves(one, Witness(squares=squares, **given), domain)
+
+
+def of(value, *exponents, product=()):
+    """One monomial squared, times a number."""
+    return Square(product=product, basis=(exponents,), gram=(F(value),))
+
+
+def test_a_multiplier_is_in_the_variables_of_its_obligation():
+    assert proved({(2, 0): F(1)}, of(1, 1, 0))
+    assert not proved({(2, 0): F(1)}, of(1, 1), multiplier={(0,): F(1)})
+    assert not proved({(2,): F(1)}, of(1, 1, 0), multiplier={(0, 0): F(1)})
+    assert not proved({(2,): F(1)}, of(1, 1), multiplier={(0,): F(1), (0, 0): F(1)})
+    assert not proved({}, multiplier={(0,): F(1), (0, 0): F(1)})
+
+
+def test_on_the_reals_the_multiplier_is_one_and_nothing_has_a_sign():
+    assert proved({(2,): F(1)}, of(2, 1), multiplier={(0,): F(2)})
+    assert not proved({(2,): F(1)}, of(2, 1), multiplier={(0,): F(2)}, domain="reals")
+    assert proved({(2,): F(1)}, of(1, 1), domain="reals")
+    assert proved({(3,): F(1)}, of(1, 1, product=(0,)))
+    assert not proved({(3,): F(1)}, of(1, 1, product=(0,)), domain="reals")
+    assert proved({(1,): F(1)}, of(1, 1, product=(0,)), multiplier={(2,): F(1)})
+    assert not proved({(1,): F(1)}, of(1, 1, product=(0,)), multiplier={(2,): F(1)}, domain="reals")
+
+
+def test_conditions_are_counted_and_follow_the_variables():
+    """p = a - b + 2 (b - a) = b - a on a >= b and b >= a, in this order."""
+    conditions = {(1, 0): F(1), (0, 1): F(-1)}, {(1, 0): F(-1), (0, 1): F(1)}
+    p = {(1, 0): F(-1), (0, 1): F(1)}
+    first, second = of(1, 0, 0, product=(2,)), of(2, 0, 0, product=(3,))
+    assert proved(p, first, second, inequalities=conditions)
+    assert not proved(p, first, second, inequalities=conditions[::-1])
+    assert not proved(p, first, second, inequalities=conditions, conditions=1)
+    assert not proved(p, first, second, inequalities=conditions, conditions=3)
+    both = {(1, 1): F(1), (2, 0): F(-1)}  # a (b - a)
+    assert proved(both, of(1, 0, 0, product=(0, 3)), inequalities=conditions)
+
+
+def test_where_nothing_is_to_prove_a_witness_is_empty():
+    h, g = ({(1,): F(1)},), ({(1,): F(1)},)
+    assert proved({})
+    assert proved({}, equalities=h, cofactors=({},))
+    assert not proved({}, of(1, 0))
+    assert not proved({}, equalities=h)
+    assert not proved({}, cofactors=({},))
+    assert not proved({}, equalities=h, cofactors=({(1,): F(1)},))
+    assert not proved({}, equalities=h * 2, cofactors=({}, {(1,): F(1)}))
+    assert not proved({}, of(1, 0, product=(1,)), equalities=h, inequalities=g, cofactors=({(0,): F(-1)},))
+    assert not proved({}, multiplier={(0,): F(2)})
+    assert not proved({}, multiplier={(1,): F(1)})
+
+
+def test_the_statement_of_an_obligation():
+    one = Obligation("p", {(2, 1): F(1)}, ({(1, 0): F(1)},), ({(0, 1): F(-1)},))
+    found = statement_of(one, "cells", {(1, 1): F(1)})
+    assert found.degree == 5
+    assert found.inequalities == ({(1, 0): 1}, {(0, 1): 1}, {(0, 1): -1})
+    assert set(found.products) == {(), (0,), (1,), (0, 1), (2,), (0, 2), (1, 2), (0, 1, 2)}
+    plain = statement_of(one, "reals")
+    assert plain.multiplier == {(0, 0): 1}
+    assert plain.inequalities == ({(0, 1): -1},)
+    assert (plain.products, plain.degree) == (((), (0,)), 3)
+    assert [width(Obligation("p", *parts)) for parts in (({},), ({}, ({(0, 0): F(1)},)), ({(1, 1, 1): F(1)},))] == [
+        1,
+        2,
+        3,
+    ]
