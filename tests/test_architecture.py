@@ -17,7 +17,8 @@ import quakedesign
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "quakedesign"
 EVERYWHERE = {
-    f"quakedesign.{name}" for name in ("errors", "rationals", "input", "output", "temporary", "text", "bounds")
+    f"quakedesign.{name}"
+    for name in ("arguments", "errors", "rationals", "input", "output", "temporary", "text", "bounds")
 }
 BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "loop", "certificates", "simulation")
 MAY_IMPORT = {
@@ -40,6 +41,7 @@ MAY_IMPORT = {
     "__init__": (),
     "errors": (),
     "text": (),
+    "arguments": (),
     "input": (),
     "rationals": (),
     "output": (),

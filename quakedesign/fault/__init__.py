@@ -1,5 +1,6 @@
 """What is controlled: parameters in SI, uncertainty, reference and disturbance."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.fault.disturbance import Disturbance
 from quakedesign.fault.friction import FrictionLaw, friction_law, friction_laws
 from quakedesign.fault.parameters import Fault, require_fault
@@ -22,3 +23,5 @@ __all__ = [
     "require_fault",
     "uncertainty_box",
 ]
+
+check_arguments(__name__)

@@ -1,5 +1,6 @@
 """What stands between law and fault, each element stated once, as exact matrices."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.loop.held import held_loop
 from quakedesign.loop.laws import LinearLaw, Model, disturbance_estimate, summed_integrals
 from quakedesign.loop.periodic import PeriodicLoop, Segment
@@ -13,3 +14,5 @@ __all__ = [
     "held_loop",
     "summed_integrals",
 ]
+
+check_arguments(__name__)

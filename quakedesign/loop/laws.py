@@ -86,7 +86,7 @@ class Prediction:
     of_push: Fraction
 
 
-def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
+def summed_integrals(gains: tuple[Fraction, Fraction, Fraction, Fraction], step: Fraction) -> LinearLaw:
     """The e-LQR as it is sampled: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1⁺ = ξ1 + T_s·e1, ξ2⁺ = ξ2 + T_s·ξ1.
 
     Parameters

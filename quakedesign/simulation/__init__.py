@@ -3,6 +3,7 @@
 Numerical libraries load inside the functions that need them. Campaigns are in `quakedesign.simulation.campaign`.
 """
 
+from quakedesign.arguments import check_arguments
 from quakedesign.simulation.actuators import (
     Actuator,
     Delay,
@@ -95,3 +96,5 @@ __all__ = [
     "velocity_step",
     "weight_study",
 ]
+
+check_arguments(__name__)

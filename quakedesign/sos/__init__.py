@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from quakedesign.arguments import check_arguments, checked
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares, holds
@@ -40,4 +41,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f"quakedesign.sos.solve.{_SEARCH[name]}"), name)
+    return checked(getattr(import_module(f"quakedesign.sos.solve.{_SEARCH[name]}"), name))
+
+
+check_arguments(__name__)

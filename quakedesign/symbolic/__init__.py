@@ -1,5 +1,6 @@
 """SymPy derivations: signed powers, plant, error dynamics, homogeneity, Filippov fields, cells, lifts, enclosures."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.symbolic.filippov import FilippovField, filippov_derivative
 from quakedesign.symbolic.homogeneity import Homogeneity, dilate, homogeneous
 from quakedesign.symbolic.lifting import lift
@@ -27,3 +28,5 @@ __all__ = [
     "solve_signed",
     "weights_for",
 ]
+
+check_arguments(__name__)

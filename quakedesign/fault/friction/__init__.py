@@ -5,6 +5,7 @@ from importlib import import_module
 from inspect import isabstract
 from pkgutil import iter_modules
 
+from quakedesign.arguments import check_arguments
 from quakedesign.errors import UnknownNameError
 from quakedesign.fault.friction.base import FrictionLaw
 
@@ -45,3 +46,6 @@ def friction_law(name: str) -> type[FrictionLaw]:
     if name not in laws:
         raise UnknownNameError(f"friction law must be one of {', '.join(sorted(laws))}. Received {name!r}.")
     return laws[name]
+
+
+check_arguments(__name__)

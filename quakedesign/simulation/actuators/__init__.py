@@ -1,5 +1,6 @@
 """What lies between the pressure that a law asks for and the pressure in the fault, one stage a file."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.simulation.actuators.base import FlowStage, SampledStage, Stage, stages
 from quakedesign.simulation.actuators.chain import DIRECT, Actuator
 from quakedesign.simulation.actuators.delay import Delay
@@ -23,3 +24,5 @@ __all__ = [
     "Stage",
     "stages",
 ]
+
+check_arguments(__name__)

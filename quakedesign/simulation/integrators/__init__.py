@@ -4,6 +4,7 @@ from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
+from quakedesign.arguments import check_arguments
 from quakedesign.errors import ParameterError
 from quakedesign.simulation.integrators.adaptive import AdaptiveIntegrator
 from quakedesign.simulation.integrators.base import Integrator
@@ -56,3 +57,6 @@ def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
             f"{', '.join(sorted(adaptive_integrators()))} (to a tolerance, smooth loops). Received {name!r}."
         )
     return known[name]
+
+
+check_arguments(__name__)

@@ -6,6 +6,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
+from quakedesign.arguments import check_arguments
 from quakedesign.errors import ParameterError
 from quakedesign.simulation.schemes.base import Scheme
 
@@ -42,3 +43,6 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
             f"Received {name}. Use one of them, or leave the settings out."
         )
     return kind(**settings)
+
+
+check_arguments(__name__)

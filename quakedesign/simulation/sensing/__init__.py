@@ -1,5 +1,6 @@
 """What lies between the true slip and what a law is told: transducer, averaging, differentiator."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.simulation.sensing.averaging import Averaging
 from quakedesign.simulation.sensing.base import Sensor, SlipStage
 from quakedesign.simulation.sensing.differentiator import Differentiator
@@ -18,3 +19,5 @@ __all__ = [
     "joint_condition",
     "smallest_bound",
 ]
+
+check_arguments(__name__)

@@ -1,5 +1,7 @@
 """Robust exact filtering differentiator (eq. dif of the paper)."""
 
+import math
+import sys
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,10 +61,11 @@ class Differentiator:
             raise ParameterError(
                 f"discretisation must be one of {', '.join(DISCRETISATIONS)}. Received {self.discretisation!r}."
             )
-        if not self.bound * self.step ** (self.size + 1) > 0:
+        size = math.log(self.bound) + (self.size + 1) * math.log(self.step)
+        if not math.log(sys.float_info.min) < size < math.log(sys.float_info.max):
             raise ParameterError(
-                f"bound·step^{self.size + 1} must not vanish in double precision. Received {self.bound!r}, "
-                f"{self.step!r} s. Take a lower order or a longer step."
+                f"bound·step^{self.size + 1} must not vanish in double precision, nor overflow. "
+                f"Received {self.bound!r}, {self.step!r} s. Take another order or step."
             )
 
     @property

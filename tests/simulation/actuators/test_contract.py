@@ -177,7 +177,7 @@ def test_a_coulomb_plant_takes_the_actuator_too(scheme):
         (lambda: Diffusion(length=0.0, diffusivity=1.0, storage=1.0), "length"),
         (lambda: Diffusion(length=1.0, diffusivity=1.0, storage=1.0, cells=0), "cells"),
         (lambda: Actuator(stages=(Lag(time_constant=1.0), Delay(samples=1))), "come first"),
-        (lambda: Actuator(stages=("lag",)), "consists of stages"),
+        (lambda: Actuator(stages=("lag",)), "stages of Actuator must be a tuple of a Stage"),
         (lambda: Actuator(stages=(EXAMPLES["diffusion"], EXAMPLES["diffusion"])), "store"),
         (lambda: run(Actuator(stages=(Lag(time_constant=1e-3),))), "substep"),
     ],

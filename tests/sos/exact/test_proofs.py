@@ -123,6 +123,9 @@ def test_a_point_must_be_negative_and_of_full_length(point, expected):
 
 def test_malformed_proofs_are_false_not_errors():
     asked = plain(X2_2XY_2Y2)
+    in_floats = Square(basis=((1, 0), (0, 1)), gram=(ONE, -ONE, Fraction(2)))
+    assert holds(asked, SumOfSquares(squares=(in_floats,)))
+    object.__setattr__(in_floats, "gram", (1.0, -1.0, 2.0))  # which the constructor refuses
     for square in (
         Square(basis=(), gram=()),
         Square(basis=((1, 0), (1, 0)), gram=(ONE, ONE, ONE)),
@@ -130,7 +133,7 @@ def test_malformed_proofs_are_false_not_errors():
         Square(basis=((1, 0, 0),), gram=(ONE,)),
         Square(basis=((1, 0), (0, 1, 0)), gram=(ONE, -ONE, Fraction(2))),
         Square(basis=((1, 0), (0,)), gram=(ONE, -ONE, Fraction(2))),
-        Square(basis=((1, 0), (0, 1)), gram=(1.0, -1.0, 2.0)),
+        in_floats,
         Square(product=(3,), basis=((1, 0),), gram=(ONE,)),
     ):
         assert holds(asked, SumOfSquares(squares=(square,))) is False

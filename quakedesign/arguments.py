@@ -1,0 +1,210 @@
+"""What the public names of a room are called with: every argument is of the type that its annotation says."""
+
+import sys
+import types
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from enum import Enum
+from functools import cache, wraps
+from importlib import import_module
+from inspect import Parameter, Signature, isclass, isfunction, signature
+from numbers import Integral, Rational, Real
+from typing import Any, Literal, Union, get_args, get_origin
+
+from quakedesign.errors import ParameterError
+from quakedesign.text import shown
+
+_ABBREVIATIONS = {"sp": "sympy", "np": "numpy", "pd": "pandas", "ca": "casadi"}
+_NUMBERS = {"float": Real, "int": Integral, "Fraction": Rational, "Expr": Real}  # SymPy takes numbers as they are
+_WORDS = {"float": "a number", "int": "a whole number", "str": "a text", "bool": "True or False", "NoneType": "None"}
+_REMEDIES = {
+    "Fault": "Write load_fault('real-fault'), say.",
+    "Controller": "Take that of design(fault, 'cta') or published('real-fault')['cta'], say.",
+    "Fraction": "Write Fraction('0.1'), say.",
+    "float": "Give it in SI units.",
+}
+_MOST_ENTRIES = 16  # of a collection that are looked at, so that a large one costs nothing
+
+
+def check_arguments(room: str) -> None:
+    """Make every function and class among a room's public names refuse arguments of other types than annotated.
+
+    Parameters
+    ----------
+    room : str
+        Name of the package, which has its ``__all__`` already.
+    """
+    module = sys.modules[room]
+    for name in module.__all__:
+        if name in vars(module):
+            setattr(module, name, checked(vars(module)[name]))
+
+
+def checked(value: Any) -> Any:
+    """Public name that checks its arguments from now on; a function also where it is defined, so that it is pickled."""
+    if isfunction(value):
+        replaced = _checked(value)
+        setattr(sys.modules[value.__module__], value.__name__, replaced)
+        return replaced
+    if isclass(value) and "__init__" in vars(value) and not issubclass(value, Enum | BaseException):
+        type.__setattr__(value, "__init__", _checked(vars(value)["__init__"]))
+    return value
+
+
+def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
+    if hasattr(function, "checks_arguments"):
+        return function
+
+    @wraps(function)
+    def checking(*positional: Any, **named: Any) -> Any:
+        try:
+            given = _signature(function).bind(*positional, **named).arguments
+        except TypeError as error:
+            raise ParameterError(f"{_name(function)} cannot be called like this: {error}.") from None
+        for name, value in given.items():
+            _require(function, name, value)
+        return function(*positional, **named)
+
+    checking.checks_arguments = True  # type: ignore[attr-defined]
+    return checking
+
+
+@cache
+def _signature(function: Callable[..., Any]) -> Signature:
+    return signature(function)
+
+
+@cache
+def _hint(function: Callable[..., Any], name: str) -> Any:
+    """Type of a parameter; what cannot be told outside of a type checker is anything."""
+    parameter = _signature(function).parameters[name]
+    if parameter.annotation is Parameter.empty:
+        return Any
+    return _resolved(parameter.annotation, getattr(function, "__globals__", {}), _home(function))
+
+
+def _resolved(hint: Any, *places: Mapping[str, Any]) -> Any:
+    if not isinstance(hint, str):
+        return hint
+    names: dict[str, Any] = {k: v for place in places for k, v in place.items()}
+    names |= {short: import_module(long) for short, long in _ABBREVIATIONS.items() if f"{short}." in hint}
+    while True:
+        try:
+            return eval(hint, names)
+        except NameError as error:
+            missing = str(error.name)
+            known = _classes(missing)
+            if len(known) != 1:
+                return Any
+            names[missing] = known.pop()
+        except TypeError:
+            return Any
+
+
+def _classes(name: str) -> set[type]:
+    """Classes of a name that the package has loaded; a type that only type checkers import is one of them."""
+    modules = [module for key, module in list(sys.modules.items()) if key.startswith("quakedesign.")]
+    return {vars(module)[name] for module in modules if isclass(vars(module).get(name))}
+
+
+def _home(function: Callable[..., Any]) -> Mapping[str, Any]:
+    """Names of the module that defines it; the ``__init__`` of a dataclass has others of its own."""
+    return vars(sys.modules[function.__module__])
+
+
+def _require(function: Callable[..., Any], name: str, value: Any) -> None:
+    parameter, hint = _signature(function).parameters[name], _hint(function, name)
+    values = [value]
+    if parameter.kind is Parameter.VAR_POSITIONAL:
+        values = list(value)
+    elif parameter.kind is Parameter.VAR_KEYWORD:
+        values = list(value.values())
+    for each in values:
+        if each is not parameter.default and not matches(each, hint):
+            remedies = (_REMEDIES[part] for part in _parts(hint) if part in _REMEDIES)
+            raise ParameterError(
+                f"{name} of {_name(function)} must be {_said(hint)}. Received {shown(each)}. {next(remedies, '')}"
+            )
+
+
+def matches(value: Any, hint: Any) -> bool:
+    """Whether a value is of a type; what the type says of the entries of a collection is required of each."""
+    if hint is Any or isinstance(hint, str) or hint is Parameter.empty:
+        return True
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        return any(matches(value, part) for part in inner)
+    if origin is Literal:
+        return value in inner
+    if origin is not None:
+        return _matches_generic(value, origin, inner)
+    if hint is None or hint is type(None):
+        return value is None
+    if not isinstance(hint, type):
+        return True
+    if hint.__name__ in _NUMBERS and isinstance(value, _NUMBERS[hint.__name__]):
+        return not isinstance(value, bool) and (hint is not float or _is_float(value))
+    return isinstance(value, hint) or (hint is bool and type(value).__name__ == "bool")
+
+
+def _is_float(value: Any) -> bool:
+    try:
+        float(value)
+    except OverflowError:
+        return False
+    return True
+
+
+def _matches_generic(value: Any, origin: Any, inner: tuple[Any, ...]) -> bool:
+    if origin is type:
+        return isclass(value) and all(not isclass(part) or issubclass(value, part) for part in inner)
+    if isinstance(origin, type) and issubclass(origin, Callable):  # type: ignore[arg-type]
+        return callable(value)
+    if isinstance(value, str | bytes) or not _is_one(value, origin):
+        return False
+    if not isinstance(value, Collection):
+        return True
+    if isinstance(value, Mapping) and len(inner) == 2:
+        return all(matches(key, inner[0]) and matches(entry, inner[1]) for key, entry in _some(value.items()))
+    if origin is tuple and inner and Ellipsis not in inner:
+        return len(value) == len(inner) and all(map(matches, value, inner))
+    return all(matches(entry, inner[0]) for entry in _some(value)) if inner else True
+
+
+def _is_one(value: Any, origin: type) -> bool:
+    """Whether a collection is of a kind; lists and arrays are tuples and sequences, every mapping is a dictionary."""
+    if issubclass(origin, Mapping):
+        return isinstance(value, Mapping)
+    listed = hasattr(value, "__len__") and hasattr(value, "__getitem__") and not isinstance(value, Mapping)
+    return isinstance(value, origin) or (issubclass(origin, Sequence) and listed)
+
+
+def _some(entries: Collection[Any]) -> Iterator[Any]:
+    return (entry for _, entry in zip(range(_MOST_ENTRIES), entries, strict=False))
+
+
+def _parts(hint: Any) -> list[str]:
+    """Names of the types that a type consists of."""
+    if not isinstance(hint, type) or get_origin(hint):
+        return [part for inner in get_args(hint) for part in _parts(inner)]
+    return [hint.__name__]
+
+
+def _said(hint: Any) -> str:
+    """A type in words."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        return " or ".join(_said(part) for part in inner)
+    if origin is Literal:
+        return " or ".join(map(repr, inner))
+    if hint is None:
+        return "None"
+    name = getattr(origin or hint, "__name__", str(hint))
+    if origin and inner and name not in ("Callable", "type"):
+        return f"a {name.lower()} of {', '.join(_said(part) for part in inner if part is not Ellipsis)}"
+    if name == "type":
+        return f"a class derived from {', '.join(_said(part) for part in inner)}"
+    return _WORDS.get(name, f"a {name}")
+
+
+def _name(function: Callable[..., Any]) -> str:
+    return function.__qualname__.removesuffix(".__init__")
