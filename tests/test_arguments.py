@@ -63,7 +63,7 @@ WRONG = {
     "no text": (lambda: qd.load_fault(None), "source of load_fault must be a text or a Path"),
     "missing": (lambda: Reference(target_slip=1.0), "Reference cannot be called like this: missing .*operation_time"),
     "unknown": (lambda: qd.derive(LAB, colour=1), "derive cannot be called like this: .*colour"),
-    "too few gains": (lambda: summed_integrals((), Fraction(1)), "gains of summed_integrals must be a tuple"),
+    "too few gains": (lambda: summed_integrals((), Fraction(1)), "gains of summed_integrals must be four"),
     "not to be called": (lambda: qd.simulate(LAB, progress=3), "progress of simulate must be a Callable or None"),
 }
 

@@ -86,7 +86,7 @@ class Prediction:
     of_push: Fraction
 
 
-def summed_integrals(gains: tuple[Fraction, Fraction, Fraction, Fraction], step: Fraction) -> LinearLaw:
+def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
     """The e-LQR as it is sampled: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1⁺ = ξ1 + T_s·e1, ξ2⁺ = ξ2 + T_s·ξ1.
 
     Parameters
@@ -95,7 +95,14 @@ def summed_integrals(gains: tuple[Fraction, Fraction, Fraction, Fraction], step:
         k1 … k4 [Pa/m, Pa·s/m, Pa/(m s), Pa/(m s²)].
     step : Fraction
         T_s [s].
+
+    Raises
+    ------
+    ParameterError
+        When there are not four gains.
     """
+    if len(gains) != 4:
+        raise ParameterError(f"gains of summed_integrals must be four. Received {len(gains)}. Give k1 to k4.")
     k1, k2, k3, k4 = gains
     zero, one = Fraction(0), Fraction(1)
     return LinearLaw(
