@@ -149,7 +149,7 @@ class Mutant:
 
     path: str
     lines: range
-    within: range  # lines of its statement, of the whole module where this is a constant
+    within: range  # lines of its function or class
     text: str
     mutation: str
     code: types.CodeType | None
@@ -184,7 +184,7 @@ def mutants_of(path: Path, *, compiled: bool = True) -> Iterator[Mutant]:
                     put(where, node)
                 lines = range(at.lineno, at.end_lineno + 1)
                 function = getattr(top, "name", "")
-                within = range(top.lineno, top.end_lineno + 1) if function else range(len(rows))
+                within = range(top.lineno, top.end_lineno + 1)
                 yield Mutant(str(path), lines, within, rows[at.lineno - 1].strip(), mutation, code, names, function)
 
 
@@ -402,7 +402,9 @@ class Mutation:
         """Return the tests that reach the mutant, the most promising ones first, within the time for one mutant."""
         known = {name: paths.get(mutant.path, set()) for name, (_, passed, paths) in reached.items() if passed}
         names = [name for name, lines in known.items() if lines.intersection(mutant.lines)]
-        if not mutant.function or not names:  # a constant, a default or a line that is not traced
+        if not mutant.function:  # a constant: any test may read it
+            names = list(known)
+        elif not names:  # a default, or a line that is not traced
             names = [name for name, lines in known.items() if lines.intersection(mutant.within)]
         reaching = {name: reached[name][0] / (1 + kills[mutant.path, mutant.function, name]) for name in names}
         chosen, left = [], self.options.seconds
