@@ -78,7 +78,7 @@ def numbers_near(value: object) -> Iterator[object]:
     elif isinstance(value, int):
         yield from dict.fromkeys([value + 1, *([value - 1] if value else []), *([2 * value] if value > 2 else [])])
     elif isinstance(value, float):
-        yield from (2 * value, value / 2)
+        yield from (2 * value, value / 2) if value else (1.0,)
 
 
 def variants(node: ast.AST, returns_bool: bool) -> Iterator[ast.AST]:

@@ -1,5 +1,6 @@
 """Level sets of a V whose powers and roots are known: V = 2|e1|^(5/3) + 3|e2|^(5/2) + |e3|^5."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 
 import pytest
@@ -118,3 +119,53 @@ def test_the_start_of_a_level_zero_is_zero():
     assert sets.starts(F(0)) == (0, 0, 0)
     found = sets.errors(F(0))
     assert (found.slip, found.rate, found.acceleration) == (0, 0, 0)
+
+
+def signed(*terms, states=("e1", "e2", "e3")):
+    """Certificate with V of degree 2 in states of weight one, and bounds of one."""
+    base = certificate().loop
+    field = {name: (power(1, states[1], 1, "s"),) for name in states}
+    loop = replace(base, states=dict.fromkeys(states, 1), field=field)
+    return Certificate(loop=loop, lyapunov=terms, claims={f"bound_{name}": F(1) for name in states})
+
+
+def product(coefficient, first, second):
+    return Term(F(coefficient), (), ((first, F(1), "s"), (second, F(1), "s")))
+
+
+def test_signs_of_a_joint_start_are_taken_at_their_worst():
+    """e1^2 + e2^2 + e3^2 - 2 e1 e3 + 2 e2 e3, for |e1| <= 1, |e2| <= 2, |e3| <= 3: 1 + 4 + 9 + 6 + 12."""
+    squares = tuple(power(1, name, 2) for name in ("e1", "e2", "e3"))
+    sets = LevelSets(signed(*squares, product(-2, "e1", "e3"), product(2, "e2", "e3")), F(1))
+    assert about(sets.level_of(slip=F(1), rate=F(2), matched=F(3)), F(32))
+    assert about(sets.level(F(3)), F(9))
+    assert about(sets.level_of(slip=F(1), matched=F(3)), F(16))
+    assert about(sets.level_of(rate=F(2), matched=F(3)), F(25))
+
+
+def test_the_state_that_holds_the_perturbation_is_the_last():
+    names = ("e1", "e2", "e3", "e4")
+    sets = LevelSets(signed(*(power(i + 1, name, 2) for i, name in enumerate(names)), states=names), F(1))
+    assert about(sets.level_of(slip=F(1), rate=F(10), matched=F(100)), F(1 + 200 + 40000))
+    assert len(sets.starts(F(1))) == 4
+
+
+def test_the_start_is_that_of_the_worse_sign():
+    """2 |e1|^2 - ⌈e1⌋^2 is 3 e1^2 for e1 < 0, and 2 |e2|^2 + ⌈e2⌋^2 is for e2 > 0."""
+    terms = power(2, "e1", 2), power(-1, "e1", 2, "s"), power(2, "e2", 2), power(1, "e2", 2, "s"), power(1, "e3", 2)
+    first, second, third = LevelSets(signed(*terms), F(1)).starts(F(12))
+    assert about(first, F(2), below=True)
+    assert about(second, F(2), below=True)
+    assert float(third) == pytest.approx(12**0.5, rel=1e-6)
+
+
+def test_the_unit_of_the_slip_is_uncertain_too():
+    e1, e2, e3, k, r, c = sp.symbols("e1 e2 e3 k r c", real=True)
+    other = LoopField(
+        states={e1: 1, e2: 1, e3: 1}, field={e1: e2, e2: -k * e2, e3: -e3}, gains=(k,), constants=(c,),
+        uncertain=(), domain="reals", roots={r: c}, units={e1: r},
+    )  # fmt: skip
+    sets = LevelSets(certificate(), SCALE, other)
+    assert about(sets.errors(LEVEL).slip, F(24))
+    assert about(sets.starts(LEVEL)[0], 16 * F(7, 5), below=True)
+    assert about(sets.level_of(slip=16 * F(7, 5), matched=F(0)), F(64))

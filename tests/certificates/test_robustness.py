@@ -3,6 +3,7 @@
 from dataclasses import replace
 from fractions import Fraction as F
 
+import numpy as np
 import pytest
 import sympy as sp
 
@@ -124,3 +125,66 @@ def test_without_any_bound_the_chain_of_norms_serves():
     found = decay(replace(weighted(), claims={"decrease": F(2)}))
     assert found.source == "chain of norms"
     assert float(found.rate) == pytest.approx(2, rel=1e-8)
+
+
+def decoupled():
+    """e1' = -[e1]^(2/3), e2' = -beta [e2]^(1/2), V = |e1|^(4/3) + |e2|^2: u^4 + w^4 and -V' = 4/3 u^3 + 2 beta w^3."""
+    base = certificate()
+    field = {"e1": (power(-1, "e1", "2/3", "s"),), "e2": (power(-1, "e2", "1/2", "s", ("beta",)),)}
+    loop = replace(base.loop, states={"e1": 3, "e2": 2}, field=field)
+    lyapunov = (power(1, "e1", "4/3"), power(1, "e2", 2))
+    return replace(base, loop=loop, lyapunov=lyapunov, claims={"decrease": F(1)})
+
+
+def sampled():
+    """Largest quotients on a fine grid of directions, for beta = 1 and 4."""
+    angle = np.linspace(0, np.pi / 2, 20001)
+    u, w = np.cos(angle), np.sin(angle)
+    value = u**4 + w**4
+    falls = {beta: 4 / 3 * u**3 + 2 * beta * w**3 for beta in (1, 4)}
+    slip = max((beta * 2 * w**2 * u**3 / (fall * value**0.5)).max() for beta, fall in falls.items())
+    rate = max((beta * 2 * w**2 * w**2 / (fall * value**0.25)).max() for beta, fall in falls.items())
+    return slip, rate, min((fall / value**0.75).min() for fall in falls.values())
+
+
+def test_weights_enter_the_powers_of_v():
+    slip, rate, least = sampled()
+    found = robustness(decoupled())
+    assert covers(found.slip, slip)
+    assert covers(found.rate, rate)
+    assert (found.slip_power, found.rate_power) == (F(1, 2), F(1, 4))
+    assert least / 1.051 <= float(decay(decoupled()).rate) <= least * (1 + 1e-9)
+
+
+def test_both_ends_of_uncertain_units_count():
+    """e1 and e2 in units between 7/5 and 3/2: a quotient of 15/14 each."""
+    e1, e2, k, beta, c, r = sp.symbols("e1 e2 k beta c r", real=True)
+    model = LoopField(
+        states={e1: 1, e2: 1}, field={e1: -e1, e2: -beta * e2}, gains=(k,), constants=(c,), uncertain=(beta,),
+        domain="reals", roots={r: c}, units={e1: r, e2: r},
+    )  # fmt: skip
+    one = certificate()
+    loop = replace(one.loop, constants={"c": F(2)}, roots={"r": ("c", (F(7, 5), F(3, 2)))})
+    found = robustness(replace(one, loop=loop), model)
+    assert covers(found.slip, 15 / 14)
+    assert covers(found.rate, 15 / 14)
+
+
+def test_the_chain_of_norms_takes_positive_terms_alone():
+    """e1^2 + e2^2 - e1 e2 on the cells of one sign, + e1 e2 on the others: at most 3/2 (u^2 + w^2)."""
+    assert float(decay_by_norms(certificate(product(-1), decrease="3"))) == pytest.approx(2, rel=1e-8)
+
+
+def test_sizes_of_the_states_change_nothing_but_the_time():
+    found = robustness(certificate(bound_e1=F(1, 16), bound_e2=F(9)))
+    assert covers(found.slip, 1)
+    assert covers(found.rate, 1)
+    assert _Cells(certificate(bound_e1=F(1, 16), bound_e2=F(4))).sizes == [4, F(1, 2)]
+    assert _Cells(certificate()).sizes == [1, 1]
+
+
+@pytest.mark.parametrize("missing", [0, 1])
+def test_without_one_of_both_bounds_nothing_is_said(missing, monkeypatch):
+    found = iter([None, F(1)] if missing == 0 else [F(1), None])
+    monkeypatch.setattr("quakedesign.certificates.robustness.largest_ratio", lambda _: next(found))
+    assert robustness(certificate()) is None

@@ -15,6 +15,7 @@ from quakedesign.symbolic.balls import ball, enclose, upper_bound
 x, y = sp.symbols("x y", real=True)
 SLACK = 1e-7  # a ball rounds its radius outward to 30 bits
 numbers = st.fractions(-4, 4, max_denominator=12)
+HALF = sp.Rational(1, 2)
 
 
 def sympy_rational(value):
@@ -172,3 +173,104 @@ def absolute(base, exponent):
 
 def test_an_early_stop_is_rigorous_too():
     assert upper_bound(x * (1 - x), {x: (F(0), F(1))}, pieces=0) >= F(1, 4)
+
+
+# ---------------------------------------------------------------- powers from their ends
+
+
+ENDS = [
+    (F(1), F(2)),
+    (F(-2), F(-1)),
+    (F(-1), F(2)),
+    (F(-2), F(1)),
+    (F(0), F(2)),
+    (F(-2), F(0)),
+    (F(0), F(0)),
+    (F(3), F(3)),
+]
+
+
+@pytest.mark.parametrize("exponent", ["1/3", "1/2", "1", "3/2", "5/2"])
+@pytest.mark.parametrize("ends", ENDS, ids=str)
+def test_powers_of_an_interval_by_their_ends(ends, exponent):
+    """|x|^a grows away from zero, ⌈x⌋^a everywhere; an end at zero is rounded outward by 30 bits of the interval."""
+    low, high = map(float, ends)
+    a = float(F(exponent))
+    slack = max(SLACK, (4 * 2.0**-30) ** a)
+    absolute = enclose(AbsolutePower(x, sp.Rational(exponent)), {x: ends})
+    least, most = sorted((abs(low) ** a, abs(high) ** a))
+    assert float(absolute.lower()) == pytest.approx(0 if low <= 0 <= high else least, abs=slack)
+    assert float(absolute.upper()) == pytest.approx(most, abs=slack)
+    signed = enclose(SignedPower(x, sp.Rational(exponent)), {x: ends})
+    assert float(signed.lower()) == pytest.approx(abs(low) ** a * (-1 if low < 0 else 1), abs=slack)
+    assert float(signed.upper()) == pytest.approx(abs(high) ** a * (-1 if high < 0 else 1), abs=slack)
+
+
+@pytest.mark.parametrize("ends", [(F(1), F(4)), (F(-4), F(-1))], ids=str)
+def test_negative_powers_of_an_interval_without_zero(ends):
+    sign = 1 if ends[0] > 0 else -1
+    for found, factor in (
+        (enclose(AbsolutePower(x, -HALF), {x: ends}), 1),
+        (enclose(SignedPower(x, -HALF), {x: ends}), sign),
+    ):
+        assert sorted(map(float, (factor * found.lower(), factor * found.upper()))) == pytest.approx(
+            [0.5, 1], abs=SLACK
+        )
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, -1, -2, -3])
+@pytest.mark.parametrize("ends", [(F(1), F(2)), (F(-2), F(-1)), (F(-1), F(2)), (F(-3), F(1))], ids=str)
+def test_whole_powers_of_an_interval_by_their_ends(ends, n):
+    found = enclose(x**n, {x: ends})
+    if n < 0 and ends[0] < 0 < ends[1]:
+        assert not found.is_finite()
+        return
+    values = [float(end) ** n for end in ends] + ([0.0] if n % 2 == 0 and ends[0] < 0 < ends[1] else [])
+    assert [float(found.lower()), float(found.upper())] == pytest.approx([min(values), max(values)], abs=300 * SLACK)
+
+
+def test_the_size_to_the_power_zero_is_one():
+    for ends in ((F(1), F(2)), (F(-2), F(-1))):
+        found = enclose(sp.Add(AbsolutePower(x, 0, evaluate=False), y, evaluate=False), {x: ends, y: (F(0), F(0))})
+        assert [float(found.lower()), float(found.upper())] == pytest.approx([1, 1], abs=SLACK)
+
+
+def test_what_is_not_finite_stays_so():
+    """1/x over an interval with zero, under a signed power."""
+    for kind in (SignedPower, AbsolutePower):
+        assert not enclose(kind(1 / x, sp.Rational(1, 3)), {x: (F(-1), F(1))}).is_finite()
+
+
+def test_numbers_are_enclosed():
+    for number in (
+        sp.Rational(1, 3),
+        sp.Float("0.1"),
+        sp.pi,
+        sp.E,
+        sp.sqrt(2),
+        sp.exp(sp.Rational(1, 3)),
+        sp.cos(1) + 2,
+    ):
+        found = enclose(number * x, {x: (F(1), F(1))})
+        assert float(found.upper() - found.lower()) < 1e-7
+        assert found.overlaps(flint.arb(str(sp.N(number, 30)), "1e-20"))
+
+
+def test_a_bound_stops_near_a_value_that_is_attained():
+    """x (1 - x) on [0, 1]: 1/4 within a hundredth, or within what is asked."""
+    for options, share in (
+        ({}, F(1, 100)),
+        ({"tolerance": F(1, 10**4)}, F(1, 10**4)),
+        ({"tolerance": F(1, 2)}, F(1, 2)),
+    ):
+        found = upper_bound(x * (1 - x), {x: (F(0), F(1))}, **options)
+        assert F(1, 4) <= found <= F(1, 4) * (1 + (share or F(1, 100)))
+    one = upper_bound(x * (1 - x), {x: (F(0), F(1))}, pieces=1)
+    assert F(1, 4) * F(11, 10) < one <= 1
+
+
+def test_a_bound_is_of_the_size():
+    assert F(4) <= upper_bound(-(x**2), {x: (F(-2), F(1))}) <= F(404, 100)
+    assert F(3) <= upper_bound(x - y, {x: (F(0), F(1)), y: (F(1), F(3))}) <= F(303, 100)
+    assert upper_bound(sp.Integer(-7), {}) == 7
+    assert upper_bound(x, {x: (F(5), F(5)), y: (F(0), F(1))}) == 5
