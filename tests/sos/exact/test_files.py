@@ -1,3 +1,4 @@
+import dataclasses
 import json
 from fractions import Fraction
 
@@ -7,8 +8,9 @@ from hypothesis import strategies as st
 
 from quakedesign import sos
 from quakedesign.errors import CertificateError
-from quakedesign.sos.exact.files import load, text
-from quakedesign.sos.exact.proofs import holds
+from quakedesign.sos.exact.answer import Answer
+from quakedesign.sos.exact.files import is_about_polynomial, load, save, text
+from quakedesign.sos.exact.proofs import Functional, Point, holds
 
 QUESTIONS = {
     "square": ("(x - y)^2 + y^2", {}),
@@ -107,3 +109,118 @@ def test_truncated_or_mistyped_files_are_refused(data):
     except CertificateError:
         return
     assert not holds(statement, proof)
+
+
+# ---------------------------------------------------------------- every rule of a file by itself
+
+BY_HAND = {
+    "format": 1,
+    "variables": ["x", "y"],
+    "polynomial": {"2,0": "1", "0,2": "1"},
+    "inequalities": [{"1,0": "1"}],
+    "equalities": [],
+    "products": [[], [0]],
+    "degree": 2,
+    "multiplier": {"0,0": "1"},
+    "sos": {
+        "squares": [{"product": [], "basis": [[1, 0], [0, 1]], "gram": ["1", "0", "1"]}],
+        "cofactors": [],
+        "multiplier": [],
+    },
+}
+SQUARE = ("sos", "squares", 0)
+
+
+def with_square(**parts):
+    return replaced(BY_HAND, SQUARE, BY_HAND["sos"]["squares"][0] | parts)
+
+
+ILL_FORMED = {
+    "format true": BY_HAND | {"format": True},
+    "format 2": BY_HAND | {"format": 2},
+    "no variables": BY_HAND | {"variables": []},
+    "a variable that is no name": BY_HAND | {"variables": ["x", "y z"]},
+    "a variable that is a number": BY_HAND | {"variables": ["x", 1]},
+    "a variable twice": BY_HAND | {"variables": ["x", "x"]},
+    "seventeen variables": BY_HAND | {"variables": [f"x{i}" for i in range(17)]},
+    "degree true": BY_HAND | {"degree": True},
+    "degree negative": BY_HAND | {"degree": -1},
+    "product of booleans": BY_HAND | {"products": [[], [False]]},
+    "product unknown": BY_HAND | {"products": [[], [1]]},
+    "multiplier empty": BY_HAND | {"multiplier": {}},
+    "33 conditions": BY_HAND | {"inequalities": [{"1,0": str(i)} for i in range(1, 34)]},
+    "33 conditions of both kinds": BY_HAND
+    | {"inequalities": [{"1,0": str(i)} for i in range(1, 18)], "equalities": [{"1,0": "1"}] * 16},
+    "two kinds of proof": BY_HAND | {"negative": {"point": ["0", "0"]}},
+    "square of a product that is not listed": with_square(product=[0, 0]),
+    "square of a product of booleans": with_square(product=[False]),
+    "basis empty": with_square(basis=[], gram=[]),
+    "basis repeated": with_square(basis=[[1, 0], [1, 0]], gram=["1", "0", "1"]),
+    "basis of a monomial as a polynomial": with_square(basis=[{"1,0": "1"}, [0, 1]]),
+    "basis of an empty polynomial": with_square(basis=[{}, [0, 1]]),
+    "basis of another length": with_square(basis=[[1], [0, 1]]),
+    "gram too short": with_square(gram=["1", "0"]),
+    "gram too long": with_square(gram=["1", "0", "1", "0"]),
+    "cofactor without equality": replaced(BY_HAND, ("sos", "cofactors"), [{}]),
+    "no object": [BY_HAND],
+}
+
+
+@pytest.mark.parametrize("case", ILL_FORMED)
+def test_what_breaks_a_rule_is_not_read(case):
+    load(json.dumps(BY_HAND))
+    with pytest.raises(CertificateError):
+        load(json.dumps(ILL_FORMED[case]))
+
+
+@pytest.mark.parametrize(
+    "fine",
+    [
+        BY_HAND | {"degree": 0},
+        BY_HAND | {"variables": [f"x{i}" for i in range(16)], "polynomial": {}, "inequalities": [], "products": [[]],
+                   "multiplier": {",".join("0" * 16): "1"}, "sos": BY_HAND["sos"] | {"squares": []}},
+        BY_HAND | {"inequalities": [{"1,0": str(i)} for i in range(1, 33)]},
+        with_square(basis=[{"1,0": "2"}, [0, 1]]),
+        with_square(basis=[{"1,0": "1", "0,0": "1"}, [0, 1]]),
+        with_square(basis=[[999, 0], [0, 1]]),
+    ],
+    ids=["degree 0", "16 variables", "32 conditions", "twice a monomial", "a polynomial", "exponent 999"],
+)  # fmt: skip
+def test_what_is_at_the_edge_of_a_rule_is_read(fine):
+    statement, proof = load(json.dumps(fine))
+    assert json.loads(text(statement, proof)) == fine
+
+
+def test_files_about_polynomials_are_told_by_their_key():
+    assert is_about_polynomial(BY_HAND)
+    assert not any(map(is_about_polynomial, ({"V": []}, ["polynomial"], "polynomial", None, {})))
+
+
+def test_only_what_can_be_read_again_is_written(tmp_path):
+    statement, proof = load(json.dumps(BY_HAND))
+    path = tmp_path / "proof.json"
+    save(statement, proof, path)
+    assert load(path.read_text()) == (statement, proof)
+    assert path.read_text().isascii()
+    other = tmp_path / "none.json"
+    with pytest.raises(CertificateError, match="only a proof"):
+        save(statement, None, other)
+    fine = dataclasses.replace(proof.squares[0], gram=(Fraction(1, 10**401), Fraction(0), Fraction(1)))
+    with pytest.raises(CertificateError, match="rational"):
+        save(statement, dataclasses.replace(proof, squares=(fine,)), other)
+    assert not other.exists()
+
+
+def test_an_answer_is_its_proof(tmp_path):
+    statement, proof = load(json.dumps(BY_HAND))
+    answer = Answer(statement=statement, proof=proof)
+    assert (str(answer.verdict), answer.check()) == ("sos", True)
+    wrong = Answer(statement=dataclasses.replace(statement, polynomial={(2, 0): Fraction(1)}), proof=proof)
+    assert (str(wrong.verdict), wrong.check()) == ("sos", False)
+    undecided = Answer(statement=statement, proof=None)
+    assert (str(undecided.verdict), undecided.check()) == ("undecided", True)
+    point = Answer(statement=statement, proof=Point(coordinates=(Fraction(0), Fraction(0))))
+    assert (str(point.verdict), point.check()) == ("negative", False)
+    assert str(Answer(statement=statement, proof=Functional(values={})).verdict) == "not-sos"
+    answer.save(tmp_path / "answer.json")
+    assert load((tmp_path / "answer.json").read_text())[1] == proof

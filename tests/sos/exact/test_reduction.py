@@ -1,4 +1,5 @@
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 import pytest
@@ -84,3 +85,75 @@ def test_sign_symmetry_splits_even_polynomials_completely():
 def test_too_large_a_basis_is_refused_before_it_is_built():
     with pytest.raises(PolynomialError, match="at most 2000 monomials"):
         full_bases(statement(tuple(f"x{i}" for i in range(14)), {(8,) + (0,) * 13: Fraction(1)}))
+
+
+# ---------------------------------------------------------------- the rule word by word
+
+
+def reduced_by_definition(found):
+    """Drop by the words of the rule, one monomial at a time, with everything counted anew each time."""
+    size = len(found.variables)
+
+    def total(*exponents):
+        return tuple(map(sum, zip(*exponents, strict=True)))
+
+    kept = set(found.target)
+    for h in found.equalities:
+        room = found.degree - max(map(sum, h))
+        kept |= {total(m, e) for m in product(range(room + 1), repeat=size) if sum(m) <= room for e in h}
+    alive = []
+    for weight in found.weights:
+        half = (found.degree - max(map(sum, weight))) // 2
+        alive.append([m for m in product(range(max(half, -1) + 1), repeat=size) if sum(m) <= half])
+    while True:
+        entries = {}
+        for k, (weight, basis) in enumerate(zip(found.weights, alive, strict=True)):
+            for (i, b), (j, c), (e, number) in product(enumerate(basis), enumerate(basis), weight.items()):
+                entries.setdefault(total(b, c, e), []).append((k, b) if i == j and number > 0 else None)
+        gone = next((group for e, group in entries.items() if e not in kept and None not in group), None)
+        if gone is None:
+            return [set(basis) for basis in alive]
+        for k, b in set(gone):
+            alive[k].remove(b)
+
+
+forms = st.dictionaries(
+    st.tuples(st.integers(0, 2), st.integers(0, 2)),
+    st.sampled_from((-2, -1, 1, 3)).map(Fraction),
+    min_size=1,
+    max_size=3,
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(forms, st.lists(forms, max_size=2), st.lists(forms, max_size=1), st.booleans(), st.integers(0, 5))
+def test_the_bases_are_those_of_the_rule(polynomial, inequalities, equalities, products, bound):
+    found = statement(
+        ("x", "y"), polynomial, inequalities=tuple(inequalities), equalities=tuple(equalities), products=products,
+        degree_bound=bound,
+    )  # fmt: skip
+    bases = reduced_bases(found)
+    assert [set(basis) for basis in bases] == reduced_by_definition(found)
+    assert all(len(set(basis)) == len(basis) for basis in bases)
+
+
+def test_the_largest_bases_that_are_built():
+    """C(n + h, n) monomials for the degree 2h: 1891 of 60 variables and degree 4, 2016 of 62; and their squares."""
+
+    def built(size, degree, *on):
+        names = tuple(f"x{i}" for i in range(size))
+        unit = {(degree,) + (0,) * (size - 1): Fraction(1)}
+        return full_bases(statement(names, unit, inequalities=on, products=False))
+
+    assert len(built(60, 4)[0]) == 1891
+    with pytest.raises(PolynomialError, match="at most 2000 monomials"):
+        built(62, 4)
+    with pytest.raises(PolynomialError, match="8000000 pairs"):
+        built(
+            60,
+            4,
+            *({(0,) * i + (2,) + (0,) * (59 - i): Fraction(1)} for i in range(60)),
+            *({(2,) + (0,) * i + (1,) + (0,) * (58 - i): Fraction(1)} for i in range(59)),
+            *({(0,) * 60: Fraction(n)} for n in (1, 2)),
+        )
+    assert reduced_bases(statement(("x",), {(0,): Fraction(1)}, inequalities=({(3,): Fraction(1)},), degree_bound=2))

@@ -1,0 +1,67 @@
+"""What may be given as a polynomial and as a condition, and what it is read as."""
+
+from fractions import Fraction as F
+
+import pytest
+import sympy as sp
+
+from quakedesign.errors import ParameterError, PolynomialError
+from quakedesign.sos.exact.reading import read
+
+x, y, z = sp.symbols("x y z")
+
+
+def test_text_expressions_and_exponents_are_the_same():
+    expected = (("x", "y"), {(2, 0): 1, (0, 1): F(-1, 2)}, ({(1, 0): 1},), ({(0, 1): 1},), None)
+    assert read("x^2 - y/2", ("x >= 0", "y == 0"), None, None) == expected
+    assert read(x**2 - y / 2, (x >= 0, sp.Eq(y, 0)), None, None) == expected
+    assert read({(2, 0): 1, (0, 1): F(-1, 2), (1, 1): 0}, ("x >= 0", "y == 0"), None, ("x", "y")) == expected
+    assert read(x**2 - y / 2, (0 <= x, sp.Eq(y, 0)), "auto", (x, y)) == (*expected[:4], "auto")
+
+
+def test_both_directions_of_a_relation():
+    assert read(x, (x <= 3,), None, None)[2] == ({(1,): -1, (0,): 3},)
+    assert read(x, (sp.Ge(x, y),), None, None)[2] == ({(1, 0): 1, (0, 1): -1},)
+    assert read(x, (sp.Eq(x, y + 1),), None, None)[3] == ({(1, 0): 1, (0, 1): -1, (0, 0): -1},)
+    assert read(x, "x >= 1", None, None)[2] == ({(1,): 1, (0,): -1},)
+
+
+def test_variables_are_found_in_order_or_given():
+    assert read("y + x", ("z >= 0",), None, None)[0] == ("y", "x", "z")
+    assert read(z * y, (x >= 0,), None, None)[0] == ("y", "z", "x")
+    assert read("x", (), "z^2", None)[0] == ("x", "z")
+    assert read("x", (), None, ("z", "x"))[:2] == (("z", "x"), {(0, 1): 1})
+    assert read(3, (), None, None)[:2] == (("x",), {(0,): 3})
+    assert read("0", (), None, ("x", "y"))[1] == {}
+    assert read(0, (), None, ("x", "y"))[1] == {}
+    assert read(F(1, 3), (), None, ("x", "y"))[1] == {(0, 0): F(1, 3)}
+
+
+def test_a_multiplier_is_read_like_a_polynomial():
+    assert read("x", (), "1 + x^2", None)[4] == {(0,): 1, (2,): 1}
+    assert read("x", (), 1 + x**2, None)[4] == {(0,): 1, (2,): 1}
+    assert read("x", (), {(2,): 1}, ("x",))[4] == {(2,): 1}
+
+
+@pytest.mark.parametrize(
+    ("polynomial", "on", "variables"),
+    [
+        ({(1, 0): 1}, (), None),
+        ({(1,): 1}, (), ("x", "y")),
+        ({(1, -1): 1}, (), ("x", "y")),
+        ({(1, True): 1}, (), ("x", "y")),
+        ({(1, 1.0): 1}, (), ("x", "y")),
+        ({"11": 1}, (), ("x", "y")),
+        ({frozenset((1, 2)): 1}, (), ("x", "y")),
+        (x * z, (), ("x", "y")),
+        ("x*z", (), ("x", "y")),
+        ("x", ("x - x >= 0",), None),
+        (x, (x > 0,), None),
+        (x, (x,), None),
+        (x, (sp.Ne(x, 0),), None),
+        (x, ({(1,): 1},), ("x",)),
+    ],
+)
+def test_everything_else_is_refused(polynomial, on, variables):
+    with pytest.raises((PolynomialError, ParameterError)):
+        read(polynomial, on, None, variables)
