@@ -70,6 +70,13 @@ def test_ends_may_be_zero_or_the_root(gain, low, high):
     _check_roots(loop)
 
 
+def test_a_root_is_that_of_a_positive_number():
+    for low, high in (("0", "0"), ("0", "1")):
+        loop = replace(proof("4", "2", "2").loop, gains={"k": F(0)}, roots={"root": ("k", (F(low), F(high)))})
+        with pytest.raises(CertificateError, match="does not hold the root"):
+            _check_roots(loop)
+
+
 def test_lifts_belong_on_cells():
     loop = replace(proof("4", "2", "2").loop, lifts={"n": ()})
     _check_roots(loop)

@@ -9,7 +9,8 @@ import sympy as sp
 
 from quakedesign.certificates import load_certificate
 from quakedesign.certificates.checking import _same_field, limit, touching_cells
-from quakedesign.certificates.claim import Loop, root_enclosure, unit_ranges
+from quakedesign.certificates.claim import Loop, error_units, loop_of, root_enclosure, unit_ranges
+from quakedesign.certificates.error_coordinates import in_error_coordinates
 from quakedesign.controllers import LoopField, laws
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.symbolic.terms import Term
@@ -113,6 +114,18 @@ def test_the_inputs_of_a_response_are_not_of_the_law():
         _same_field(replace(ELQR, field=moved), None)
 
 
+def test_a_response_may_be_about_error_coordinates():
+    model = in_error_coordinates(laws()["elqr"].loop_field())
+    moved = loop_of("elqr", model, gains=ELQR.gains, uncertain=ELQR.uncertain, constants=ELQR.constants)
+    push = {"e2": (*moved.field["e2"], Term(F(1), ("push",), ()))}
+    _same_field(replace(moved, field=moved.field | push, inputs={"push": (F(1),)}), None)
+    with pytest.raises(CertificateError, match="the field is not that"):
+        _same_field(moved, None)
+    wrong = {"e2": (*push["e2"], Term(F(1), (), (("e1", F(1), "s"),)))}
+    with pytest.raises(CertificateError, match="the field is not that"):
+        _same_field(replace(moved, field=moved.field | wrong, inputs={"push": (F(1),)}), None)
+
+
 # ---------------------------------------------------------------- what a loop is made of
 
 
@@ -176,6 +189,8 @@ def test_the_limit_of_a_field_by_hand():
     point = {"e1": F(-2), "e2": F(3), "e3": F(0)}
     signs = {"e1": -1, "e2": 1, "e3": 1}
     assert limit(terms, CTA, point, signs, {"d": F(1, 10), "beta": F(1)}) == -168 + F(1, 2)
+    negative = {"e1": -1, "e2": -1, "e3": 1}
+    assert limit(terms, CTA, point, negative, {"d": F(1, 10), "beta": F(1)}) == -168 + F(1, 2)  # |e2| has no sign
     with pytest.raises(CertificateError, match="no polynomial"):
         limit((Term(F(1), (), (("e2", F(1, 3), "s"),)),), CTA, point, signs, {})
 
@@ -190,3 +205,16 @@ def test_a_law_from_outside_may_have_fewer_states():
     _same_field(loop, own)
     with pytest.raises(CertificateError, match="the field is not that"):
         _same_field(replace(loop, field={"x": ()}), own)
+
+
+def test_units_are_those_of_the_model_or_of_the_law_by_its_name():
+    root, other = DIA.roots["kappa"][1]
+    assert root == other == F(5, 4)
+    own = error_units(DIA)
+    assert set(own) == set(DIA.states)
+    assert own != dict.fromkeys(DIA.states, (F(1), F(1)))
+    assert error_units(DIA, laws()["dia"].loop_field()) == own
+    assert error_units(replace(DIA, law="own")) == dict.fromkeys(DIA.states, (F(1), F(1)))
+    assert error_units(replace(DIA, law="own"), laws()["dia"].loop_field()) == own
+    assert error_units(CTA) == dict.fromkeys(CTA.states, (F(1), F(1)))
+    assert error_units(DIA, replace(laws()["dia"].loop_field(), units={})) == dict.fromkeys(DIA.states, (F(1), F(1)))

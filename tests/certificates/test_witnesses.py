@@ -147,3 +147,12 @@ def test_the_statement_of_an_obligation():
         2,
         3,
     ]
+
+
+def test_one_negative_coefficient_is_too_many():
+    """(-u^2 + u - 1)(-u^2) = u^4 - u^3 + u^2 is a square, and the multiplier is negative everywhere."""
+    square = Square(basis=((2,), (1,)), gram=(F(1), F(-1, 2), F(1)))
+    assert not proved({(2,): F(-1)}, square, multiplier={(2,): F(-1), (1,): F(1), (0,): F(-1)})
+    assert proved(
+        {(2,): F(1)}, of(1, 2), of(1, 1), of(1, 1, product=(0,)), multiplier={(2,): F(1), (1,): F(1), (0,): F(1)}
+    )

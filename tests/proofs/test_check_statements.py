@@ -377,8 +377,9 @@ def test_the_worst_result_counts(written, capsys):
     assert checker.main([bad]) == checker.main([good, bad]) == 1
     assert checker.main([none]) == checker.main([none, good]) == checker.main([bad, none]) == 2
     said = capsys.readouterr()
-    assert f"{refuted}: refuted" in said.out
-    assert f"{bad}: invalid: format must be the integer 1. Received 2" in said.out
+    lines = said.out.splitlines()
+    assert f"{refuted}: refuted" in lines
+    assert f"{bad}: invalid: format must be the integer 1. Received 2" in lines
     assert said.err.splitlines()[0].startswith(f"FILE must be readable. Received {none!r}: 'No such file")
 
 
@@ -422,3 +423,11 @@ def test_an_edge_of_the_set_belongs_to_it():
     edge = POLYNOMIALS.file({"1": "-1"}, "negative", {"point": ["1"]}, names="x", on=[{"0": "1", "1": "-1"}])
     edge["products"] = [[], [0]]
     assert POLYNOMIALS.verify(edge).verdict == "refuted"
+
+
+def test_a_product_beyond_the_degree_is_left_out():
+    """Evaluation at 0 is negative at x^2 - 1; x^12 >= 0 and its squares are of degree 12 at least."""
+    functional = {"functional": {"0": "1"}}
+    beyond = POLYNOMIALS.file({"2": "1", "0": "-1"}, "not-sos", functional, names="x", on=[{"12": "1"}])
+    beyond["products"] = [[], [0]]
+    assert POLYNOMIALS.verify(beyond).verdict == "refuted"
