@@ -37,6 +37,7 @@ class _Ending:
         self._said = False
         self._before = number_placed()
         self.remedy: str | None = None
+        self.reported = sys.unraisablehook
 
     def receive(self, number: int, _frame: FrameType | None) -> None:
         """Handle the first signal; further ones do not disturb the end."""
@@ -55,6 +56,12 @@ class _Ending:
                 number, end = received[0], monotonic() + PATIENCE
         self._number = self._number or number
         os._exit(self._conclude())
+
+    def not_raised(self, what: Any) -> None:
+        """End the process where Python can only report the interruption, as in a finaliser, and would go on."""
+        if isinstance(what.exc_value, Interruption):
+            os._exit(self._conclude())
+        self.reported(what)
 
     @contextmanager
     def concluded(self) -> Iterator[None]:
@@ -127,6 +134,7 @@ def _received(by: _Ending, last: bool) -> Iterator[None]:
     Thread(target=by.watch, args=(reader,), daemon=True).start()
     woken = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     before = {number: signal.getsignal(number) for number in handled}
+    sys.unraisablehook = by.not_raised
     try:
         for number in handled:
             signal.signal(number, by.receive)
@@ -134,6 +142,7 @@ def _received(by: _Ending, last: bool) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if last else handler)
+        sys.unraisablehook = by.reported
         signal.set_wakeup_fd(woken)
         os.close(writer)
 

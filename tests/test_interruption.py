@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -154,3 +156,22 @@ def test_an_interruption_that_is_swallowed_ends_the_process_all_the_same(start, 
     _, err = process.communicate(timeout=10)
     assert (process.returncode, err) == (143, "quakedesign: terminated; nothing was written.\n")
     assert not os.listdir(tmp_path / "tmp")
+
+
+def test_an_interruption_that_python_can_only_report_ends_the_command_all_the_same():
+    text = """
+import os, signal, time
+from quakedesign.interruption import ending
+
+class Slow:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(30)
+
+signal.signal(signal.SIGTERM, signal.SIG_DFL)
+with ending(process=True):
+    Slow()
+    time.sleep(30)
+"""
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert (done.returncode, done.stderr) == (143, "quakedesign: terminated; nothing was written.\n")
