@@ -9,7 +9,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.certificates import Certificate, Loop
-from quakedesign.certificates.linear_premises import linear_premises, sectors
+from quakedesign.certificates.linear_premises import effective_stress, linear_premises, sectors
 from quakedesign.certificates.response import InputResponse, OutputBound, Response
 from quakedesign.certificates.tracking import (
     disturbance_inputs,
@@ -215,3 +215,51 @@ def test_the_reference_asks_for_its_peak_rate():
     assert found["constant_reference"].required == pytest.approx(RATES[0], rel=1e-12)
     assert found["constant_reference"].certified == found["vanishing_disturbance"].certified == 0
     assert found["vanishing_disturbance"].required == pytest.approx(3.2e-4)
+
+
+# ---------------------------------------------------------------- sectors
+
+
+def test_sectors_by_hand_with_a_growing_disturbance_and_every_width():
+    """k = 0.48, eta = 1.6 and N = 8e-8, each a tenth up and down; chord N' stress slope, slope 0.1/0.27635."""
+    fault = disturbed(slip_growth=0.125, rate_growth=0.25).with_box("ten-percent")
+    found = sectors(fault)
+    chord = 1.1 * 8e-8 * float(found.largest_effective_stress) * 0.1 / 0.27635
+    assert float(found.slip[0]) == pytest.approx(-0.48 * 1.1 + 0.125, rel=1e-12)
+    assert float(found.slip[1]) == pytest.approx(chord - 0.48 * 0.9 + 0.125, rel=1e-9)
+    assert found.rate == (F(8, 5) * F(9, 10) - F(1, 4), F(8, 5) * F(11, 10) - F(1, 4))
+    assert found.authority == F("0.2353") * 8 * F(9, 10) / 10**8
+    rows = [max(abs(float(s) + 0.48) for s in found.slip), max(abs(float(w) - 1.6) for w in found.rate)]
+    assert [float(bound * found.authority) for bound in found.row_bounds] == pytest.approx(rows, rel=1e-9)
+    assert found.ranges() == {"beta": found.beta, "s": found.slip, "w": found.rate}
+
+
+def test_a_normal_stress_that_turns_leaves_both_signs_of_the_chord():
+    """At rest at r the fault bears (mu* N stress - k r)/(mu N), which is negative beyond 2.79 m."""
+    near, far = (replace(REAL, reference=replace(REAL.reference, target_slip=slip)) for slip in (2.7, 5.0))
+    assert float(sectors(near).slip[0]) == pytest.approx(-0.48 + 3.2e-6, rel=1e-9)
+    found = sectors(far)
+    chord = 8e-8 * float(found.largest_effective_stress) * 0.1 / 0.27635
+    assert float(found.slip[0]) == pytest.approx(-chord - 0.48 + 3.2e-6, rel=1e-9)
+    assert float(found.slip[1]) == pytest.approx(chord - 0.48 + 3.2e-6, rel=1e-9)
+
+
+def test_the_stress_at_rest_by_hand():
+    """Anything that weakens at most by slope * r from mu* and not below mu_res bears at most the value at the least."""
+    stress, positive = effective_stress(REAL)
+    slip = np.linspace(0, TARGET, 20001)
+    least = np.maximum(0.2353, 0.3353 - 0.1 / 0.27635 * slip)
+    exact = np.abs((0.3353 * 4.0 - (0.48 - 3.2e-6) * slip) / (least * 8e-8)).max()
+    assert positive
+    assert exact * (1 - 1e-9) <= float(stress) <= 1.011 * exact
+
+
+def test_the_smallest_bound_of_the_slip_rate_counts():
+    one = certificate("error")
+    part = InputResponse(
+        sets=(),
+        bounds={name: OutputBound(bound=F(bound, 10**6), weights=()) for name, bound in (("y", 5), ("z", 1))},
+    )
+    row = one.response.outputs["y"]
+    both = Response(outputs={"y": row, "z": row}, parts=dict.fromkeys(one.response.parts, part))
+    assert covers(float(peaks_covered(replace(one, response=both), REAL)[1].split()[5]), 3e-6 + RATES[0])
