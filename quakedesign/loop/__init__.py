@@ -4,11 +4,13 @@ from quakedesign.arguments import check_arguments
 from quakedesign.loop.held import held_loop
 from quakedesign.loop.laws import LinearLaw, Model, disturbance_estimate, summed_integrals
 from quakedesign.loop.periodic import PeriodicLoop, Segment
+from quakedesign.loop.running import SampledController
 
 __all__ = [
     "LinearLaw",
     "Model",
     "PeriodicLoop",
+    "SampledController",
     "Segment",
     "disturbance_estimate",
     "held_loop",

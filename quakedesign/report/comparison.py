@@ -1,11 +1,12 @@
 """All controllers of one fault side by side, in closed loop."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Verdict
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import Variant, certified_lipschitz
 from quakedesign.controllers import SlidingMode, published
@@ -46,6 +47,8 @@ class Entry:
         For a linear law: what is decided when p is held over T_s, see `Design.held_loop`.
     peaks : mapping of str to CertifiedPeaks
         For a designed linear law that is proved: certified peaks by class of disturbances; no class without any.
+    guarantee : Guarantee or NoGuarantee or None
+        For a designed law: what is proved of it with p held over T_s, see `Design.guarantee`.
     """
 
     label: str
@@ -57,6 +60,7 @@ class Entry:
     variants: tuple[Variant, ...] = ()
     held: HeldLoop | None = None
     peaks: Mapping[str, CertifiedPeaks] = field(default_factory=dict)
+    guarantee: Guarantee | NoGuarantee | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Keys of DESIGN.md; exact quantities as texts, measured ones as numbers, SI."""
@@ -72,6 +76,7 @@ class Entry:
             "headline": headline(self),
             "largest_sampling_time": self.largest_step,
             "growth_per_step": self.growth_per_step,
+            "guarantee": self.guarantee.sentence() if self.guarantee else None,
             "held": self.held.to_dict() if self.held else None,
             "peaks": {name: found.to_dict() for name, found in self.peaks.items()} or None,
             "details": dict(found.details),
@@ -169,7 +174,7 @@ def compare(
     for controller in published(fault.name).values() if with_published else ():
         tell(f"{controller.title} (published): verdict", 0.0)
         entries.append(_entry("published", assess(fault, controller), schemes, tell))
-    entries.extend(_entry("designed", found, schemes, tell) for found in designs)
+    entries.extend(replace(_entry("designed", found, schemes, tell), guarantee=found.guarantee) for found in designs)
     return Comparison(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
 
 

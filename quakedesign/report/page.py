@@ -37,7 +37,8 @@ img{max-width:100%}code{background:#f3f3f3;padding:0 .2rem}</style></head><body>
     + _TABLES
     + """<p>{{ grades }}. Errors count after a quarter of the task; p &lt; 0 is withdrawal. {{ schemes }}.</p>
 <h2>What is proved, and under which premises</h2>
-{% for e in entries %}<h3>{{ e.label }}</h3><p>{{ headline(e) }}.</p>
+{% for e in entries %}<h3>{{ e.label }}</h3>
+{% if e.guarantee %}<p>guarantee: {{ e.guarantee.sentence() }}.</p>{% endif %}<p>{{ headline(e) }}.</p>
 <p>Gains: {% for n, v in e.design.gains.items() %}<code>{{ n }} = {{ number(v) }}</code> {% endfor %}</p>
 <table><thead><tr><th>premise</th><th>note</th><th>required</th><th>certified</th><th>ratio</th>
 <th>holds</th></tr></thead>

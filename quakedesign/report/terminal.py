@@ -35,6 +35,8 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in entry.design.gains.items())
         console.print()
         console.print(entry.label, style="bold", end=": ")
+        if entry.guarantee is not None:
+            console.print(f"guarantee: {entry.guarantee.sentence()}", end="\n  ")
         console.print(headline(entry))
         console.print(f"  gains: {gains or 'none'}")
         for premise in entry.design.premises:

@@ -6,10 +6,14 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Verdict
+from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, guarantee, task_of
 from quakedesign.certificates.premises import Domain, Premise, Variant, feedforward_variants
 from quakedesign.controllers import Controller, SlidingMode, control_law
+from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.controllers.feed_forward import NONE
 from quakedesign.fault import Fault
+from quakedesign.loop import summed_integrals
+from quakedesign.rationals import rational
 from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks, certified_peaks
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
@@ -89,6 +93,22 @@ class Design:
         if self.controller is None or isinstance(self.controller, SlidingMode):
             return None
         return certified_peaks(self.fault, self.controller, disturbance_class=disturbance_class)
+
+    @property
+    def guarantee(self) -> Guarantee | NoGuarantee:
+        """What is proved of the law as it runs, once per T_s of the fault, integrals summed, p held; or why nothing.
+
+        Computed when asked for, in about a second.
+        """
+        law = self.controller
+        summed = isinstance(law, ExtendedLQR) and law.feedback == "error" and law.limits is None and not law.offset
+        if law is None or not summed:
+            return NoGuarantee(
+                reason=f"no analysis of {self.title} under a held pressure is known here", small_gain=None
+            )
+        step = rational(self.fault.sampling_time)
+        held = Held(law=summed_integrals(tuple(law.gains.values()), step), step=step)
+        return guarantee(task_of(self.fault), held)
 
     def held_loop(self) -> HeldLoop | None:
         """What is decided of an e-LQR when p is held over the fault's sampling time; None for another law."""

@@ -9,7 +9,7 @@ from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
 from quakedesign.errors import ParameterError
-from quakedesign.loop import LinearLaw, PeriodicLoop, held_loop
+from quakedesign.loop import LinearLaw, PeriodicLoop, SampledController, held_loop
 
 _DIGITS = 4
 _MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
@@ -30,6 +30,11 @@ class Held:
     step: Fraction
     delay: Fraction = Fraction(0)
     lag: Fraction = Fraction(0)
+
+    @property
+    def controller(self) -> SampledController:
+        """The law for `simulate`, with the scheme ``explicit`` and the step T_s; delay and lag are the actuator's."""
+        return SampledController(law=self.law, step=self.step)
 
     def loop(self, task: Task) -> PeriodicLoop:
         """Nominal error loop on a task."""
@@ -113,10 +118,7 @@ class Guarantee:
 
     def bounds(self) -> Bounds | NoGuarantee:
         """What the theorem gives, computed anew."""
-        try:
-            return certified_bounds(self.task, self.held.loop(self.task))
-        except ParameterError as error:
-            return NoGuarantee(reason=str(error), small_gain=None)
+        return _bounds(self.task, self.held, self.held.loop(self.task))
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
@@ -150,14 +152,18 @@ def guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
     ParameterError
         For a loop without a steady state.
     """
-    loop = held.loop(task)
-    try:
-        found = certified_bounds(task, loop)
-    except ParameterError as error:
-        return NoGuarantee(reason=str(error), small_gain=None)
+    found = _bounds(task, held, held.loop(task))
     if isinstance(found, NoGuarantee):
         return found
     return Guarantee(task=task, held=held, claims=Claims.of(task, found).rounded())
+
+
+def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
+    try:
+        return certified_bounds(task, loop)
+    except ParameterError:
+        reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
+        return NoGuarantee(reason=reason, small_gain=None)
 
 
 def _above(value: Fraction) -> Fraction:

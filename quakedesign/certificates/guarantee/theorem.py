@@ -28,6 +28,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.bounds import UpperBound
+from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.loop import PeriodicLoop
@@ -80,6 +81,14 @@ class NoGuarantee:
 
     reason: str
     small_gain: UpperBound | None
+
+    def check(self) -> Verdict:
+        """UNDECIDED."""
+        return Verdict.UNDECIDED
+
+    def sentence(self) -> str:
+        """For people."""
+        return f"none: {self.reason}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,7 +46,7 @@ class Answer:
     def lines(self) -> list[str]:
         """For people: the sentence first, then what was seen."""
         if not isinstance(self.found, Guarantee):
-            said = [f"none: {self.found.reason}"]
+            said = [self.found.sentence()]
             if self.shorter is not None:
                 said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             return said

@@ -11,8 +11,11 @@ import pytest
 
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
+from quakedesign.controllers import published
+from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.synthesis import Design
 from quakedesign.synthesis.guaranteed import design_held, worst_found
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
@@ -143,9 +146,29 @@ def test_sharper_claims_are_not_proved():
 def test_a_step_far_too_long_has_no_guarantee_and_says_why():
     found = design_held(task_of(load_fault("real-fault")), F(2), objective="peak")
     assert isinstance(found, NoGuarantee)
-    assert "must be stable" in found.reason
+    assert "is not stable" in found.reason
 
 
 def test_another_objective_is_refused():
     with pytest.raises(ParameterError, match="tracking, peak"):
         design_held(task_of(load_fault("real-fault")), F(1), objective="speed")
+
+
+def test_designs_say_what_is_guaranteed_of_them_as_they_run():
+    """The published e-LQR is unstable when held over 184 ms; gains for the sampled loop are guaranteed."""
+    fault = load_fault("real-fault")
+    gains = dict(zip(("k1", "k2", "k3", "k4"), map(F, ("6.96e8", "2.53e8", "6.02e8", "2.16e8")), strict=True))
+    made = [
+        Design(fault=fault, name=law.name, verdict=Verdict.UNDECIDED, controller=law, certificate=None, premises=())
+        for law in (
+            ExtendedLQR(gains=gains),
+            ExtendedLQR(gains=published("real-fault")["elqr"].gains),
+            published("real-fault")["cta"],
+        )
+    ]
+    held, unstable, sliding = (design.guarantee for design in made)
+    assert isinstance(held, Guarantee)
+    assert held.check() is Verdict.PROVED
+    assert unstable.check() is sliding.check() is Verdict.UNDECIDED
+    assert unstable.sentence().startswith("none: held over 0.184 s even the nominal loop is not stable")
+    assert sliding.sentence() == "none: no analysis of 2-CTA under a held pressure is known here"

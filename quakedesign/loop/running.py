@@ -1,0 +1,62 @@
+"""A linear law of samples as a controller that simulations run."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, ClassVar
+
+import sympy as sp
+
+from quakedesign.controllers import Controller, LoopField, Signals
+from quakedesign.errors import UnsupportedError
+from quakedesign.loop.laws import LinearLaw
+from quakedesign.rationals import to_sympy
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledController(Controller):
+    """p = Cz + Dy, whose states z ← Fz + Gy are those of the scheme ``explicit`` with the step T_s: ξ ← ξ + T_s·ξ′.
+
+    Attributes
+    ----------
+    law : LinearLaw
+    step : Fraction
+        T_s [s] for which it is meant.
+    """
+
+    name: ClassVar[str] = "sampled"
+    title: ClassVar[str] = "sampled law"
+    source: ClassVar[str] = "quakedesign.loop.laws"
+    gain_units: ClassVar[Mapping[str, str]] = {}
+
+    gains: Mapping[str, Fraction] = field(default_factory=dict)
+    law: LinearLaw
+    step: Fraction
+
+    @property
+    def integral_units(self) -> tuple[str, ...]:  # type: ignore[override]
+        """One for every state; the law's own."""
+        return ("-",) * len(self.law.states)
+
+    def pressure(self, signals: Signals) -> sp.Expr:
+        """Cz + Dy [Pa]."""
+        return _combined((*self.law.output, *self.law.feedback), _read(signals))
+
+    def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
+        """(Fz + Gy − z)/T_s."""
+        rows = zip(self.law.update, self.law.measured, signals.integrals, strict=True)
+        seen = _read(signals)
+        return tuple((_combined((*own, *fed), seen) - z) / to_sympy(self.step) for own, fed, z in rows)
+
+    @classmethod
+    def loop_field(cls) -> LoopField:
+        """Refuse: it has no loop in continuous time."""
+        raise UnsupportedError("a sampled law has no loop in continuous time. Use a guarantee of the loop that runs.")
+
+
+def _read(signals: Signals) -> tuple[Any, ...]:
+    return (*signals.integrals, signals.slip_error, signals.slip_rate_error)
+
+
+def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Expr:
+    return sp.Add(*(to_sympy(v) * signal for v, signal in zip(numbers, signals, strict=True)))
