@@ -2,7 +2,7 @@
 
 from quakedesign.arguments import check_arguments
 from quakedesign.loop.held import held_loop
-from quakedesign.loop.laws import LinearLaw, Model, disturbance_estimate, summed_integrals
+from quakedesign.loop.laws import LinearLaw, Model, Prediction, disturbance_estimate, summed_integrals
 from quakedesign.loop.periodic import PeriodicLoop, Segment
 from quakedesign.loop.running import SampledController
 
@@ -10,6 +10,7 @@ __all__ = [
     "LinearLaw",
     "Model",
     "PeriodicLoop",
+    "Prediction",
     "SampledController",
     "Segment",
     "disturbance_estimate",

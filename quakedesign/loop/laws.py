@@ -79,11 +79,37 @@ class Model:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
-    """One sample ahead, e2⁺ ≈ of_slip·e1 + of_rate·e2 + of_push·(β·b·p + d); any numbers give a law."""
+    """What a law expects, from its model; any numbers give a law, good ones a good one.
+
+    Attributes
+    ----------
+    of_slip, of_rate : Fraction
+        Of e1 and e2 now, for e2 at the next sample.
+    of_pushes : tuple of Fraction
+        γ_j [s]: what βb·p + d adds to that, p being what was asked for j samples ago, from 0 on.
+    ahead : tuple of rows
+        Of e1 and e2 now, for both when the pressure asked for now arrives; the unit matrix without delay.
+    ahead_of_pushes : tuple of (Fraction, Fraction)
+        What βb·p + d adds to these [s², s], p being what was asked for j samples ago, from 1 on.
+
+    Raises
+    ------
+    ParameterError
+        When the pushes of both do not fit, or those of the next sample add up to zero.
+    """
 
     of_slip: Fraction
     of_rate: Fraction
-    of_push: Fraction
+    of_pushes: Row
+    ahead: Matrix = ((Fraction(1), Fraction(0)), (Fraction(0), Fraction(1)))
+    ahead_of_pushes: Matrix = ()
+
+    def __post_init__(self) -> None:
+        if len(self.of_pushes) != len(self.ahead_of_pushes) + 1 or not sum(self.of_pushes):
+            raise ParameterError(
+                "a prediction needs pushes from 0 and from 1 sample ago on, those of the next sample not zero in all. "
+                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)}. Complete them."
+            )
 
 
 def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
@@ -119,8 +145,10 @@ def disturbance_estimate(
 ) -> LinearLaw:
     """Feedback of slip and slip rate, and a level d of everything else that the last period showed.
 
-    d ← d + a(e2 − π)/γ, p = −k1e1 − k2e2 − d/(βb), π ← of_slip·e1 + of_rate·e2 + γ(βb·p + d): the estimate follows the
-    innovation of the slip rate and has no trend, so that it does not wind up while the fault sticks.
+    d ← d + a(e2 − π)/Σγ_j, p = −k1ê1 − k2ê2 − d/(βb) with ê = e as expected when p arrives, and
+    π ← of_slip·e1 + of_rate·e2 + Σγ_j(βb·p_j + d). The estimate follows the innovation of the slip rate and has no
+    trend, so that it does not wind up while the fault sticks. States: π [m/s], d [m/s²], and the pressures p_1, p_2 …
+    asked for before [Pa].
 
     Parameters
     ----------
@@ -129,24 +157,39 @@ def disturbance_estimate(
     weight : Fraction
         a [-].
     prediction : Prediction
-        Of the slip rate, with γ = of_push [s] other than 0.
     gain : Fraction
-        β·b of the model [m²/kg].
+        β·b of the model [m²/kg], positive.
     """
-    if not prediction.of_push or gain <= 0:
-        raise ParameterError("a disturbance estimate needs of_push other than 0 and a positive gain. Received others.")
-    k1, k2 = gains
-    gamma, share, one = prediction.of_push, weight / prediction.of_push, Fraction(1)
-    level = ((-share, one), (Fraction(0), share))  # d⁺ of (π, d) and of (e1, e2)
-    output = tuple(-v / gain for v in level[0])
-    feedback = (-k1, -k2 - level[1][1] / gain)
-    ahead = tuple(gamma * (gain * p + d) for p, d in zip(output, level[0], strict=True))
-    own = (prediction.of_slip, prediction.of_rate)
-    seen = tuple(x + gamma * (gain * p + d) for x, p, d in zip(own, feedback, level[1], strict=True))
+    if gain <= 0:
+        raise ParameterError(f"the gain of a model must be positive. Received {float(gain):.4g} m²/kg. Check its sign.")
+    late = len(prediction.ahead_of_pushes)
+    size = 4 + late  # rows act on (π, d, p_1 …) and then on (e1, e2)
+    share = weight / sum(prediction.of_pushes)
+    level = _row(size, {0: -share, 1: Fraction(1), size - 1: share})
+    expected = [_row(size, {size - 2: of_slip, size - 1: of_rate}) for of_slip, of_rate in prediction.ahead]
+    for j, added in enumerate(prediction.ahead_of_pushes):
+        push = _sum((gain, _row(size, {2 + j: Fraction(1)})), (Fraction(1), level))
+        expected = [_sum((Fraction(1), row), (v, push)) for row, v in zip(expected, added, strict=True)]
+    asked = _sum((-gains[0], expected[0]), (-gains[1], expected[1]), (-1 / gain, level))
+    pressures = [asked, *(_row(size, {2 + j: Fraction(1)}) for j in range(late))]
+    pushes = [
+        (v, _sum((gain, row), (Fraction(1), level))) for v, row in zip(prediction.of_pushes, pressures, strict=True)
+    ]
+    own = _row(size, {size - 2: prediction.of_slip, size - 1: prediction.of_rate})
+    rows = [_sum((Fraction(1), own), *pushes), level, *pressures[:late]]
     return LinearLaw(
-        states=("predicted_rate", "disturbance"),
-        update=(ahead, level[0]),
-        measured=(seen, level[1]),
-        output=output,
-        feedback=feedback,
+        states=("predicted_rate", "disturbance", *(f"asked_{j + 1}_ago" for j in range(late))),
+        update=tuple(row[:-2] for row in rows),
+        measured=tuple(row[-2:] for row in rows),
+        output=asked[:-2],
+        feedback=asked[-2:],
     )
+
+
+def _row(size: int, entries: dict[int, Fraction]) -> Row:
+    return tuple(entries.get(i, Fraction(0)) for i in range(size))
+
+
+def _sum(*parts: tuple[Fraction, Row]) -> Row:
+    """Combination of rows."""
+    return tuple(sum((factor * row[i] for factor, row in parts), Fraction(0)) for i in range(len(parts[0][1])))

@@ -7,15 +7,14 @@ import pytest
 from scipy.linalg import expm
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop import LinearLaw, Model, disturbance_estimate, held_loop, summed_integrals
-from quakedesign.loop.laws import Prediction
+from quakedesign.loop import LinearLaw, Model, Prediction, disturbance_estimate, held_loop, summed_integrals
 
 STEP = F(1, 5)
 MODEL = Model(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
 AUTHORITY = F(2)
 PROPORTIONAL = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(F(-3), F(-2)))
 ESTIMATE = disturbance_estimate(
-    (F(4), F(2)), F(2, 5), Prediction(of_slip=F(1, 12), of_rate=F(3, 4), of_push=F(1, 6)), F(2)
+    (F(4), F(2)), F(2, 5), Prediction(of_slip=F(1, 12), of_rate=F(3, 4), of_pushes=(F(1, 6),)), F(2)
 )
 INTEGRALS = summed_integrals((F(4), F(2), F(1), F(1, 10)), STEP)
 
@@ -97,10 +96,49 @@ def test_sizes_that_do_not_fit_are_refused():
         LinearLaw(states=("z",), update=(), measured=(), output=(F(1),), feedback=(F(1), F(0)))
 
 
+@pytest.mark.parametrize(("delay", "ages"), [("0", 0), ("1/5", 1), ("3/20", 1), ("27/100", 2)])
+def test_a_law_that_knows_the_delay_expects_what_comes(delay, ages):
+    """On the plant of its own model, disturbance and all, the predicted slip rate is the measured one."""
+    period, late = float(STEP), float(F(delay))
+    whole, part = divmod(F(delay), STEP)
+    flow = np.array([[0, 1, 0], [0.5, -1.5, 1], [0, 0, 0]])
+    pushed = lambda t: expm(flow * t)[:2, 2]  # noqa: E731
+    pushes = [0.0] * (ages + 1)
+    pushes[int(whole)] = pushed(period - float(part))[1]
+    if part:
+        pushes[int(whole) + 1] = pushed(period)[1] - pushes[int(whole)]
+    ahead = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in range(1, ages + 1)]
+    law = disturbance_estimate(
+        (F(4), F(2)),
+        F(2, 5),
+        Prediction(
+            of_slip=F(expm(flow * period)[1][0]),
+            of_rate=F(expm(flow * period)[1][1]),
+            of_pushes=tuple(map(F, pushes)),
+            ahead=tuple(tuple(map(F, row[:2])) for row in expm(flow * late)[:2]),
+            ahead_of_pushes=tuple(tuple(map(F, row)) for row in ahead),
+        ),
+        MODEL.gain,
+    )
+    assert np.allclose(run_matrices(held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay)), 120, 0.3)[-1], 0, atol=1e-9)
+    # a constant disturbance is known after the first samples: the innovation decays with 1 − a alone
+    z, e, asked, found = np.zeros(len(law.output)), np.zeros(2), [0.0] * (ages + 1), []
+    f, g, c, d = (np.array(m, float) for m in (law.update, law.measured, law.output, law.feedback))
+    for _ in range(30):
+        found.append(e[1] - z[0])
+        asked = [c @ z + d @ e, *asked][: ages + 1]
+        z = f @ z + g @ e
+        arrived = asked[int(whole)]
+        before = asked[int(whole) + 1] if part else arrived
+        for duration, p in ((float(part), before), (period - float(part), arrived)):
+            e = expm(flow * duration)[:2, :2] @ e + pushed(duration) * (float(MODEL.gain) * p + 0.3)
+    assert np.allclose(np.array(found[2:]) / found[1:-1], 0.6, atol=1e-6)
+
+
 def test_the_estimate_rests_on_the_disturbance_that_its_model_has():
     """With the model's own plant and a constant disturbance the level settles on it: p* = −d/gain, no error."""
     near = expm(np.array([[0, 1, 0], [0.5, -1.5, 1], [0, 0, 0]]) * 0.2)[1]
-    prediction = Prediction(of_slip=F(near[0]), of_rate=F(near[1]), of_push=F(near[2]))
+    prediction = Prediction(of_slip=F(near[0]), of_rate=F(near[1]), of_pushes=(F(near[2]),))
     law = disturbance_estimate((F(4), F(2)), F(2, 5), prediction, MODEL.gain)
     loop = held_loop(law, MODEL, AUTHORITY, STEP)
     assert np.allclose(run_matrices(loop, 80, 0.3)[-1], 0, atol=1e-9)

@@ -9,14 +9,13 @@ from quakedesign import simulate
 from quakedesign.certificates.guarantee import Guarantee, Held, guarantee, task_of
 from quakedesign.errors import UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.loop import SampledController, disturbance_estimate
-from quakedesign.loop.laws import Prediction
+from quakedesign.loop import Prediction, SampledController, disturbance_estimate
 
 STEP = F("0.184")
 LAW = disturbance_estimate(
     (F(672300000), F(206000000)),
     F("0.57"),
-    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_push=F("0.1596")),
+    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),)),
     F("2.282e-8"),
 )
 HELD = Held(law=LAW, step=STEP)

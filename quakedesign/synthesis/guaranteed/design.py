@@ -11,8 +11,7 @@ from scipy.optimize import minimize
 
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.errors import ParameterError
-from quakedesign.loop import LinearLaw, Model, disturbance_estimate
-from quakedesign.loop.laws import Prediction
+from quakedesign.loop import LinearLaw, Model, Prediction, disturbance_estimate
 from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated
 
 OBJECTIVES = ("tracking", "peak")
@@ -53,11 +52,12 @@ def design_held(
     """
     if objective not in OBJECTIVES:
         raise ParameterError(f"objective must be one of {', '.join(OBJECTIVES)}. Received {objective!r}.")
-    template = Held(law=_law(task, step, np.array(_STARTS[0])), step=step, delay=delay, lag=lag)
+    law = _laws(task.model, step, delay)
+    template = Held(law=law(np.array(_STARTS[0])), step=step, delay=delay, lag=lag)
     worst = replace(task, change=None)  # gains are chosen for the larger class: they answer slow disturbances as well
 
     def seen(x: np.ndarray) -> Estimate | None:
-        return estimated(worst, replace(template, law=_law(task, step, x)).loop(worst)) if 0 < x[2] < 1 else None
+        return estimated(worst, replace(template, law=law(x)).loop(worst)) if 0 < x[2] < 1 else None
 
     best = min((_search(lambda x: _peak_cost(seen(x), step), start) for start in _STARTS), key=lambda f: f[0])
     found = seen(best[1])
@@ -65,25 +65,44 @@ def design_held(
         limit = _ROOM * float(found.bounds.slip_rate_error)
         starts = (best[1], _STARTS[1])
         best = min((_search(lambda x: _drift_cost(seen(x), limit), start) for start in starts), key=lambda f: f[0])
-    return guarantee(task, replace(template, law=_law(task, step, best[1])))
+    return guarantee(task, replace(template, law=law(best[1])))
 
 
-def _law(task: Task, step: Fraction, x: np.ndarray) -> LinearLaw:
+def _laws(model: Model, step: Fraction, delay: Fraction) -> Callable[[np.ndarray], LinearLaw]:
     """Law of three numbers without units; its gains and its model of the plant have four digits."""
-    model, seconds = task.model, float(step)
-    gain = float(model.gain)
-    return disturbance_estimate(
-        (_short(float(x[0]) / gain / seconds**2), _short(float(x[1]) / gain / seconds)),
-        _short(float(x[2])),
-        _prediction(model, seconds),
-        _short(gain),
-    )
+    seconds, gain, prediction = float(step), float(model.gain), _prediction(model, step, delay)
+
+    def law(x: np.ndarray) -> LinearLaw:
+        gains = _short(float(x[0]) / gain / seconds**2), _short(float(x[1]) / gain / seconds)
+        return disturbance_estimate(gains, _short(float(x[2])), prediction, _short(gain))
+
+    return law
 
 
-def _prediction(model: Model, seconds: float) -> Prediction:
+def _prediction(model: Model, step: Fraction, delay: Fraction) -> Prediction:
+    """What the model says of the next sample, and of the time at which a pressure arrives."""
     flow = np.array([[0, 1, 0], [float(model.slip), -float(model.rate), 1], [0, 0, 0]])
-    of_slip, of_rate, of_push = (float(v) for v in expm(flow * seconds)[1])
-    return Prediction(of_slip=_short(of_slip), of_rate=_short(of_rate), of_push=_short(of_push))
+    period, late = float(step), float(delay)
+
+    def pushed(duration: float) -> np.ndarray:
+        """Errors after a unit push for some time."""
+        return np.array(expm(flow * duration))[:2, 2]
+
+    whole, part = int(delay // step), float(delay % step)
+    ages = whole + (1 if part else 0)
+    pushes = [0.0] * (ages + 1)
+    pushes[whole] = float(pushed(period - part)[1])
+    if part:
+        pushes[whole + 1] = float(pushed(period)[1]) - pushes[whole]
+    ahead = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in range(1, ages + 1)]
+    next_rate, arrival = np.array(expm(flow * period))[1], np.array(expm(flow * late))[:2, :2]
+    return Prediction(
+        of_slip=_short(float(next_rate[0])),
+        of_rate=_short(float(next_rate[1])),
+        of_pushes=tuple(_short(v) for v in pushes),
+        ahead=tuple(tuple(_short(float(v)) for v in row) for row in arrival),
+        ahead_of_pushes=tuple(tuple(_short(float(v)) for v in row) for row in ahead),
+    )
 
 
 def _search(cost: Callable[[np.ndarray], float], start) -> tuple[float, np.ndarray]:

@@ -16,8 +16,7 @@ from quakedesign.certificates.guarantee import Held, guarantee, task_of
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, save_guarantee
 from quakedesign.errors import CertificateError
 from quakedesign.fault import load_fault
-from quakedesign.loop import disturbance_estimate, summed_integrals
-from quakedesign.loop.laws import Prediction
+from quakedesign.loop import Prediction, disturbance_estimate, summed_integrals
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("guarantee_check", PATH)
@@ -28,7 +27,7 @@ STEP = F("0.184")
 ESTIMATE = disturbance_estimate(
     (F(672300000), F(198900000)),
     F("0.6"),
-    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_push=F("0.1596")),
+    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),)),
     F("2.282e-8"),
 )
 INTEGRALS = summed_integrals((F(696000000), F(253000000), F(602000000), F(216000000)), STEP)
