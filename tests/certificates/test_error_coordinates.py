@@ -69,3 +69,22 @@ def test_loops_of_another_form_are_refused():
         in_error_coordinates(linear(lambda x1, x2, xi, *k: (x2, -x1 - x2 - k[2] * xi, x1 - xi)))
     with pytest.raises(CertificateError, match="linear"):
         in_error_coordinates(model_of("cta")[1])
+
+
+def test_a_loop_without_integrals_is_its_own_error_loop():
+    moved = in_error_coordinates(linear(lambda x1, x2, k1, k2, k3: (x2, -k1 * x1 - k2 * x2), "x1 x2"))
+    e1, e2 = moved.states
+    k1, k2, _ = moved.gains
+    assert [str(e1), str(e2)] == ["e1", "e2"]
+    assert [sp.expand(moved.field[s]) for s in (e1, e2)] == [e2, -k1 * e1 - k2 * e2]
+
+
+def test_integrals_act_through_one_control():
+    both = linear(lambda x1, x2, a, b, k1, k2, k3: (x2, -x1 - 2 * k1 * a - 2 * k2 * b, x1, a), "x1 x2 xi1 xi2")
+    moved = in_error_coordinates(both)
+    e1, e2, zeta, chi = moved.states
+    k1, k2, _ = moved.gains
+    assert [sp.expand(moved.field[s]) for s in moved.states] == [e2, -e1 - 2 * zeta, k1 * e1 + chi, k2 * e1]
+    apart = linear(lambda x1, x2, a, b, k1, k2, k3: (x2, -x1 - k1 * a - 2 * k2 * b, x1, a), "x1 x2 xi1 xi2")
+    with pytest.raises(CertificateError, match="one control"):
+        in_error_coordinates(apart)
