@@ -11,8 +11,9 @@ import pytest
 from quakedesign.certificates import certificate_text, checking, parse_certificate
 from quakedesign.certificates.files import save_certificate
 from quakedesign.certificates.obligations import claimed, less
-from quakedesign.certificates.response_obligations import OneInput
+from quakedesign.certificates.response_obligations import OneInput, require_sound
 from quakedesign.errors import CertificateError
+from quakedesign.symbolic.terms import Term
 
 PATH = Path(__file__).parents[1] / "proofs" / "test_check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("files_by_hand", PATH)
@@ -96,6 +97,19 @@ CASES = {
         "outputs need names",
     ),
     "three limits": (lambda: hand.edited(hand.driven(), ("inputs", "v", "limits", ["1"] * 3)), "limits is longer"),
+    "a number": (lambda: 5, "must have exactly the keys"),
+    "a state twice in a term": (
+        lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "1", "s"], ["x", "1", "a"]])),
+        "longer|twice in a term",
+    ),
+    "a lift and a state twice": (
+        lambda: hand.edited(hand.nested_sum(), ("field", "x", 0, 2, [["x", "1", "s"], ["x", "1", "a"]])),
+        "twice in a term",
+    ),
+    "an unknown kind": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "1", "b"]])), "wrong kind"),
+    "an even power zero": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "0", "a"]])), "wrong kind"),
+    "a power 25": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "25", "s"]])), "wrong kind"),
+    "33 parameters": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 1, ["k"] * 33)), "longer than 32"),
     "an exponent off the weight": (
         lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "1/2", "s"]])),
         "is no integer",
@@ -119,6 +133,10 @@ def test_what_is_at_the_edge_of_a_rule_is_read():
     assert len(read(hand.relay() | twelve(6) | {"claims": claims}).claims) == 9
     with pytest.raises(CertificateError, match="claims"):
         read(hand.relay() | twelve(6) | {"claims": claims | {"more": "1"}})
+    edge = read(hand.edited(hand.relay(), ("field", "x", 0, ["1", ["k"] * 32, [["x", "24", "s"]]])))
+    assert edge.loop.field["x"][0].factors == (("x", 24, "s"),)
+    inner = {"n": hand.X1, "m": [["1", [], [["n", "1", "s"]]]]}
+    assert list(read(hand.relay() | {"lifts": inner}).loop.lifts) == ["n", "m"]
     high = hand.edited(hand.relay(), ("witnesses", 0, "squares", 0, "basis", [[999]]))
     assert read(high).witnesses["positive +"].squares[0].basis == ((999,),)
 
@@ -143,6 +161,14 @@ def test_only_what_can_be_read_again_is_saved(tmp_path):
 def test_a_squares_condition_is_counted_from_the_variables():
     squares = read(hand.nested_sign()).witnesses["decrease +++ s=7/5"].squares
     assert [square.product for square in squares] == [(0,), (1,), (2,)]
+
+
+def test_every_list_of_squares_has_its_own_condition():
+    square = hand.square([0, 0], [[0, 0]], "2")
+    document = hand.edited(hand.nested_sign(), ("witnesses", 1, "inequalities", [[square], [square]]))
+    found = read(document).witnesses["decrease +++ s=7/5"]
+    assert [one.product for one in found.squares] == [(0,), (1,), (2,), (3,)]
+    assert found.conditions == 2
 
 
 # ---------------------------------------------------------------- obligations of files
@@ -199,3 +225,122 @@ def test_a_weight_of_zero_takes_nothing_from_its_set():
     document = hand.edited(hand.driven(), ("inputs", "u", "bounds", "y", "weights", ["0"]))
     with pytest.raises(CertificateError, match="does not prove"):
         read(document).check()
+
+
+def changed_set(**parts):
+    """The set of the input v with other parts."""
+    one = read(hand.driven())
+    part = one.response.parts["v"]
+    sets = tuple(replace(own, **parts) for own in part.sets)
+    return one.loop, replace(one.response, parts=one.response.parts | {"v": replace(part, sets=sets)})
+
+
+def changed_bound(**parts):
+    """The bound of y under v with other parts."""
+    one = read(hand.driven())
+    part = one.response.parts["v"]
+    bounds = {name: replace(bound, **parts) for name, bound in part.bounds.items()}
+    return one.loop, replace(one.response, parts=one.response.parts | {"v": replace(part, bounds=bounds)})
+
+
+def changed_loop(**parts):
+    one = read(hand.driven())
+    return replace(one.loop, **parts), one.response
+
+
+def changed_response(**parts):
+    one = read(hand.driven())
+    return one.loop, replace(one.response, **parts)
+
+
+def changed_field(*terms):
+    loop = read(hand.driven()).loop
+    return changed_loop(field={"x": (*loop.field["x"], *terms)})
+
+
+def term(*factors, parameters=()):
+    return Term(F(1), parameters, tuple((name, F(exponent), kind) for name, exponent, kind in factors))
+
+
+V, X = (term(("v", 2, "a")),), (term(("x", 1, "s")),)
+PARTS = read(hand.driven()).response.parts
+SIDE_CONDITIONS = {
+    "on cells": (changed_loop(domain="cells"), "a bound needs reals"),
+    "with lifts": (changed_loop(lifts={"n": X}), "a bound needs reals"),
+    "with roots": (changed_loop(roots={"r": ("k", (F(1), F(2)))}), "a bound needs reals"),
+    "a cube": (changed_field(term(("x", 3, "s"))), "that is linear"),
+    "a constant": (changed_field(term()), "that is linear"),
+    "an input times a state": (changed_field(term(("x", 1, "s"), parameters=("u",))), "that is linear"),
+    "two inputs": (changed_field(term(parameters=("u", "v"))), "that is linear"),
+    "two states": (changed_field(term(("x", 1, "s"), ("x", 1, "s"))), "that is linear"),
+    "an absolute value": (changed_field(term(("x", 1, "a"))), "that is linear"),
+    "no inputs": (changed_loop(inputs={}, field={"x": X}), "must act on the loop"),
+    "an input without effect": (changed_loop(inputs={"u": (F(1),), "v": (F(1), F(1)), "w": (F(1),)}), "must act"),
+    "an input without sets": (changed_response(parts={"u": PARTS["u"]}), "every input needs its sets"),
+    "inputs in another order": (changed_response(parts=dict(reversed(PARTS.items()))), "every input needs its sets"),
+    "no outputs": (changed_response(outputs={}), "every input needs its sets"),
+    "an output of degree 2": (changed_response(outputs={"y": (term(("x", 2, "a")),)}), "a form of degree 1"),
+    "an output of two degrees": (changed_response(outputs={"y": (*X, term(("x", 2, "a")))}), "a form of degree 1"),
+    "an uncertain output": (
+        changed_response(outputs={"y": (term(("x", 1, "s"), parameters=("b",)),)}),
+        "an uncertain parameter",
+    ),
+    "no limits": (changed_loop(inputs={"u": (F(1, 2),), "v": ()}), "one or two positive limits"),
+    "three limits": (changed_loop(inputs={"u": (F(1, 2),), "v": (F(1),) * 3}), "one or two positive limits"),
+    "a limit of zero": (changed_loop(inputs={"u": (F(1, 2),), "v": (F(1), F(0))}), "one or two positive limits"),
+    "no sets": (
+        changed_response(parts=PARTS | {"v": replace(PARTS["v"], sets=())}),
+        "sets and a bound of every output",
+    ),
+    "no bounds": (
+        changed_response(parts=PARTS | {"v": replace(PARTS["v"], bounds={})}),
+        "sets and a bound of every output",
+    ),
+    "a set of degree 1": (changed_set(function=X), "a form of degree 2"),
+    "an uncertain set": (changed_set(function=(term(("x", 2, "a"), parameters=("b",)),)), "an uncertain parameter"),
+    "one share for two limits": (changed_set(shares=(F(1),)), "needs a share"),
+    "three shares": (changed_set(shares=(F(1),) * 3), "needs a share"),
+    "nothing said of borrowing": (changed_set(borrowed=()), "is misplaced"),
+    "two borrowed": (changed_set(borrowed=(F(0), F(0))), "is misplaced"),
+    "borrowed from itself": (changed_set(shares=(F(0), F(0)), borrowed=(F(1),)), "is misplaced"),
+    "no decay": (changed_set(decay=F(0), shares=(F(0), F(0))), "the decay must be positive"),
+    "a negative share": (changed_set(shares=(F(3), F(-1))), "must not be negative"),
+    "shares above the decay": (changed_set(shares=(F(5, 2), F(501, 1000))), "more than the decay"),
+    "a start outside": (changed_set(function=(term(("x", 2, "a")), *V * 1, *V * 4)), "the start is outside"),
+    "a bound of zero": (changed_bound(bound=F(0)), "a bound must be positive"),
+    "a negative bound": (changed_bound(bound=F(-1)), "a bound must be positive"),
+    "no weight": (changed_bound(weights=()), "every set needs a weight"),
+    "two weights": (changed_bound(weights=(F(1, 2), F(1, 2))), "every set needs a weight"),
+    "a negative weight": (changed_bound(weights=(F(-1),)), "every set needs a weight"),
+    "a weight above one": (changed_bound(weights=(F(1001, 1000),)), "every set needs a weight"),
+}
+
+
+@pytest.mark.parametrize("case", SIDE_CONDITIONS)
+def test_every_side_condition_of_a_bound_by_itself(case):
+    (loop, response), reason = SIDE_CONDITIONS[case]
+    with pytest.raises(CertificateError, match=reason):
+        require_sound(loop, response)
+
+
+@pytest.mark.parametrize(
+    "fine",
+    [
+        changed_set(function=(term(("x", 2, "a")), *V * 4)),  # 4 v^2 = 1 at the limit 1/2
+        changed_set(shares=(F(5, 2), F(1, 2))),
+        changed_set(shares=(F(0), F(0))),
+        changed_bound(weights=(F(0),)),
+        changed_bound(weights=(F(1),)),
+        changed_field(term(parameters=("u",))),
+    ],
+)
+def test_a_bound_at_the_edge_of_a_side_condition_is_sound(fine):
+    require_sound(*fine)
+
+
+def test_the_derivative_of_a_set_is_affine_in_what_has_a_range():
+    loop, response = changed_field(term(("x", 1, "s"), parameters=("b", "b")))
+    with pytest.raises(CertificateError, match="not affine in b"):
+        OneInput(loop, "u").derivative(response.parts["u"].sets[0])
+    loop, response = changed_field(term(("x", 1, "s"), parameters=("k", "k")))
+    assert OneInput(loop, "u").derivative(response.parts["u"].sets[0])

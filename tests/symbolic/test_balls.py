@@ -274,3 +274,8 @@ def test_a_bound_is_of_the_size():
     assert F(3) <= upper_bound(x - y, {x: (F(0), F(1)), y: (F(1), F(3))}) <= F(303, 100)
     assert upper_bound(sp.Integer(-7), {}) == 7
     assert upper_bound(x, {x: (F(5), F(5)), y: (F(0), F(1))}) == 5
+
+
+def test_the_sign_of_zero_alone_is_any():
+    found = enclose(SignedPower(x, 0), {x: (F(0), F(0))})
+    assert [float(found.lower()), float(found.upper())] == pytest.approx([-1, 1], abs=SLACK)

@@ -150,7 +150,10 @@ ILL_FORMED = {
     "multiplier empty": BY_HAND | {"multiplier": {}},
     "33 conditions": BY_HAND | {"inequalities": [{"1,0": str(i)} for i in range(1, 34)]},
     "33 conditions of both kinds": BY_HAND
-    | {"inequalities": [{"1,0": str(i)} for i in range(1, 18)], "equalities": [{"1,0": "1"}] * 16},
+    | {"inequalities": [{"1,0": str(i)} for i in range(1, 18)], "equalities": [{"1,0": "1"}] * 16}
+    | {"sos": BY_HAND["sos"] | {"cofactors": [{}] * 16}},
+    "a number": 5,
+    "gram too fine": with_square(basis=[[i, 0] for i in range(12)], gram=[f"1/{10**399 + i}" for i in range(78)]),
     "two kinds of proof": BY_HAND | {"negative": {"point": ["0", "0"]}},
     "square of a product that is not listed": with_square(product=[0, 0]),
     "square of a product of booleans": with_square(product=[False]),

@@ -124,6 +124,7 @@ def test_products_are_those_of_orthants_and_single_ones_of_others():
         (), (0,), (1,), (2,), (0, 1), (0, 2), (1, 2)
     )  # fmt: skip
     assert asked(inequalities=both, products=True, degree_bound=4).products[-1] == (0, 1, 2)
+    assert asked(inequalities=both, degree_bound=4).products == ((), (0,), (1,), (2,), (0, 2))
     assert asked(inequalities=both, degree_bound=1).products == ((), (0,), (2,))
     assert asked(inequalities=both, degree_bound=0, products=False).products == ((),)
     assert asked(inequalities=(X, dict(X))).inequalities == (X,)

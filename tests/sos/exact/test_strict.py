@@ -160,6 +160,7 @@ def test_polynomials_are_read_and_written():
         (0, 0): 1, (2, 10): Fraction(-1, 3)
     }  # fmt: skip
     assert polynomial_text(read_polynomial(text, "x", 2, 2)) == text
+    assert read_polynomial({"999,0": "1"}, "x", 2, 2) == {(999, 0): 1}
     for raw in ({"0,0": "0"}, {"0": "1"}, {"0,0,0": "1"}, {"00,0": "1"}, {"0, 0": "1"}, {"-1,0": "1"}, {"1000,0": "1"}):
         assert refused(read_polynomial, raw, "x", 2, 2)
     assert refused(read_polynomial, text, "x", 2, 1)
