@@ -125,6 +125,15 @@ def test_at_the_bound_itself_nothing_is_proved(simple, monkeypatch):
     assert certified_domain(question()).level == (15 / 16) ** 2
 
 
+def test_a_share_of_all_of_the_decrease_is_too_much(simple, monkeypatch):
+    """A share of V itself is one at V = 1: the step below is 15/16; and the whole is too fast at once."""
+    monkeypatch.setattr(domain, "largest_sensitivities", lambda *_, **__: (F(1), F(0)))
+    monkeypatch.setattr(domain, "largest_matched_rate", lambda *given, **more: F(2) if given[2] == Errors() else F(3))
+    exact = replace(WITHSTANDS, slip=F(1), slip_power=F(1), rate_power=F(1))
+    found = certified_domain(question(exact))
+    assert (found.method, found.level) == ("split", (15 / 16) ** 2)
+
+
 def test_an_equal_level_of_both_is_the_split(simple, monkeypatch):
     monkeypatch.setattr(domain, "largest_matched_rate", lambda *given, **more: 1 + given[2].slip)
     found = certified_domain(question(WITHSTANDS))

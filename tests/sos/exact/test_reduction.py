@@ -157,3 +157,8 @@ def test_the_largest_bases_that_are_built():
             *({(0,) * 60: Fraction(n)} for n in (1, 2)),
         )
     assert reduced_bases(statement(("x",), {(0,): Fraction(1)}, inequalities=({(3,): Fraction(1)},), degree_bound=2))
+
+
+def test_what_a_product_of_neighbours_feeds_is_kept():
+    """x (1·x) is x^2, so that the x of a square alone stays although x^2 is not in x^3 + 1."""
+    assert reduced_bases(asked("x^3 + 1", on=("x >= 0",), degree_bound=3)) == (((0,), (1,)), ((0,), (1,)))
