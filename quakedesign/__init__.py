@@ -21,6 +21,7 @@ _HOME = {
     "design": "synthesis",
     "certify": "synthesis",
     "Design": "synthesis",
+    "limits": "studies",
     "compare": "report",
 }
 

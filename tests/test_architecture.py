@@ -32,8 +32,9 @@ MAY_IMPORT = {
     "certificates": ("fault", "symbolic", "controllers", "loop", "sos", "sos.exact"),
     "simulation": ("fault", "symbolic", "controllers", "loop", "workers"),
     "synthesis": (*BELOW, "workers"),
-    "report": (*BELOW, "synthesis"),
-    "cli": (*BELOW, "synthesis", "report", "interruption"),
+    "studies": (*BELOW, "synthesis"),
+    "report": (*BELOW, "synthesis", "studies"),
+    "cli": (*BELOW, "synthesis", "studies", "report", "interruption"),
     "__main__": ("cli", "interruption"),
     "workers": ("interruption",),
     "interruption": (),
@@ -112,6 +113,9 @@ def test_rooms_import_only_what_the_design_allows(path):
         ("simulation/x.py: import quakedesign.certificates.claim", False),
         ("certificates/guarantee/x.py: from quakedesign.loop import held_loop", True),
         ("loop/x.py: from quakedesign.simulation import simulate", False),
+        ("studies/x.py: from quakedesign.synthesis import design", True),
+        ("studies/x.py: from quakedesign.report import compare", False),
+        ("synthesis/x.py: from quakedesign.studies import limits", False),
     ],
 )
 def test_the_rule_itself_tells_good_from_bad(source, ok, tmp_path, monkeypatch):

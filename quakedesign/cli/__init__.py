@@ -8,7 +8,19 @@ import warnings
 
 from cyclopts import CycloptsError
 
-from quakedesign.cli import campaign, design, figures, gain_map, guarantee, loop, plant, polynomial, proof, synthesis
+from quakedesign.cli import (
+    campaign,
+    design,
+    figures,
+    gain_map,
+    guarantee,
+    limits,
+    loop,
+    plant,
+    polynomial,
+    proof,
+    synthesis,
+)
 from quakedesign.cli.shared import app
 from quakedesign.errors import QuakedesignError
 from quakedesign.interruption import ending
@@ -21,6 +33,7 @@ __all__ = [
     "figures",
     "gain_map",
     "guarantee",
+    "limits",
     "loop",
     "main",
     "plant",

@@ -1,0 +1,250 @@
+"""What no controller whatever can do with a fault: two theorems, evaluated in ball arithmetic.
+
+A claim about all frictions and parameters of the box fails if it fails for one of them, so each theorem picks the plant
+that hurts most among a few. κ = k̂ − φ1 and w = η̂ − φ2 stand for the plant, φ is any measurable function of time with
+|φ| ≤ H, the pressure p is whatever a controller likes: linear or not, with memory, knowing plant, slip, slip rate and
+disturbance exactly up to the sample. X and P below are the largest slip-rate error and the largest withdrawal.
+
+**Theorem 1 (surprise).** Let the pressure be decided at samples T apart, act θ later and stay for T. On the plant
+continued to negative slip rates no controller keeps the slip error within E and the slip-rate error below X for ever if
+
+    X ≤ 2H·h(T + θ),   h: impulse response of h″ = σh − wh′ from acceleration to slip.
+
+Once the reference r rests, friction that is affine there, μ(r + e1) = μr − m·e1 for |e1| ≤ E, gives with q = p − p*
+
+    e1′ = e2,   e2′ = s·e1 − w·e2 + N̂(μr − m·e1)q + φ,   s = N̂m(σ′ − p*) − κ,   σ = s − m(2X/T + sE + |w|X)/(μr − mE),
+
+and σ must not be negative. Friction that does not change, m = 0, leaves σ = s = −κ, and E may be any bound.
+*Proof.* Suppose |e1| ≤ E, |e2| ≤ X′ < X for every φ. Take φ = H from the rest of r on. While p is held, y = e2 obeys
+y″ = σ_k·y − w·y′ with σ_k = s − N̂mq_k. Integrated over the T that q_k lasts, e2′ bounds q_k from below and, N̂q_k(μr −
+mE) ≤ 2X′/T + sE + |w|X′, from above: σ ≤ σ_k ≤ some σ₊. If y ≥ δ > 0 at all changes of p from some on, then y is in
+between above the solution for σ₊ with δ at both ends (maximum principle, or for σ < 0 since κT² ≤ 1 < π²), each T adds
+at least a fixed part of δ to e1, and e1 leaves E. So for every δ some change of p, at t + θ + T with t a sample, has
+e2 < δ. Turn φ to −H at t: what p does until then was decided by t and stays. The difference d of both courses has d2′ =
+σ(t)d1 − w·d2 + 2H with σ(t) ≥ σ, so d2 ≥ 2H·h(θ + T) ≥ X, and the turned course has e2 < δ − X, for every δ > 0. ∎
+A controller that holds for T also holds for T/n, and one that acts θ late could act earlier, so T and θ may be
+shortened.
+
+**Theorem 2 (withdrawal).** Let a fault rest at p = 0 when a push φ = H begins, and the pressure at the well be 0 until
+T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse response is not
+negative: delay, diffusion 1/cosh √(sL²/D). Friction that falls from μ* by m per slip gives s = N̂mσ′ − κ and, for s > 0,
+the unstable pole λ, λ² + wλ = s. If
+
+    H·e^{λT} > N̂μ*·P·G(λ),
+
+then slip passes E = (μ* − μ_res)/m, where friction has lost all that it can, whatever the controller does, even if it
+knows φ and the plant from the onset on; also where friction sticks instead of reversing.
+*Proof.* For 0 ≤ x1 ≤ E: x2′ ≥ s·x1 − w·x2 + N̂(μ* − m·x1)p_f + H, an equality unless the fault sticks, and the third
+term is at least c·min(p_f, 0), c = N̂μ*, and min(p_f, 0) at least the path's answer to u = min(p, 0). With z = (λ + w)x1
++ x2, z′ = λz + … so that z ≥ ζ, ζ = z0 + what u up to now will still do; ζ′ = λζ + cG(λ)u + H, ζ(0) = 0. Until T ζ
+grows to H(e^{λT} − 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 for ever: ζ grows exponentially. x1′ = z − (λ + w)x1 with
+z ≥ ζ > 0 keeps x1 positive, so the premise x1 ≥ 0 lasts, and takes x1 beyond E. ∎
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from math import ceil, sqrt
+from typing import Any
+
+from flint import arb, arb_mat, ctx, fmpq
+
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.guarantee import Task
+from quakedesign.errors import ParameterError
+from quakedesign.rationals import fraction_of
+
+_BITS = 128
+_SHARE = Fraction(1, 20)  # E of theorem 1: of the slip over which friction falls, and of the target
+_BISECTIONS = 14
+_GROWN, _TURNED = 32, 1  # longest T·√|s| that theorem 1 is used with, for s above and below 0
+_ZERO = Fraction(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SmallestPeak:
+    """No controller keeps both errors below these.
+
+    Attributes
+    ----------
+    slip_rate_error : LowerBound
+        X [m/s].
+    slip_error : UpperBound or None
+        E [m]; None where any bounded slip error is meant.
+    """
+
+    slip_rate_error: LowerBound
+    slip_error: UpperBound | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Surprised:
+    """A plant of theorem 1: s [1/s²], w [1/s], m [1/m], the least friction near r [-], E [m]."""
+
+    slip: Fraction
+    rate: Fraction
+    weakening: Fraction
+    friction: Fraction
+    reach: Fraction | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Pushed:
+    """A plant of theorem 2: s [1/s²], w [1/s], N̂μ* [m²/kg]."""
+
+    slip: Fraction
+    rate: Fraction
+    authority: Fraction
+
+    @property
+    def pole(self) -> Any:
+        """λ [1/s]."""
+        w = _ball(self.rate)
+        return ((w * w + 4 * _ball(self.slip)).sqrt() - w) / 2
+
+
+def smallest_peak(task: Task, step: Fraction, delay: Fraction = _ZERO) -> SmallestPeak | None:
+    """Theorem 1; None without a disturbance.
+
+    Parameters
+    ----------
+    task : Task
+    step, delay : Fraction
+        T, positive, and θ [s].
+
+    Raises
+    ------
+    ParameterError
+        For times that are negative, or a step of 0.
+    """
+    _require(step > 0 and delay >= 0, "a step above 0 and a delay of at least 0", step, delay)
+    with ctx.workprec(_BITS):
+        found = [
+            SmallestPeak(
+                slip_rate_error=LowerBound(_surprise(plant, step, delay, task.amplitude)),
+                slip_error=None if plant.reach is None else UpperBound(plant.reach),
+            )
+            for plant in _surprised(task)
+        ]
+    best = max(found, key=lambda one: one.slip_rate_error)
+    return best if best.slip_rate_error > 0 else None
+
+
+def longest_reaction(task: Task, withdrawal: Fraction) -> UpperBound | None:
+    """T + θ [s] beyond which no controller holds the fault, without a diffusive path; None where none is proved."""
+    _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
+
+    def longest(plant: _Pushed) -> Any:
+        ratio = _ball(plant.authority * withdrawal / task.amplitude)
+        return ratio.log() / plant.pole if ratio > 1 else arb(0)
+
+    return _least(task, longest)
+
+
+def longest_diffusion(task: Task, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
+    """L²/D [s] beyond which no controller holds the fault with samples T apart; None where none is proved."""
+    _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
+
+    def longest(plant: _Pushed) -> Any:
+        pole = plant.pole
+        ratio = _ball(plant.authority * withdrawal / task.amplitude) * (-pole * _ball(step)).exp()
+        return ratio.acosh() ** 2 / pole if ratio > 1 else arb(0)
+
+    return _least(task, longest)
+
+
+def farthest_well(diffusion_time: UpperBound, diffusivity: Fraction) -> UpperBound:
+    """L [m] of a diffusion time L²/D [s] at a diffusivity D [m²/s]."""
+    _require(diffusivity > 0, "a diffusivity above 0", diffusivity)
+    with ctx.workprec(_BITS):
+        return UpperBound(_upper(_ball(diffusion_time * diffusivity).sqrt()))
+
+
+def smallest_withdrawal(task: Task, step: Fraction) -> LowerBound | None:
+    """P [Pa] below which no controller holds the fault with samples T apart; None where none is proved."""
+    _require(step >= 0, "a step of at least 0", step)
+    with ctx.workprec(_BITS):
+        found = [
+            _lower(_ball(task.amplitude / plant.authority) * (plant.pole * _ball(step)).exp())
+            for plant in _pushed(task)
+        ]
+    return LowerBound(max(found)) if found else None
+
+
+def _least(task: Task, value: Callable[[_Pushed], Any]) -> UpperBound | None:
+    with ctx.workprec(_BITS):
+        found = [_upper(value(plant)) for plant in _pushed(task)]
+    return UpperBound(min(found)) if found else None
+
+
+def _corners(task: Task) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
+    """κ, w and N̂ at the ends of their ranges."""
+    for k, eta, area in product(task.stiffness, task.specific_damping, task.area_per_mass):
+        yield k - task.growths[0], eta - task.growths[1], area
+
+
+def _pushed(task: Task) -> list[_Pushed]:
+    law = task.friction
+    found = [
+        _Pushed(area * law.weakening * task.normal_stress - kappa, w, area * law.static)
+        for kappa, w, area in _corners(task)
+    ]
+    return [plant for plant in found if plant.slip > 0 and law.static > law.least and task.amplitude]
+
+
+def _surprised(task: Task) -> Iterator[_Surprised]:
+    """Friction that does not change near the target, and friction that falls as fast as it may."""
+    law, target = task.friction, task.target_slip
+    for kappa, w, area in _corners(task):
+        yield _Surprised(-kappa, w, _ZERO, law.static, None)
+        if law.static > law.least and law.weakening:
+            reach = _SHARE * min((law.static - law.least) / law.weakening, target)
+            middle = max(law.least + law.weakening * reach, law.static - law.weakening * target)
+            stress = (law.static * task.normal_stress - kappa / area * target) / middle
+            slip = area * law.weakening * stress - kappa
+            if slip > 0:
+                yield _Surprised(slip, w, law.weakening, middle - law.weakening * reach, reach)
+
+
+def _surprise(plant: _Surprised, step: Fraction, delay: Fraction, amplitude: Fraction) -> Fraction:
+    """X, or 0 where the theorem says nothing."""
+    pace = sqrt(abs(plant.slip))
+    most = _GROWN if plant.slip > 0 else _TURNED
+    held = step / max(1, ceil(float(step) * pace / most))
+    late = delay if float(delay) * pace <= most else Fraction(most / pace)
+
+    def bound(slip: Fraction) -> Any:
+        flow = arb_mat([[arb(0), arb(1)], [_ball(slip), -_ball(plant.rate)]])
+        return 2 * _ball(amplitude) * (flow * _ball(held + late)).exp()[0, 1]
+
+    def holds(peak: Fraction, reach: Fraction) -> bool:
+        force = 2 * peak / held + plant.slip * reach + abs(plant.rate) * peak
+        slip = plant.slip - plant.weakening * force / plant.friction
+        return slip >= 0 and bool(bound(slip) >= _ball(peak))
+
+    if plant.reach is None:
+        return max(_ZERO, _lower(bound(plant.slip)))
+    low, high = _ZERO, _upper(bound(plant.slip))
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if holds(middle, plant.reach) else (low, middle)
+    return low
+
+
+def _require(holds: bool, what: str, *values: Fraction) -> None:
+    if not holds:
+        received = ", ".join(f"{float(v):.4g}" for v in values)
+        raise ParameterError(f"a limit needs {what}. Received {received}. Correct it.")
+
+
+def _ball(value: Fraction) -> Any:
+    return arb(fmpq(value.numerator, value.denominator))
+
+
+def _upper(value: Any) -> Fraction:
+    return fraction_of(value.upper().fmpq())
+
+
+def _lower(value: Any) -> Fraction:
+    return fraction_of(value.lower().fmpq())

@@ -1,0 +1,60 @@
+"""The command about what no controller can do."""
+
+from pathlib import Path
+
+from quakedesign.cli.shared import Force, Json, Pascals, SquareMetresPerSecond, app, print_json, print_lines
+
+
+@app.command
+def limits(
+    fault: str,
+    /,
+    *,
+    pressure: Pascals | None = None,
+    diffusivity: SquareMetresPerSecond = 1.0,
+    box: str | None = None,
+    out: Path | None = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Say what no controller whatever can do with a fault, beside what a designed one is proved to do.
+
+    The smallest slip-rate error, the longest T_s, delay and diffusion time, the farthest well and the smallest
+    withdrawal, for any disturbance as large as the fault's.
+
+    Parameters
+    ----------
+    fault
+        Preset or path of a .toml file.
+    pressure
+        Largest withdrawal, such as '20 MPa'; the effective normal stress unless given.
+    diffusivity
+        Of the rock between well and fault, such as '1 m^2/s'.
+    box
+        Uncertainty box: paper or ten-percent.
+    out
+        Folder for a figure and results.json; nothing is written unless given.
+    force
+        Replace a folder of earlier results.
+    json
+        Print JSON.
+    """
+    from quakedesign.fault import load_fault
+
+    found = load_fault(fault, box=box)
+    if out is not None:
+        from quakedesign.report.folder import prepare
+
+        prepare(out, force=force)
+    from quakedesign.report.limits import limits_lines, write_limits
+    from quakedesign.studies import limits as all_limits
+
+    answer = all_limits(found, pressure=pressure, diffusivity=diffusivity)
+    if out is not None:
+        write_limits(answer, out)
+    if json:
+        print_json(answer.to_dict())
+    else:
+        written = [] if out is None else [f"written: {out}/ (limits.png, results.json)"]
+        print_lines([*limits_lines(answer), *written])
+    return 0

@@ -1,0 +1,107 @@
+"""Limits of a fault as lines, as a figure and as a folder."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quakedesign.bounds import Bound, LowerBound, UpperBound
+from quakedesign.output import whole_folder, write_whole
+from quakedesign.report.drawing import NATURAL, figure, finish
+from quakedesign.simulation.earthquake import natural_peak
+from quakedesign.studies import Limits
+
+_FORBIDDEN, _PROVED = "#F3C6B2", "#0072B2"
+
+
+def limits_lines(found: Limits) -> list[str]:
+    """For people, within 80 columns."""
+    task = found.fault
+    head = [
+        f"{task.name}: what no controller can do, beside what is proved of designs",
+        f"(box {task.box.name}, any disturbance of at most {task.disturbance.largest_explicit:.6g} m/s^2, "
+        f"T_s = {task.sampling_time:g} s)",
+        "",
+        f"{'':24}{'impossible':>20}{'proved':>16}",
+    ]
+    rows = [
+        f"{limit.title:24}{_beyond(limit.impossible_beyond, limit.unit):>20}"
+        f"{_shown(limit.proved_up_to, limit.unit):>16}"
+        for limit in found.named().values()
+    ]
+    return [*head, *rows, "", *_meaning(found)]
+
+
+def _meaning(found: Limits) -> list[str]:
+    law = found.fault.friction.name
+    if found.peak_slip_rate_error.impossible_beyond is None:
+        return ["without a disturbance nothing is impossible"]
+    within = "bounded" if found.slip_error is None else f"within {found.slip_error.quantity('m')} of the reference"
+    told = [
+        "impossible for every controller, linear or not, for some friction of the box",
+        "slip-rate error: even with slip, slip rate and disturbance known up to the",
+        f"  sample, if the slip stays {within}; slip rates may",
+        "  be negative, as in the guarantees",
+    ]
+    if found.largest_step.impossible_beyond is None:
+        return [*told, f"the others: none is known, since {law} does not make a fault like this unstable in slip"]
+    return [
+        *told,
+        f"the others: withdrawal of at most {UpperBound(found.withdrawal).quantity('Pa', 4)}, "
+        f"D = {float(found.diffusivity):g} m^2/s; a constant push",
+        "  that begins after a sample makes the fault slip until its friction is lost,",
+        "  even if the controller knows everything from the next sample on",
+    ]
+
+
+def _beyond(bound: Bound | None, unit: str) -> str:
+    if bound is None:
+        return "-"
+    return f"{'below' if isinstance(bound, LowerBound) else 'above'} {bound.quantity(unit)}"
+
+
+def _shown(bound: Bound | None, unit: str) -> str:
+    return "-" if bound is None else bound.quantity(unit)
+
+
+def limits_figure(found: Limits) -> Any:
+    """Slip-rate errors over T_s: impossible, proved, and the natural earthquake's slip rate.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    drawing, axes = figure(1, 4.2)
+    axis, natural = axes[0, 0], natural_peak(found.fault)
+    axis.set(xscale="log", yscale="log", xlabel="T_s [s]", ylabel="slip-rate error [m/s]")
+    steps, peaks = np.array([(float(step), float(peak)) for step, peak in found.smallest_peaks()]).reshape(-1, 2).T
+    if len(steps):
+        top = 3 * max(natural or 0.0, *peaks)
+        last = found.largest_step.impossible_beyond
+        axis.fill_between(steps, peaks[0] / 3, peaks, color=_FORBIDDEN, lw=0, label="impossible for every controller")
+        if last is not None:
+            axis.axvspan(float(last), 2 * steps[-1], color=_FORBIDDEN, lw=0)
+        axis.set(xlim=(steps[0], (1 if last is None else 2) * steps[-1]), ylim=(peaks[0] / 3, top))
+    if found.proved:
+        proved = sorted((float(g.held.step), float(g.claims.slip_rate_error)) for g in found.proved)
+        axis.plot(*zip(*proved, strict=True), "o", color=_PROVED, label="proved of a designed controller")
+    if natural:
+        axis.axhline(natural, color=NATURAL, linestyle="--", linewidth=1, label="natural earthquake (slip rate)")
+    axis.axvline(found.fault.sampling_time, color="#777777", linewidth=0.8, linestyle=":", label="T_s of the fault")
+    note = f"disturbance of at most {found.fault.disturbance.largest_explicit:.4g} m/s², box {found.fault.box.name}"
+    return finish(drawing, f"{found.fault.name}: what a held pressure can do", [], note, legend=axis)
+
+
+def write_limits(found: Limits, folder: Path) -> dict[str, Any]:
+    """Write ``limits.png`` and ``results.json`` into a folder that appears whole; return what the latter holds.
+
+    Raises
+    ------
+    OutputError
+    """
+    facts = found.to_dict()
+    with whole_folder(folder) as partial:
+        limits_figure(found).savefig(partial / "limits.png", metadata={"Software": None})
+        write_whole(partial / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
+    return facts

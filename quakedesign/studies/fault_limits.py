@@ -1,0 +1,234 @@
+"""What no controller can do with a fault, beside what a designed one is proved to do."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.bounds import Bound, LowerBound, UpperBound
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task, task_of
+from quakedesign.certificates.impossibility import (
+    farthest_well,
+    longest_diffusion,
+    longest_reaction,
+    smallest_peak,
+    smallest_withdrawal,
+)
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.synthesis.guaranteed import design_held
+
+Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
+_ATTEMPTS = 6  # designs for one time
+_MOST_DELAY = 8  # periods; more is not analysed
+_POINTS = 24  # of the curve of smallest peaks
+
+KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
+WAITING = "all controllers, linear or not, all-knowing from the first sample after the disturbance begins"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """One quantity, its limit for all controllers, and how far designed ones have a guarantee.
+
+    Attributes
+    ----------
+    title : str
+    unit : str
+    impossible_beyond : LowerBound or UpperBound or None
+        A LowerBound: nothing smaller is possible; an UpperBound: nothing larger; None: no limit is known.
+    proved_up_to : LowerBound or UpperBound or None
+        Of the designs that were tried, the best with a guarantee; None where none was found.
+    holds_for : str
+        Controllers for which it is impossible.
+    """
+
+    title: str
+    unit: str
+    impossible_beyond: Bound | None
+    proved_up_to: Bound | None
+    holds_for: str
+
+    def to_dict(self) -> dict[str, str | None]:
+        """Decimal texts, rounded outwards."""
+        beyond, proved = self.impossible_beyond, self.proved_up_to
+        return {
+            "impossible_beyond": None if beyond is None else str(beyond),
+            "proved_up_to": None if proved is None else str(proved),
+            "unit": self.unit,
+            "holds_for": self.holds_for,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits of a fault, for the worst friction and parameters of its box.
+
+    Attributes
+    ----------
+    fault : Fault
+    withdrawal : Fraction
+        Largest withdrawal [Pa], P of −P ≤ p.
+    diffusivity : Fraction
+        [m²/s].
+    slip_error : UpperBound or None
+        Within which the smallest slip-rate error is meant [m]; None for any bounded slip error.
+    peak_slip_rate_error, largest_step, largest_delay, largest_diffusion_time, farthest_well, smallest_pressure : Limit
+        Each of the latter three and the delay at the fault's T_s.
+    proved : tuple of Guarantee
+        Of the designs without delay that were found on the way, by T_s.
+    """
+
+    fault: Fault
+    withdrawal: Fraction
+    diffusivity: Fraction
+    slip_error: UpperBound | None
+    peak_slip_rate_error: Limit
+    largest_step: Limit
+    largest_delay: Limit
+    largest_diffusion_time: Limit
+    farthest_well: Limit
+    smallest_pressure: Limit
+    proved: tuple[Guarantee, ...]
+
+    def named(self) -> dict[str, Limit]:
+        """All limits by name."""
+        names = (
+            "peak_slip_rate_error",
+            "largest_step",
+            "largest_delay",
+            "largest_diffusion_time",
+            "farthest_well",
+            "smallest_pressure",
+        )
+        return {name: getattr(self, name) for name in names}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; what is proved as decimal texts, rounded outwards."""
+        return {
+            "fault": self.fault.name,
+            "box": self.fault.box.name,
+            "disturbance": self.fault.disturbance.largest_explicit,
+            "step": self.fault.sampling_time,
+            "withdrawal": float(self.withdrawal),
+            "diffusivity": float(self.diffusivity),
+            "slip_error": None if self.slip_error is None else str(self.slip_error),
+            **{name: limit.to_dict() for name, limit in self.named().items()},
+        }
+
+    def smallest_peaks(self) -> list[tuple[Fraction, LowerBound]]:
+        """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below."""
+        task, first = task_of(self.fault), rational(self.fault.sampling_time) / 10
+        last = float(self.largest_step.impossible_beyond or 10_000 * first)
+        ratio = max(last / float(first), 100.0) ** (1 / _POINTS)
+        steps = [Fraction(f"{float(first) * ratio**i:.4g}") for i in range(_POINTS + 1)]
+        found = [(step, smallest_peak(task, step)) for step in steps]
+        return [(step, peak.slip_rate_error) for step, peak in found if peak is not None]
+
+
+def limits(fault: Fault, *, pressure: float | None = None, diffusivity: float = 1.0, prove: bool = True) -> Limits:
+    """What no controller can do with a fault whose disturbance is of the class ``amplitude``.
+
+    Parameters
+    ----------
+    fault : Fault
+    pressure : float, optional
+        Largest withdrawal [Pa]; the effective normal stress unless given.
+    diffusivity : float
+        Of the rock between well and fault [m²/s].
+    prove : bool
+        Whether to look for designs with a guarantee, which takes a minute.
+
+    Returns
+    -------
+    Limits
+
+    Raises
+    ------
+    ParameterError
+        For a negative pressure, a diffusivity that is not positive, or friction with a state.
+    """
+    task, step = task_of(fault), rational(fault.sampling_time)
+    withdrawal = task.normal_stress if pressure is None else rational(pressure, "pressure")
+    spread = rational(diffusivity, "diffusivity")
+    if withdrawal <= 0 or spread <= 0:
+        raise ParameterError(
+            f"pressure and diffusivity must be positive. Received {float(withdrawal):.4g} Pa and {float(spread):.4g} "
+            "m^2/s. Give the size of the largest withdrawal."
+        )
+    held = _proved_steps(task, step) if prove else ()
+    own = next((g for g in held if g.held.step == step), None)
+    delay = _proved_delay(task, step) if own is not None else None
+    peak, reaction = smallest_peak(task, step), longest_reaction(task, withdrawal)
+    path = longest_diffusion(task, withdrawal, step)
+    well = None if path is None else farthest_well(path, spread)
+    late = None if reaction is None else UpperBound(max(reaction - step, Fraction(0)))
+    return Limits(
+        fault=fault,
+        withdrawal=withdrawal,
+        diffusivity=spread,
+        slip_error=peak.slip_error if peak else None,
+        peak_slip_rate_error=Limit(
+            title="slip-rate error",
+            unit="m/s",
+            impossible_beyond=peak.slip_rate_error if peak else None,
+            proved_up_to=own.claims.slip_rate_error if own else None,
+            holds_for=KNOWING,
+        ),
+        largest_step=_limit("T_s", "s", reaction, LowerBound(held[-1].held.step) if held else None),
+        largest_delay=_limit("delay", "s", late, delay),
+        largest_diffusion_time=_limit("diffusion time L^2/D", "s", path, None),
+        farthest_well=_limit("distance of the well", "m", well, None),
+        smallest_pressure=_limit(
+            "withdrawal",
+            "Pa",
+            smallest_withdrawal(task, step),
+            UpperBound(max(-own.claims.least_pressure, Fraction(0))) if own else None,
+        ),
+        proved=held,
+    )
+
+
+def _limit(title: str, unit: str, beyond: Bound | None, proved: Bound | None) -> Limit:
+    return Limit(title=title, unit=unit, impossible_beyond=beyond, proved_up_to=proved, holds_for=WAITING)
+
+
+def _proved_steps(task: Task, step: Fraction) -> tuple[Guarantee, ...]:
+    return _tried(lambda held: design_held(task, held, objective="peak"), step)
+
+
+def _proved_delay(task: Task, step: Fraction) -> LowerBound | None:
+    found = _tried(lambda late: design_held(task, step, objective="peak", delay=late), step / 2, _MOST_DELAY * step)
+    return LowerBound(found[-1].held.delay) if found else None
+
+
+def _tried(attempt: Attempt, first: Fraction, most: Fraction | None = None) -> tuple[Guarantee, ...]:
+    """Guarantees at a time and at longer ones, or at a shorter one where it has none; the longest last."""
+    return _lengthened(attempt, first, most) or _shortened(attempt, first)
+
+
+def _lengthened(attempt: Attempt, first: Fraction, most: Fraction | None) -> tuple[Guarantee, ...]:
+    """Guarantees at a time, twice that and so on while they last, then by bisection."""
+    found: list[Guarantee] = []
+    good, failed = first, None
+    for power in range(_ATTEMPTS):
+        time = first * 2**power if failed is None else (good + failed) / 2
+        answer = attempt(time)
+        if isinstance(answer, Guarantee):
+            found.append(answer)
+            good = time
+        else:
+            failed = time
+        if not found or good == most:
+            break
+    return tuple(found)
+
+
+def _shortened(attempt: Attempt, first: Fraction) -> tuple[Guarantee, ...]:
+    """A guarantee at the longest of half a time, a quarter and so on."""
+    for power in range(1, _ATTEMPTS + 1):
+        answer = attempt(first / 2**power)
+        if isinstance(answer, Guarantee):
+            return (answer,)
+    return ()

@@ -1,0 +1,309 @@
+"""What no controller can do: closed forms, independent simulations, and no guarantee that contradicts it."""
+
+from dataclasses import replace
+from fractions import Fraction as F
+from math import acosh, cosh, exp, log, sqrt
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import linprog
+from scipy.special import erfc
+
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.guarantee import Guarantee, Held, guarantee, task_of
+from quakedesign.certificates.impossibility import (
+    farthest_well,
+    longest_diffusion,
+    longest_reaction,
+    smallest_peak,
+    smallest_withdrawal,
+)
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.loop import disturbance_estimate
+from quakedesign.loop.laws import Prediction
+
+REAL = task_of(load_fault("real-fault"))
+STEP = F(184, 1000)
+# κ = 0 and friction that never changes: e2′ = −w·e2 + u + φ with w = 1.6 1/s
+STEADY = replace(
+    REAL,
+    friction=replace(REAL.friction, static=F(1, 4), least=F(1, 4), largest=F(1, 4), weakening=F(0)),
+    growths=(REAL.stiffness[0], F(0)),
+)
+
+
+def pushed(task):
+    """s, w, N̂μ* and λ of the plant of the theorem on withdrawals, where nothing but friction is uncertain."""
+    law, area = task.friction, float(task.area_per_mass[0])
+    s = area * float(law.weakening * task.normal_stress) - float(task.stiffness[0] - task.growths[0])
+    w = float(task.specific_damping[0] - task.growths[1])
+    return s, w, area * float(law.static), (sqrt(w * w + 4 * s) - w) / 2
+
+
+def steep(task):
+    """s, w, N̂, least friction nearby and slope of the steepest friction at the target, and E."""
+    law, area = task.friction, float(task.area_per_mass[0])
+    reach = min((law.static - law.least) / law.weakening, task.target_slip) / 20
+    middle = max(law.least + law.weakening * reach, law.static - law.weakening * task.target_slip)
+    kappa = float(task.stiffness[0] - task.growths[0])
+    stress = float(law.static * task.normal_stress) - kappa / area * float(task.target_slip)
+    m = float(law.weakening)
+    s = area * m * stress / float(middle) - kappa
+    return s, float(task.specific_damping[0]), area, float(middle), m, float(reach)
+
+
+def test_a_sampled_first_order_plant_has_the_known_smallest_peak():
+    for step in (F(1, 100), F(184, 1000), F(3)):
+        found = smallest_peak(STEADY, step)
+        exact = 2 * 3.2e-4 * (1 - exp(-1.6 * float(step))) / 1.6
+        assert float(found.slip_rate_error) == pytest.approx(exact, rel=1e-12)
+        assert found.slip_error is None
+        assert isinstance(found.slip_rate_error, LowerBound)
+
+
+def test_a_delay_counts_as_a_longer_step():
+    assert smallest_peak(STEADY, STEP, F(1, 2)) == smallest_peak(STEADY, STEP + F(1, 2))
+
+
+def test_an_unstable_pole_and_a_pure_delay():
+    s, w, authority, pole = pushed(REAL)
+    assert pole**2 + w * pole == pytest.approx(s, rel=1e-12)
+    for pressure in (10**5, 2 * 10**7):
+        exact = log(authority * pressure / 3.2e-4) / pole
+        found = longest_reaction(REAL, F(pressure))
+        assert isinstance(found, UpperBound)
+        assert float(found) == pytest.approx(exact, rel=1e-12)
+        assert float(longest_reaction(REAL, smallest_withdrawal(REAL, F(3)))) == pytest.approx(3, rel=1e-12)
+
+
+def test_a_diffusive_path():
+    _, _, authority, pole = pushed(REAL)
+    ratio = authority * 2e7 / 3.2e-4 * exp(-pole * 0.184)
+    found = longest_diffusion(REAL, F(2 * 10**7), STEP)
+    assert float(found) == pytest.approx(acosh(ratio) ** 2 / pole, rel=1e-12)
+    assert cosh(sqrt(pole * float(found))) == pytest.approx(ratio, rel=1e-9)
+    assert float(farthest_well(found, F(1))) == pytest.approx(11.74, abs=0.01)
+    assert float(farthest_well(found, F(4))) == pytest.approx(2 * float(farthest_well(found, F(1))))
+
+
+def test_nothing_is_impossible_without_a_disturbance_and_little_without_an_instability():
+    still = replace(REAL, amplitude=F(0))
+    assert smallest_peak(still, STEP) is None
+    assert longest_reaction(still, F(1)) is None
+    assert smallest_withdrawal(STEADY, STEP) is None
+    assert longest_diffusion(STEADY, F(1), STEP) is None
+    assert longest_reaction(REAL, F(1)) == 0  # 1 Pa holds nothing
+    assert longest_diffusion(REAL, F(1), STEP) == 0
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: smallest_peak(REAL, F(0)),
+        lambda: smallest_peak(REAL, F(1), F(-1)),
+        lambda: longest_reaction(REAL, F(-1)),
+        lambda: longest_diffusion(REAL, F(1), F(-1)),
+        lambda: smallest_withdrawal(REAL, F(-1)),
+        lambda: farthest_well(UpperBound(1), F(0)),
+    ],
+)
+def test_meaningless_times_and_pressures_are_refused(call):
+    with pytest.raises(ParameterError, match="a limit needs"):
+        call()
+
+
+def test_more_uncertainty_and_larger_disturbances_forbid_more():
+    wide = replace(REAL, spreads=(F(1, 10),) * 3)
+    loud = replace(REAL, amplitude=2 * REAL.amplitude)
+    plain = smallest_peak(REAL, STEP).slip_rate_error
+    assert smallest_peak(wide, STEP).slip_rate_error > plain
+    assert float(smallest_peak(loud, STEP).slip_rate_error) == pytest.approx(2 * float(plain), rel=1e-3)
+    for task in (wide, loud):
+        assert longest_reaction(task, F(2 * 10**7)) < longest_reaction(REAL, F(2 * 10**7))
+
+
+@pytest.mark.parametrize("step", [F(184, 1000), F(1), F(2)])
+def test_the_best_linear_law_is_hardly_above_the_limit_for_all(step):
+    """l1-optimal: the answer of e2 to a disturbance over one period, brought to rest in ten, with the least sum."""
+    s, w, *_ = steep(REAL)
+    whole = expm(np.array([[0, 1, 0], [s, -w, 1], [0, 0, 0]]) * float(step))
+    a, b = whole[:2, :2], whole[:2, 2]
+    periods = 10
+    answers = [b]  # of the state after each period to each pressure, and to the disturbance
+    for _ in range(periods):
+        answers.append(a @ answers[-1])
+    forced = np.array(answers)
+    moved = np.zeros((periods + 1, periods, 2))
+    for k in range(periods + 1):
+        for j in range(k):
+            moved[k, j] = answers[k - 1 - j]
+    rates, ends = moved[:, :, 1], moved[-1].T
+    eye = np.eye(periods + 1)
+    found = linprog(
+        np.r_[np.zeros(periods), np.ones(periods + 1)],
+        A_ub=np.block([[rates, -eye], [-rates, -eye]]),
+        b_ub=np.r_[-forced[:, 1], forced[:, 1]],
+        A_eq=np.c_[ends, np.zeros((2, periods + 1))],
+        b_eq=-forced[-1],
+        bounds=[(None, None)] * periods + [(0, None)] * (periods + 1),
+    )
+    best, limit = float(REAL.amplitude) * found.fun, float(smallest_peak(REAL, step).slip_rate_error)
+    assert limit <= best * (1 + 1e-9)
+    assert best == pytest.approx(limit, rel=0.02)
+
+
+def deadbeat(whole, share):
+    """Bring a share of both errors to zero in two periods, the last disturbance cancelled."""
+    a, b = whole[:2, :2], whole[:2, 2]
+    gains = np.linalg.solve(np.array([a @ b, b]).T, a @ a)[0]  # u now, with the best u next
+    return lambda e, last, _k: -share * (gains @ e) - last
+
+
+def controllers(step, s, w):
+    whole = expm(np.array([[0, 1, 0], [s, -w, 1], [0, 0, 0]]) * step)
+    return {
+        "deadbeat": deadbeat(whole, 1.0),
+        "half as fast": deadbeat(whole, 0.5),
+        "linear": lambda e, last, _k: -0.5 * e[0] / step**2 - 0.9 * e[1] / step - last,
+        "cautious": lambda e, last, _k: -0.05 * e[0] / step**2 - 0.6 * e[1] / step - 0.9 * last,
+        "no estimate": lambda e, _last, _k: -0.6 * e[0] / step**2 - 1.1 * e[1] / step,
+        "switching": lambda e, last, _k: -last - 5e-4 * np.tanh((e[1] + 0.3 * e[0] / step) / 1e-4),
+        "dead zone": lambda e, last, _k: -last - (0.9 * e[1] + 0.4 * (e[0] - np.clip(e[0], -1e-4, 1e-4)) / step) / step,
+        "in turn": lambda e, last, k: -last - (0.9 + 0.2 * (k % 2)) * e[1] / step - 0.3 * e[0] / step**2,
+    }  # fmt: skip
+
+
+def fault(e, q, phi, step, plant):
+    """One period of the fault with affine friction at the target, by Runge and Kutta."""
+    s, w, area, middle, m, _ = plant
+
+    def change(x):
+        return np.array([x[1], s * x[0] - w * x[1] + area * (middle - m * x[0]) * q + phi])
+
+    h = step / 6
+    for _ in range(6):
+        k1 = change(e)
+        k2 = change(e + h / 2 * k1)
+        k3 = change(e + h / 2 * k2)
+        k4 = change(e + h * k3)
+        e = e + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return e
+
+
+@pytest.mark.parametrize("name", controllers(0.184, 1, 1))
+def test_no_controller_is_seen_below_the_smallest_peak(name):
+    plant = steep(REAL)
+    step, periods, push = 0.184, 600, float(REAL.amplitude)
+    limit, reach = float(smallest_peak(REAL, STEP).slip_rate_error), plant[-1]
+    law = controllers(step, *plant[:2])[name]
+    e, last, peak, slips = np.zeros(2), 0.0, 0.0, [0.0]
+    for k in range(periods):
+        q = law(e, last, k) / (plant[2] * plant[3])
+        turned = fault(e, q, -push, step, plant)
+        e, last = fault(e, q, push, step, plant), push
+        peak = max(peak, abs(e[1]), abs(turned[1]))
+        slips.append(e[0])
+        assert abs(e[0]) <= reach
+    left = (max(slips) - min(slips)) / (periods * step)  # the least e2 that the argument has found by now
+    assert left < 0.02 * limit
+    assert peak >= limit - left
+
+
+def escapes(task, pressure, reaction, path):
+    """Whether slip passes E under the push although everything is withdrawn from the first moment on."""
+    s, w, authority, pole = pushed(task)
+    law = task.friction
+    end, m = float((law.static - law.least) / law.weakening), float(law.weakening)
+    area, push = float(task.area_per_mass[0]), float(task.amplitude)
+    x, rate, time, h = 0.0, 0.0, 0.0, 2e-3 / pole
+    while time < reaction + 25 / pole and 0 <= x < end and rate >= 0:
+        p = -pressure * path(time - reaction)
+        rate += h * (s * x - w * rate + (authority - area * m * x) * p + push)
+        x += h * rate
+        time += h
+    return x >= end
+
+
+def test_the_longest_reaction_parts_what_escapes_from_what_can_be_held():
+    pressure = 5 * 3.2e-4 / pushed(REAL)[2]
+    limit = float(longest_reaction(REAL, F(pressure)))
+    assert escapes(REAL, pressure, 1.01 * limit, lambda t: float(t >= 0))
+    assert not escapes(REAL, pressure, 0.97 * limit, lambda t: float(t >= 0))
+
+
+def test_the_longest_diffusion_time_does_as_well():
+    pressure = 20 * 3.2e-4 / pushed(REAL)[2]
+    limit = float(longest_diffusion(REAL, F(pressure), STEP))
+
+    def path(span):
+        def step_answer(t):
+            n = np.arange(30)
+            return 2 * float(((-1.0) ** n * erfc((2 * n + 1) / 2 * sqrt(span / t))).sum()) if t > 0 else 0.0
+
+        return step_answer
+
+    assert escapes(REAL, pressure, 0.184, path(1.03 * limit))
+    assert not escapes(REAL, pressure, 0.184, path(0.93 * limit))
+
+
+def random_task(number):
+    random = np.random.default_rng(number)
+
+    def times(value, low, high):
+        return F(f"{float(value) * random.uniform(low, high):.4g}")
+
+    law = REAL.friction
+    least = F(f"{random.uniform(0.2, 0.33):.3f}")
+    return replace(
+        REAL,
+        shear_modulus=times(REAL.shear_modulus, 0.5, 1.5),
+        damping=times(REAL.damping, 0.2, 2),
+        normal_stress=times(REAL.normal_stress, 0.4, 1.2),
+        spreads=tuple(F(int(random.integers(0, 8)), 100) for _ in range(3)),
+        friction=replace(law, least=least, weakening=times(law.weakening, 0.3, 1.2)),
+        amplitude=times(REAL.amplitude, 0.1, 10),
+        target_slip=times(REAL.target_slip, 0.1, 1.5),
+    ), F(f"{random.uniform(0.05, 0.3):.3f}")
+
+
+def law_for(task, step):
+    """Feedback with an estimate of the disturbance, its three numbers as usual ones."""
+    model = task.model
+    flow = np.array([[0, 1, 0], [float(model.slip), -float(model.rate), 1], [0, 0, 0]])
+    ahead = Prediction(**dict(zip(("of_slip", "of_rate", "of_push"), map(F, expm(flow * float(step))[1]), strict=True)))
+    gain = model.gain
+    return disturbance_estimate((F(3, 5) / gain / step**2, 1 / gain / step), F(1, 10), ahead, gain)
+
+
+def contradicted(numbers):
+    """How many random faults have a guarantee, and those whose guarantee is beyond a limit."""
+    proved, wrong = 0, []
+    for number in numbers:
+        task, step = random_task(number)
+        found = guarantee(task, Held(law=law_for(task, step), step=step))
+        if isinstance(found, Guarantee):
+            limit, claims = smallest_peak(task, step), found.claims
+            proved += 1
+            held = limit.slip_error is None or claims.slip_error <= limit.slip_error
+            least = smallest_withdrawal(task, step)
+            if held and claims.slip_rate_error < limit.slip_rate_error:
+                wrong.append(number)
+            if least is not None and -claims.least_pressure < least:
+                wrong.append(number)
+    return proved, wrong
+
+
+@pytest.mark.parametrize("first", range(0, 20, 4))
+def test_no_guarantee_contradicts_a_limit(first):
+    proved, wrong = contradicted(range(first, first + 4))
+    assert proved >= 3
+    assert not wrong
+
+
+@pytest.mark.slow
+def test_no_guarantee_of_two_hundred_random_faults_contradicts_a_limit():
+    proved, wrong = contradicted(range(200))
+    assert proved >= 100
+    assert not wrong

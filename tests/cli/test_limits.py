@@ -1,0 +1,49 @@
+"""The command that says what no controller can do."""
+
+import json
+
+import pytest
+
+from quakedesign.certificates.guarantee import NoGuarantee
+from quakedesign.cli import main
+
+KEYS = ("peak_slip_rate_error", "largest_step", "largest_delay", "largest_diffusion_time", "farthest_well")
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch):
+    monkeypatch.setattr("quakedesign.report.limits.natural_peak", lambda _fault: 0.05)
+    monkeypatch.setattr(
+        "quakedesign.studies.fault_limits.design_held", lambda *_, **__: NoGuarantee(reason="none", small_gain=None)
+    )
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as end:
+        main(["limits", *arguments])
+    return end.value.code
+
+
+def test_json_has_both_sides(capsys):
+    assert run("lab-fault", "--pressure", "40 kPa", "--diffusivity", "1e-2", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {"impossible_beyond", "proved_up_to"} <= set.intersection(*(set(found[key]) for key in KEYS))
+    assert found["withdrawal"] == 40000
+    well, time = (float(found[key]["impossible_beyond"]) for key in ("farthest_well", "largest_diffusion_time"))
+    assert well == pytest.approx((1e-2 * time) ** 0.5, rel=1e-5)
+    assert found["farthest_well"]["proved_up_to"] is None
+
+
+def test_a_folder_with_a_figure(tmp_path, capsys):
+    folder = tmp_path / "limits"
+    assert run("lab-fault", "--out", str(folder)) == 0
+    assert {path.name for path in folder.iterdir()} == {"limits.png", "results.json"}
+    assert "written" in capsys.readouterr().out
+    assert run("lab-fault", "--out", str(folder)) == 2
+    assert "must be new" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("given", [("--pressure", "-1 MPa"), ("--diffusivity", "0"), ("--pressure", "1 m")])
+def test_nonsense_is_refused_in_one_line(given, capsys):
+    assert run("lab-fault", *given) == 2
+    assert capsys.readouterr().err.count("\n") == 1

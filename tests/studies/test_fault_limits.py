@@ -1,0 +1,142 @@
+"""Limits of a fault: both sides, what is searched for, and what is said."""
+
+import json
+from fractions import Fraction as F
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.guarantee import Claims, Guarantee, Held, NoGuarantee, task_of
+from quakedesign.certificates.impossibility import longest_reaction
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Disturbance
+from quakedesign.loop import summed_integrals
+from quakedesign.report.limits import limits_figure, limits_lines
+from quakedesign.studies import limits as study
+
+REAL = qd.load_fault("real-fault")
+LAW = summed_integrals((F(1), F(1), F(1), F(1)), F(1))
+CLAIMS = Claims(
+    slip_error=UpperBound(F(1, 10**4)),
+    slip_rate_error=UpperBound(F(2, 10**4)),
+    peak_slip_rate=UpperBound(F(2, 10**4)),
+    least_pressure=LowerBound(-(10**7)),
+    largest_pressure=UpperBound(10**7),
+)
+
+
+@pytest.fixture(autouse=True)
+def _natural_peak(monkeypatch):
+    monkeypatch.setattr("quakedesign.report.limits.natural_peak", lambda fault: 0.25)
+
+
+@pytest.fixture
+def designs(monkeypatch):
+    """Designs that have a guarantee up to a longest T_s and a longest delay; the pairs that were asked for."""
+    asked, longest = [], {"step": F(4, 5), "delay": F(95, 1000)}
+
+    def designed(task, step, *, objective, delay=F(0)):
+        assert objective == "peak"
+        asked.append((step, delay))
+        if step > longest["step"] or delay > longest["delay"]:
+            return NoGuarantee(reason="too long", small_gain=None)
+        return Guarantee(task=task, held=Held(law=LAW, step=step, delay=delay), claims=CLAIMS)
+
+    monkeypatch.setattr("quakedesign.studies.fault_limits.design_held", designed)
+    return asked, longest
+
+
+def test_both_sides_of_the_real_fault(designs):
+    found = study(REAL, pressure=2e7)
+    assert found.to_dict()["largest_step"]["impossible_beyond"] == "15.8694"
+    assert found.largest_step.impossible_beyond == longest_reaction(task_of(REAL), F(2 * 10**7))
+    assert found.largest_delay.impossible_beyond == found.largest_step.impossible_beyond - F(184, 1000)
+    assert found.farthest_well.to_dict()["impossible_beyond"] == "11.7421"
+    assert found.farthest_well.proved_up_to is None
+    assert found.peak_slip_rate_error.proved_up_to == CLAIMS.slip_rate_error
+    assert found.smallest_pressure.proved_up_to == 10**7
+    for limit in found.named().values():
+        assert isinstance(limit.impossible_beyond, LowerBound | UpperBound)
+        if limit.proved_up_to is not None:
+            assert type(limit.proved_up_to) is not type(limit.impossible_beyond)
+
+
+def test_the_search_doubles_and_then_bisects(designs):
+    asked, _ = designs
+    found = study(REAL)
+    steps = [step for step, delay in asked if not delay]
+    assert steps == [F(184, 1000) * times for times in (1, 2, 4, 8, 6, 5)]
+    assert found.largest_step.proved_up_to == F(736, 1000)
+    assert found.largest_delay.proved_up_to == F(92, 1000)
+    assert [g.held.step for g in found.proved] == [F(184, 1000) * times for times in (1, 2, 4)]
+
+
+def test_a_fault_that_is_sampled_too_slowly_gets_a_shorter_step(designs):
+    asked, longest = designs
+    longest["step"] = F(3, 100)
+    found = study(REAL)
+    assert [step for step, _ in asked] == [F(184, 1000) / 2**n for n in range(4)]
+    assert found.largest_step.proved_up_to == F(23, 1000)
+    assert found.largest_delay.proved_up_to is None
+    assert found.peak_slip_rate_error.proved_up_to is None
+
+
+def test_nothing_proved_at_all(designs):
+    _, longest = designs
+    longest["step"] = F(0)
+    found = study(REAL)
+    assert found.proved == ()
+    assert {limit.proved_up_to for limit in found.named().values()} == {None}
+
+
+def test_what_is_printed_stays_within_80_columns_and_on_the_safe_side(designs):
+    found = study(REAL, pressure=2e7)
+    lines = limits_lines(found)
+    assert max(map(len, lines)) <= 80
+    text = "\n".join(lines)
+    assert "below 102 µm/s" in text  # 1.0255e-4 m/s
+    assert "above 11.8 m" in text  # 11.7421 m
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_without_a_disturbance_nothing_is_impossible():
+    quiet = qd.load_fault("lab-fault").with_disturbance(Disturbance())
+    found = study(quiet, prove=False)
+    assert {limit.impossible_beyond for limit in found.named().values()} == {None}
+    assert found.smallest_peaks() == []
+    assert "without a disturbance nothing is impossible" in limits_lines(found)
+    assert limits_figure(found).axes[0].get_ylabel().endswith("[m/s]")
+
+
+def test_the_curve_ends_where_no_controller_holds(designs):
+    found = study(REAL, pressure=2e7)
+    curve = found.smallest_peaks()
+    assert float(curve[-1][0]) == pytest.approx(15.87, abs=0.01)
+    assert curve[0][0] == F(184, 10000)
+    values = [float(peak) for _, peak in curve]
+    assert values == sorted(values)
+
+
+def test_the_figure_shows_the_earthquake_and_what_is_proved(designs):
+    axis = limits_figure(study(REAL)).axes[0]
+    labels = axis.get_legend_handles_labels()[1]
+    assert "natural earthquake (slip rate)" in labels
+    (points,) = [line for line in axis.lines if line.get_label().startswith("proved")]
+    assert list(points.get_xdata()) == pytest.approx([0.184, 0.368, 0.736])
+    assert axis.get_ylim()[1] > 0.1
+
+
+@pytest.mark.parametrize("given", [{"pressure": 0.0}, {"pressure": -1.0}, {"diffusivity": 0.0}])
+def test_meaningless_numbers_are_refused(given):
+    with pytest.raises(ParameterError, match="must be positive"):
+        study(REAL, **given)
+
+
+@pytest.mark.slow
+def test_the_laboratory_fault_in_earnest():
+    found = study(qd.load_fault("lab-fault"))
+    assert found.largest_step.proved_up_to >= F(2, 1000)
+    for guarantee in found.proved:
+        assert guarantee.check() is qd.Verdict.PROVED
+    assert found.peak_slip_rate_error.proved_up_to > found.peak_slip_rate_error.impossible_beyond
