@@ -344,3 +344,16 @@ def test_the_derivative_of_a_set_is_affine_in_what_has_a_range():
         OneInput(loop, "u").derivative(response.parts["u"].sets[0])
     loop, response = changed_field(term(("x", 1, "s"), parameters=("k", "k")))
     assert OneInput(loop, "u").derivative(response.parts["u"].sets[0])
+
+
+@pytest.mark.parametrize(("weights", "sound"), [((1, 0), True), ((F(1, 2), F(1, 2)), True), ((F(-1, 2), 1), False)])
+def test_weights_of_two_sets_are_each_not_negative(weights, sound):
+    loop, response = changed_bound(weights=tuple(map(F, weights)))
+    part = response.parts["v"]
+    twice = replace(part, sets=tuple(replace(own, borrowed=(F(0), F(0))) for own in part.sets * 2))
+    both = replace(response, parts=response.parts | {"v": twice})
+    if sound:
+        require_sound(loop, both)
+    else:
+        with pytest.raises(CertificateError, match="every set needs a weight"):
+            require_sound(loop, both)

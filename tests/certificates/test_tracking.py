@@ -10,6 +10,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.certificates.linear_premises import effective_stress, linear_premises, sectors
+from quakedesign.certificates.premise import Premise
 from quakedesign.certificates.response import InputResponse, OutputBound, Response
 from quakedesign.certificates.tracking import (
     disturbance_inputs,
@@ -22,6 +23,7 @@ from quakedesign.certificates.tracking import (
 from quakedesign.controllers import published
 from quakedesign.errors import CertificateError
 from quakedesign.fault import Disturbance
+from quakedesign.fault.friction import friction_law
 from quakedesign.symbolic.terms import Term
 
 REAL = qd.load_fault("real-fault")
@@ -263,3 +265,35 @@ def test_the_smallest_bound_of_the_slip_rate_counts():
     row = one.response.outputs["y"]
     both = Response(outputs={"y": row, "z": row}, parts=dict.fromkeys(one.response.parts, part))
     assert covers(float(peaks_covered(replace(one, response=both), REAL)[1].split()[5]), 3e-6 + RATES[0])
+
+
+def test_friction_that_weakens_with_the_rate_widens_the_damping_at_both_ends():
+    law = friction_law("slip-rate-weakening")(residual=0.2, drop=0.1, critical_rate=0.5)
+    found = sectors(replace(REAL, friction=law))
+    chord = 8e-8 * float(found.largest_effective_stress) * float(law.rate_slope)
+    assert chord > 0
+    assert [float(end) for end in found.rate] == pytest.approx([1.6 - chord, 1.6 + chord], rel=1e-9)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_both_limits_of_a_disturbance_are_needed(which):
+    one = certificate("error")
+    limits = [F(9, 10) * v if i == which else v for i, v in enumerate(one.loop.inputs["disturbance"])]
+    assert len(limits) == 2
+    smaller = replace(one.loop, inputs=one.loop.inputs | {"disturbance": tuple(limits)})
+    with pytest.raises(CertificateError, match="smaller"):
+        peaks_covered(replace(one, loop=smaller), REAL)
+
+
+def test_a_premise_holds_up_to_its_bound():
+    def premise(required, certified, **more):
+        return Premise(name="x", required=required, certified=certified, unit="-", **more)
+
+    assert premise(1.0, 1.0).holds
+    assert premise(1.0, 1.5).holds
+    assert not premise(1.001, 1.0).holds
+    assert not premise(1.6, 1.0).holds
+    assert not premise(0.5, 1.0, proved=False).holds
+    assert not premise(0.5, 1.0).measured
+    assert premise(1.0, 4.0).ratio == 0.25
+    assert premise(0.0, 1.0).ratio == 0
