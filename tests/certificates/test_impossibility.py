@@ -21,8 +21,7 @@ from quakedesign.certificates.impossibility import (
 )
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.loop import disturbance_estimate
-from quakedesign.loop.laws import Prediction
+from quakedesign.loop import Prediction, disturbance_estimate
 
 REAL = task_of(load_fault("real-fault"))
 STEP = F(184, 1000)
@@ -272,7 +271,9 @@ def law_for(task, step):
     """Feedback with an estimate of the disturbance, its three numbers as usual ones."""
     model = task.model
     flow = np.array([[0, 1, 0], [float(model.slip), -float(model.rate), 1], [0, 0, 0]])
-    ahead = Prediction(**dict(zip(("of_slip", "of_rate", "of_push"), map(F, expm(flow * float(step))[1]), strict=True)))
+    of_slip, of_rate, of_push = map(F, expm(flow * float(step))[1])
+    now = ((F(1), F(0)), (F(0), F(1)))
+    ahead = Prediction(of_slip=of_slip, of_rate=of_rate, of_pushes=(of_push,), ahead=now, ahead_of_pushes=())
     gain = model.gain
     return disturbance_estimate((F(3, 5) / gain / step**2, 1 / gain / step), F(1, 10), ahead, gain)
 
