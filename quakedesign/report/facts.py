@@ -5,8 +5,11 @@ from math import isfinite
 from typing import Any
 
 from quakedesign.bounds import LowerBound
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
+from quakedesign.rationals import rational
 from quakedesign.report.needed_pressure import need_sentence, needed_pressure, ways
+from quakedesign.studies import limits
 from quakedesign.symbolic import derive
 from quakedesign.synthesis.analysis.sampling_adequacy import LARGEST_PRODUCT, SamplingAdequacy, sampling_adequacy
 
@@ -53,6 +56,7 @@ def fault_sentences(fault: Fault) -> list[str]:
         *_event(fault),
         f"{state}; eigenvalues {poles} 1/s",
         sampling_sentence(sampling_adequacy(fault)),
+        *beyond_control(fault),
         *([need_sentence(needed)] if (needed := needed_pressure(fault)) else []),
     ]
 
@@ -75,6 +79,21 @@ def sampling_sentence(found: SamplingAdequacy) -> str:
         f"T_s = {found.step:.4g} s {judged}: times the unstable pole, {found.pole:.4g} 1/s {where}, it is "
         f"{found.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
     )
+
+
+def beyond_control(fault: Fault) -> list[str]:
+    """That no controller can hold a fault at its T_s, where that is proved."""
+    try:
+        longest = limits(fault, prove=False).largest_step.impossible_beyond
+    except (ParameterError, UnsupportedError):  # friction with a state, or that nothing can be proved with
+        return []
+    if longest is None or rational(fault.sampling_time) <= longest:
+        return []
+    return [
+        f"NO CONTROLLER can hold this fault at T_s = {fault.sampling_time:.4g} s for all friction of its box and a "
+        f"disturbance as large as its own: beyond {longest.quantity('s')} none can, even if it withdraws all of the "
+        "effective normal stress"
+    ]
 
 
 def _known(value: float) -> float | None:

@@ -1,5 +1,6 @@
 """Limits of a fault: both sides, what is searched for, and what is said."""
 
+import dataclasses
 import json
 from fractions import Fraction as F
 
@@ -12,6 +13,7 @@ from quakedesign.certificates.impossibility import longest_reaction
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
 from quakedesign.loop import summed_integrals
+from quakedesign.report.facts import beyond_control
 from quakedesign.report.limits import limits_figure, limits_lines
 from quakedesign.studies import limits as study
 
@@ -125,6 +127,12 @@ def test_the_figure_shows_the_earthquake_and_what_is_proved(designs):
     (points,) = [line for line in axis.lines if line.get_label().startswith("proved")]
     assert list(points.get_xdata()) == pytest.approx([0.184, 0.368, 0.736])
     assert axis.get_ylim()[1] > 0.1
+
+
+@pytest.mark.parametrize(("step", "said"), [(17.8, False), (17.9, True)])
+def test_a_fault_says_when_no_controller_can_hold_it_at_its_step(step, said):
+    told = " ".join(beyond_control(dataclasses.replace(REAL, sampling_time=step)))
+    assert ("beyond 17.9 s none can" in told) is said  # 17.828 s
 
 
 @pytest.mark.parametrize("given", [{"pressure": 0.0}, {"pressure": -1.0}, {"diffusivity": 0.0}])
