@@ -14,6 +14,7 @@ _PERIODS = 64
 _PIECES = 6
 _SWEEPS = 8
 _COURSES = 24  # for each of the two outputs
+_SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
 _SEED = 7
 
 
@@ -38,7 +39,7 @@ def worst_found(claim: Guarantee, *, sticks: bool = False) -> WorstFound:
 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64
     periods long. With `sticks` the fault does not slide backward: friction holds it wherever the loop would, along the
-    reference at its largest rate.
+    reference at its largest rate and at a twentieth of that.
     """
     search = _Search(claim.task, claim.held.loop(claim.task), sticks)
     return WorstFound(slip_error=search.largest[0], slip_rate_error=search.largest[1])
@@ -46,18 +47,18 @@ def worst_found(claim: Guarantee, *, sticks: bool = False) -> WorstFound:
 
 @dataclass(frozen=True, slots=True)
 class _Pieces:
-    """One segment: its jump, and for every vertex e^{Ah} and what constant inputs add."""
+    """One segment: its jump, for every vertex e^{Ah} and what constant inputs add, and h [s]."""
 
     jump: np.ndarray
     steps: np.ndarray
     added: np.ndarray
+    length: float
 
 
 class _Search:
     """One run of sweeps; `largest` holds |e1| and |e2|."""
 
     def __init__(self, task: Task, loop: PeriodicLoop, sticks: bool) -> None:
-        self.back = float(task.reference_rates[0]) if sticks else None
         self.limit = float(task.amplitude) if task.change is not None else None
         flow, inputs = _with_disturbance(task, loop)
         self.size = len(flow)
@@ -67,6 +68,8 @@ class _Search:
             _pieces(vertices, inputs, _widened(s.jump, self.size), float(s.duration) / _PIECES) for s in loop.segments
         ]
         courses = 2 * _COURSES
+        paces = np.where(np.arange(courses) // 2 % 2, 1, _SLOW)
+        self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.allowed = np.ones((courses, len(vertices)), dtype=bool)
         if self.limit is not None and beta[0] < beta[1]:  # the class rate has friction of the slip alone: β is slow
             half = len(vertices) // 2
@@ -94,19 +97,23 @@ class _Search:
             gain = np.einsum("cvi,ci->cv", ahead, costate) + np.abs(push).sum(axis=2)
             best = np.where(self.allowed, gain, -np.inf).argmax(axis=1)
             row = np.arange(len(best))
-            state = ahead[row, best] + np.einsum("cij,cj->ci", part.added[best], np.sign(push[row, best]))
+            following = ahead[row, best] + np.einsum("cij,cj->ci", part.added[best], np.sign(push[row, best]))
             chosen.append(best)
-            held.append(self._held(state))
+            held.append(self._held(state, following, part.length))
+            state = following
             slip, rate = np.abs(state[:, :2]).max(axis=0)
             self.largest = max(self.largest[0], float(slip)), max(self.largest[1], float(rate))
         return chosen, held
 
-    def _held(self, state: np.ndarray) -> np.ndarray:
+    def _held(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
         """Keep every state where it can be; mask of what is held there."""
         mask = np.zeros(state.shape, dtype=bool)
         if self.back is not None:
-            mask[:, 1] = state[:, 1] < -self.back
-            state[mask[:, 1], 1] = -self.back
+            mask[:, 1] = stuck = state[:, 1] < -self.back
+            above = np.maximum(before[:, 1] + self.back, 0)  # slip rate before; it falls to zero, then the fault sticks
+            moving = above / np.where(stuck, above - state[:, 1] - self.back, 1)
+            state[stuck, 0] = (before[:, 0] - length * self.back + length * moving * above / 2)[stuck]
+            state[stuck, 1] = -self.back[stuck]
         if self.limit is not None:
             mask[:, -1] = np.abs(state[:, -1]) > self.limit
             state[:, -1] = np.clip(state[:, -1], -self.limit, self.limit)
@@ -155,7 +162,7 @@ def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, jump: np.ndarray, le
         found: Any = expm(whole * length)
         steps.append(found[:size, :size])
         added.append(found[:size, size:])
-    return _Pieces(jump, np.array(steps), np.array(added))
+    return _Pieces(jump, np.array(steps), np.array(added), length)
 
 
 def _widened(jump: Any, size: int) -> np.ndarray:

@@ -16,7 +16,7 @@ from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.synthesis import Design
-from quakedesign.synthesis.guaranteed import design_held, worst_found
+from quakedesign.synthesis.guaranteed import Answer, design_held, worst_found
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -99,7 +99,16 @@ def test_courses_along_the_nominal_response_come_close_and_stay_below(row):
         assert claim.claims.slip_rate_error <= 1.5 * seen[1]
 
 
-@pytest.mark.parametrize("row", ROWS)
+def test_where_stick_leaves_the_bounds_the_answer_says_so():
+    """One period late the slip error of the sticking fault exceeds what is proved of the continued one."""
+    claim = designed("real one period late")
+    seen = worst_found(claim, sticks=True)
+    assert seen.slip_error > claim.claims.slip_error
+    found = Answer(fault=load_fault("real-fault"), found=claim, worst_with_stick=seen)
+    assert found.lines()[-1].startswith("with stick a course was found that leaves the bounds")
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if row not in DELAYS])
 def test_with_stick_no_course_leaves_the_bounds(row):
     """The reference moves at its largest rate; the fault never slides backward."""
     claim = designed(row)
@@ -174,3 +183,12 @@ def test_designs_say_what_is_guaranteed_of_them_as_they_run():
     assert unstable.check() is sliding.check() is Verdict.UNDECIDED
     assert unstable.sentence().startswith("none: held over 0.184 s even the nominal loop is not stable")
     assert sliding.sentence() == "none: no analysis of 2-CTA under a held pressure is known here"
+
+
+@pytest.mark.parametrize("row", ["real peak", "real tracking"])
+def test_the_worst_found_with_stick_is_no_less_than_the_attacker_s(row):
+    claim = designed(row)
+    found, held, back = worst_found(claim, sticks=True), numbers(claim), float(claim.task.reference_rates[0])
+    largest, _ = attacker.run(held, 40, 24, attacker.switching(held, 500, 960, seed=6), 500, back=back)
+    assert largest[1].max() <= found.slip_rate_error <= claim.claims.slip_rate_error
+    assert largest[0].max() <= found.slip_error <= claim.claims.slip_error
