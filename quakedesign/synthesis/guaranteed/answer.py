@@ -152,7 +152,7 @@ def _shorter(task: Task, step: Fraction, objective: str, delay: Fraction, lag: F
     """Guarantee at the longest of steps that shrink by a fifth, delay and lag as they are."""
     for _ in range(_TRIALS):
         step = _two_digits(step * _SHORTER)
-        if delay > 8 * step:
+        if delay > 7 * step:
             return None
         if isinstance(design_held(task, step, objective="peak", delay=delay, lag=lag), Guarantee):
             found = design_held(task, step, objective=objective, delay=delay, lag=lag)

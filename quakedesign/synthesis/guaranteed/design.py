@@ -20,6 +20,7 @@ _EVALUATIONS = 150
 _CREEPING = 0.1  # what the slip error over T_s counts beside the slip-rate error, so that the loop does not creep
 _ROOM = 1.6  # share of the smallest peak that `tracking` may spend
 _DIGITS = 4
+_MOST_PERIODS = 7  # of delay: law and loop then have 20 states, the most of a file
 _FAILED = 1e6
 
 
@@ -48,10 +49,15 @@ def design_held(
     Raises
     ------
     ParameterError
-        For another objective.
+        For another objective, or times that are negative or too long.
     """
     if objective not in OBJECTIVES:
         raise ParameterError(f"objective must be one of {', '.join(OBJECTIVES)}. Received {objective!r}.")
+    if step <= 0 or not 0 <= delay <= _MOST_PERIODS * step or lag < 0:
+        raise ParameterError(
+            f"a design needs a positive step, a delay of 0 to {_MOST_PERIODS} steps and a lag of 0 or more. Received "
+            f"{float(step):.4g} s, {float(delay):.4g} s, {float(lag):.4g} s. Shorten the delay."
+        )
     law = _laws(task.model, step, delay)
     template = Held(law=law(np.array(_STARTS[0])), step=step, delay=delay, lag=lag)
     worst = replace(task, change=None)  # gains are chosen for the larger class: they answer slow disturbances as well
