@@ -36,6 +36,8 @@ def test_a_designed_loop_with_its_file(call, tmp_path):
     for seen in ("worst_found", "worst_found_with_stick"):
         assert 0 < found[seen]["slip_error"] <= F(found["slip_error"])
         assert F(found["slip_rate_error"]) / 2 <= found[seen]["slip_rate_error"] <= F(found["slip_rate_error"])
+    limit = F(found["limit"]["slip_rate_error"])
+    assert F(1, 10**4) < limit < F(found["slip_rate_error"])
     assert check_files([path], "real-fault")[str(path)][0] == "proved"
     code, _, err = call("real-fault", "--out", str(path))
     assert code == 2

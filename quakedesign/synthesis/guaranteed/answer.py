@@ -5,6 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, Task, guarantee, task_of
+from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
@@ -56,9 +57,21 @@ class Answer:
                 said.append(
                     f"{name}: slip error {seen.slip_error:.3g} m, slip-rate error {seen.slip_rate_error:.3g} m/s"
                 )
+        limit = self.limit
+        if limit is not None:
+            both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
+            errors = f"the slip-rate error below {limit.slip_rate_error:.3g} m/s{both}"
+            said.append(f"no controller held over this T_s keeps {errors}")
         if self._leaves_with_stick():
             said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
         return said
+
+    @property
+    def limit(self) -> SmallestPeak | None:
+        """What no controller can do at the same T_s and delay; None for the class ``rate``."""
+        if not isinstance(self.found, Guarantee) or self.found.task.change is not None:
+            return None
+        return smallest_peak(self.found.task, self.found.held.step, self.found.held.delay)
 
     def _leaves_with_stick(self) -> bool:
         if not isinstance(self.found, Guarantee) or self.worst_with_stick is None:
@@ -86,6 +99,7 @@ class Answer:
             "small_gain": small,
             "worst_found": _seen(self.worst),
             "worst_found_with_stick": _seen(self.worst_with_stick),
+            "limit": _limit(self.limit),
             "step": str(self.found.held.step),
             "law": _law(self.found.held.law),
         }
@@ -182,6 +196,13 @@ def _claims(found: Guarantee) -> dict[str, Any]:
 
 def _seen(worst: WorstFound | None) -> dict[str, float] | None:
     return None if worst is None else {"slip_error": worst.slip_error, "slip_rate_error": worst.slip_rate_error}
+
+
+def _limit(limit: SmallestPeak | None) -> dict[str, str | None] | None:
+    if limit is None:
+        return None
+    slip = limit.slip_error
+    return {"slip_rate_error": limit.slip_rate_error.exact, "slip_error": None if slip is None else slip.exact}
 
 
 def _law(law: LinearLaw) -> dict[str, Any]:
