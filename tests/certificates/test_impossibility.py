@@ -4,6 +4,7 @@ from dataclasses import replace
 from fractions import Fraction as F
 from math import acosh, cosh, exp, log, sqrt
 
+import mpmath
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -60,6 +61,30 @@ def test_a_sampled_first_order_plant_has_the_known_smallest_peak():
         assert float(found.slip_rate_error) == pytest.approx(exact, rel=1e-12)
         assert found.slip_error is None
         assert isinstance(found.slip_rate_error, LowerBound)
+
+
+def test_every_bound_is_on_the_side_where_the_claim_is_true():
+    with mpmath.workdps(60):
+        h, w, t = mpmath.mpf(32) / 10**5, mpmath.mpf(8) / 5, mpmath.mpf(184) / 1000
+        peak = 2 * h * (1 - mpmath.exp(-w * t)) / w
+        area = mpmath.mpf(8) / 10**8
+        s = area * exact(REAL.friction.weakening) * 5 * 10**7
+        s -= exact(REAL.stiffness[0] - REAL.growths[0])
+        pole = (mpmath.sqrt(w * w + 4 * s) - w) / 2
+        ratio = area * exact(REAL.friction.static) * 2 * 10**7 / h
+        cases = (
+            (smallest_peak(STEADY, STEP).slip_rate_error, peak, -1),
+            (longest_reaction(REAL, F(2 * 10**7)), mpmath.log(ratio) / pole, 1),
+            (longest_diffusion(REAL, F(2 * 10**7), F(0)), mpmath.acosh(ratio) ** 2 / pole, 1),
+            (smallest_withdrawal(REAL, F(0)), 2 * 10**7 / ratio, -1),
+        )
+        for found, true, side in cases:
+            excess = side * (exact(found) - true) / true
+            assert -(mpmath.mpf(10) ** -50) <= excess < mpmath.mpf(10) ** -30
+
+
+def exact(value):
+    return mpmath.mpf(value.numerator) / value.denominator
 
 
 def test_a_delay_counts_as_a_longer_step():
@@ -208,6 +233,29 @@ def test_no_controller_is_seen_below_the_smallest_peak(name):
     left = (max(slips) - min(slips)) / (periods * step)  # the least e2 that the argument has found by now
     assert left < 0.02 * limit
     assert peak >= limit - left
+
+
+@pytest.mark.parametrize("name", ["half as fast", "linear", "in turn"])
+def test_nor_below_that_of_a_pressure_one_period_late(name):
+    """Laws that predict the state at which their pressure arrives; the disturbance turns for two periods."""
+    plant = steep(REAL)
+    s, w, area, middle, _, reach = plant
+    step, periods, push = 0.184, 600, float(REAL.amplitude)
+    limit = float(smallest_peak(REAL, STEP, STEP).slip_rate_error)
+    law = controllers(step, s, w)[name]
+    whole = expm(np.array([[0, 1, 0], [s, -w, 1], [0, 0, 0]]) * step)
+    e, waiting, peak, slips = np.zeros(2), 0.0, 0.0, [0.0]
+    for k in range(periods):
+        expected = whole[:2, :2] @ e + whole[:2, 2] * (area * middle * waiting + push)
+        q = law(expected, push, k) / (area * middle)
+        turned = fault(fault(e, waiting, -push, step, plant), q, -push, step, plant)
+        e, waiting = fault(e, waiting, push, step, plant), q
+        peak = max(peak, abs(e[1]), abs(turned[1]))
+        slips.append(e[0])
+        assert abs(e[0]) <= reach
+    left = (max(slips) - min(slips)) / (periods * step)
+    assert left < 0.02 * limit
+    assert limit - left <= peak <= 1.5 * limit
 
 
 def escapes(task, pressure, reaction, path):
