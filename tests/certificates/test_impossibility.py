@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 from fractions import Fraction as F
-from math import acosh, cosh, exp, log, sqrt
+from math import acosh, cosh, exp, log, sinh, sqrt
 
 import mpmath
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from scipy.optimize import linprog
+from scipy.optimize import brentq, linprog
 from scipy.special import erfc
 
 from quakedesign.bounds import LowerBound, UpperBound
@@ -85,6 +85,40 @@ def test_every_bound_is_on_the_side_where_the_claim_is_true():
 
 def exact(value):
     return mpmath.mpf(value.numerator) / value.denominator
+
+
+def answer_in_slip(slip, rate, time):
+    """Of slip to a unit impulse of acceleration, x2' = slip·x1 − rate·x2 with real poles."""
+    root = sqrt(rate * rate / 4 + slip)
+    return exp(-rate * time / 2) * sinh(root * time) / root
+
+
+def test_what_friction_gains_by_its_own_pressure_is_given_away():
+    """X = 2H·h with σ of X, at steps at which σ matters."""
+    s, w, _, middle, m, reach = steep(REAL)
+
+    def sigma(peak, step):
+        return s - m * (2 * peak / step + s * reach + w * peak) / (middle - m * reach)
+
+    for step in (1.0, 10.0):
+        top = 2 * 3.2e-4 * answer_in_slip(s, w, step)
+        exact = brentq(lambda x, t=step: 2 * 3.2e-4 * answer_in_slip(sigma(x, t), w, t) - x, 0, top)
+        found = float(smallest_peak(REAL, F(step)).slip_rate_error)
+        assert exact * (1 - 2e-3) < found <= exact * (1 + 1e-9)
+    assert exact < 0.95 * top
+
+
+def test_a_disturbance_that_asks_for_too_much_pressure_leaves_friction_that_does_not_change():
+    found = smallest_peak(replace(REAL, amplitude=700 * REAL.amplitude), STEP)
+    exact = 2 * 700 * 3.2e-4 * answer_in_slip(-0.4799968, 1.6, 0.184)
+    assert found.slip_error is None
+    assert float(found.slip_rate_error) == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_long_step_of_a_stable_fault_counts_as_a_part_of_it():
+    found = smallest_peak(replace(STEADY, growths=REAL.growths), F(20))
+    exact = 2 * 3.2e-4 * answer_in_slip(-0.4799968, 1.6, 20 / 14)
+    assert float(found.slip_rate_error) == pytest.approx(exact, rel=1e-12)
 
 
 def test_a_delay_counts_as_a_longer_step():
