@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -30,28 +31,25 @@ def limits_lines(found: Limits) -> list[str]:
         f"{_shown(limit.proved_up_to, limit.unit):>16}"
         for limit in found.named().values()
     ]
-    return [*head, *rows, "", *_meaning(found)]
+    return [*head, *rows, "", *(line for said in _meaning(found) for line in wrap(said, 80, subsequent_indent="  "))]
 
 
 def _meaning(found: Limits) -> list[str]:
-    law = found.fault.friction.name
     if found.peak_slip_rate_error.impossible_beyond is None:
         return ["without a disturbance nothing is impossible"]
-    within = "bounded" if found.slip_error is None else f"within {found.slip_error.quantity('m')} of the reference"
+    within = "bounded" if found.slip_error is None else f"within {found.slip_error.quantity('m')}"
     told = [
         "impossible for every controller, linear or not, for some friction of the box",
-        "slip-rate error: even with slip, slip rate and disturbance known up to the",
-        f"  sample, if the slip stays {within}; slip rates may",
-        "  be negative, as in the guarantees",
+        "slip-rate error: even with slip, slip rate and disturbance known up to the sample, if the slip error stays "
+        f"{within}; slip rates may be negative, as in the guarantees",
     ]
     if found.largest_step.impossible_beyond is None:
-        return [*told, f"the others: none is known, since {law} does not make a fault like this unstable in slip"]
+        return [*told, "the others: none is known, since friction's weakening alone does not make this fault unstable"]
     return [
         *told,
         f"the others: withdrawal of at most {UpperBound(found.withdrawal).quantity('Pa', 4)}, "
-        f"D = {float(found.diffusivity):g} m^2/s; a constant push",
-        "  that begins after a sample makes the fault slip until its friction is lost,",
-        "  even if the controller knows everything from the next sample on",
+        f"D = {float(found.diffusivity):g} m^2/s; a constant push that begins after a sample makes the fault slip "
+        "until its friction is lost, even if the controller knows everything from the next sample on",
     ]
 
 

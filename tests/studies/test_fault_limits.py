@@ -111,6 +111,15 @@ def test_without_a_disturbance_nothing_is_impossible():
     assert limits_figure(found).axes[0].get_ylabel().endswith("[m/s]")
 
 
+def test_a_stable_fault_has_a_smallest_peak_and_nothing_else():
+    stiff = dataclasses.replace(REAL, shear_modulus=3e11)
+    found = study(stiff, prove=False)
+    impossible = {name: limit.impossible_beyond for name, limit in found.named().items()}
+    assert impossible.pop("peak_slip_rate_error") > 0
+    assert set(impossible.values()) == {None}
+    assert max(map(len, limits_lines(found))) <= 80
+
+
 def test_the_curve_ends_where_no_controller_holds(designs):
     found = study(REAL, pressure=2e7)
     curve = found.smallest_peaks()
