@@ -2,11 +2,12 @@
 
 import sys
 import types
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import Enum
 from functools import cache, wraps
 from importlib import import_module
 from inspect import Parameter, Signature, isclass, isfunction, signature
+from itertools import islice
 from numbers import Integral, Rational, Real
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -22,6 +23,7 @@ _REMEDIES = {
     "Fraction": "Write Fraction('0.1'), say.",
     "float": "Give it in SI units.",
 }
+_VARIABLE = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
 _MOST_ENTRIES = 16  # of a collection that are looked at, so that a large one costs nothing
 
 
@@ -56,16 +58,34 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(function)
     def checking(*positional: Any, **named: Any) -> Any:
-        try:
-            given = _signature(function).bind(*positional, **named).arguments
-        except TypeError as error:
-            raise ParameterError(f"{_name(function)} cannot be called like this: {error}.") from None
-        for name, value in given.items():
+        for name, value in _given(function, positional, named).items():
             _require(function, name, value)
         return function(*positional, **named)
 
     checking.checks_arguments = True  # type: ignore[attr-defined]
     return checking
+
+
+def _given(function: Callable[..., Any], positional: tuple[Any, ...], named: dict[str, Any]) -> Mapping[str, Any]:
+    """Arguments by name. Binding takes as long as making a small value, so it is left to calls that are not plain."""
+    leading, keywords, required = _names(function)
+    given = dict(zip(leading, positional, strict=False)) | named
+    plain = len(given) == len(positional) + len(named) and named.keys() <= keywords
+    if plain and required <= given.keys():
+        return given
+    try:
+        return _signature(function).bind(*positional, **named).arguments
+    except TypeError as error:
+        raise ParameterError(f"{_name(function)} cannot be called like this: {error}.") from None
+
+
+@cache
+def _names(function: Callable[..., Any]) -> tuple[tuple[str, ...], frozenset[str], frozenset[str]]:
+    """Names of parameters that take a place, that take a name, and that have to be given."""
+    single = {k: p for k, p in _signature(function).parameters.items() if p.kind not in _VARIABLE}
+    leading = tuple(k for k, p in single.items() if p.kind is not Parameter.KEYWORD_ONLY)
+    keywords = frozenset(k for k, p in single.items() if p.kind is not Parameter.POSITIONAL_ONLY)
+    return leading, keywords, frozenset(k for k, p in single.items() if p.default is Parameter.empty)
 
 
 @cache
@@ -112,38 +132,62 @@ def _home(function: Callable[..., Any]) -> Mapping[str, Any]:
 
 
 def _require(function: Callable[..., Any], name: str, value: Any) -> None:
-    parameter, hint = _signature(function).parameters[name], _hint(function, name)
+    parameter, test = _wanted(function, name)
     values = [value]
     if parameter.kind is Parameter.VAR_POSITIONAL:
         values = list(value)
     elif parameter.kind is Parameter.VAR_KEYWORD:
         values = list(value.values())
     for each in values:
-        if each is not parameter.default and not matches(each, hint):
+        if each is not parameter.default and not test(each):
+            hint = _hint(function, name)
             remedies = (_REMEDIES[part] for part in _parts(hint) if part in _REMEDIES)
             raise ParameterError(
                 f"{name} of {_name(function)} must be {_said(hint)}. Received {shown(each)}. {next(remedies, '')}"
             )
 
 
+@cache
+def _wanted(function: Callable[..., Any], name: str) -> tuple[Parameter, Callable[[Any], bool]]:
+    return _signature(function).parameters[name], _test(_hint(function, name))
+
+
 def matches(value: Any, hint: Any) -> bool:
     """Whether a value is of a type; what the type says of the entries of a collection is required of each."""
-    if hint is Any or isinstance(hint, str) or hint is Parameter.empty:
-        return True
+    return _test(hint)(value)
+
+
+@cache
+def _test(hint: Any) -> Callable[[Any], bool]:
+    """Whether a value is of a type, as a function that has taken the type apart already."""
     origin, inner = get_origin(hint), get_args(hint)
+    if hint in (Any, Parameter.empty):
+        return lambda _: True
     if origin in (Union, types.UnionType):
-        return any(matches(value, part) for part in inner)
+        tests = [_test(part) for part in inner]
+        return lambda value: any(test(value) for test in tests)
     if origin is Literal:
-        return value in inner
-    if origin is not None:
-        return _matches_generic(value, origin, inner)
+        return lambda value: value in inner
+    if origin is type:
+        return lambda value: isclass(value) and all(not isclass(part) or issubclass(value, part) for part in inner)
+    if isinstance(origin, type):
+        return callable if issubclass(origin, Callable) else _test_of_collection(origin, inner)  # type: ignore[arg-type]
     if hint is None or hint is type(None):
-        return value is None
-    if not isinstance(hint, type):
-        return True
-    if hint.__name__ in _NUMBERS and isinstance(value, _NUMBERS[hint.__name__]):
-        return not isinstance(value, bool) and (hint is not float or _is_float(value))
-    return isinstance(value, hint) or (hint is bool and type(value).__name__ == "bool")
+        return lambda value: value is None
+    return _test_of_class(hint) if isinstance(hint, type) else lambda _: True
+
+
+def _test_of_class(hint: type) -> Callable[[Any], bool]:
+    numbers = _NUMBERS.get(hint.__name__)
+
+    def test(value: Any) -> bool:
+        if type(value) is hint:
+            return True
+        if numbers is not None and isinstance(value, numbers):
+            return not isinstance(value, bool) and (hint is not float or _is_float(value))
+        return isinstance(value, hint) or (hint is bool and type(value).__name__ == "bool")
+
+    return test
 
 
 def _is_float(value: Any) -> bool:
@@ -154,32 +198,32 @@ def _is_float(value: Any) -> bool:
     return True
 
 
-def _matches_generic(value: Any, origin: Any, inner: tuple[Any, ...]) -> bool:
-    if origin is type:
-        return isclass(value) and all(not isclass(part) or issubclass(value, part) for part in inner)
-    if isinstance(origin, type) and issubclass(origin, Callable):  # type: ignore[arg-type]
-        return callable(value)
-    if isinstance(value, str | bytes) or not _is_one(value, origin):
-        return False
-    if not isinstance(value, Collection):
-        return True
-    if isinstance(value, Mapping) and len(inner) == 2:
-        return all(matches(key, inner[0]) and matches(entry, inner[1]) for key, entry in _some(value.items()))
-    if origin is tuple and inner and Ellipsis not in inner:
-        return len(value) == len(inner) and all(map(matches, value, inner))
-    return all(matches(entry, inner[0]) for entry in _some(value)) if inner else True
+def _test_of_collection(origin: type, inner: tuple[Any, ...]) -> Callable[[Any], bool]:
+    tests = [_test(part) for part in inner if part is not Ellipsis]
+    fixed = origin is tuple and len(tests) == len(inner) > 0
+
+    def test(value: Any) -> bool:
+        if isinstance(value, str | bytes) or not _is_one(value, origin):
+            return False
+        if not isinstance(value, Collection) or not tests:
+            return True
+        if isinstance(value, Mapping) and len(tests) == 2:
+            return all(tests[0](key) and tests[1](entry) for key, entry in islice(value.items(), _MOST_ENTRIES))
+        if fixed:
+            return len(value) == len(tests) and all(each(entry) for each, entry in zip(tests, value, strict=True))
+        return all(map(tests[0], islice(value, _MOST_ENTRIES)))
+
+    return test
 
 
 def _is_one(value: Any, origin: type) -> bool:
     """Whether a collection is of a kind; lists and arrays are tuples and sequences, every mapping is a dictionary."""
+    if type(value) is origin:
+        return True
     if issubclass(origin, Mapping):
         return isinstance(value, Mapping)
     listed = hasattr(value, "__len__") and hasattr(value, "__getitem__") and not isinstance(value, Mapping)
     return isinstance(value, origin) or (issubclass(origin, Sequence) and listed)
-
-
-def _some(entries: Collection[Any]) -> Iterator[Any]:
-    return (entry for _, entry in zip(range(_MOST_ENTRIES), entries, strict=False))
 
 
 def _parts(hint: Any) -> list[str]:
