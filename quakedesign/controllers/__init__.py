@@ -9,6 +9,7 @@ from importlib.resources import files
 from inspect import isabstract
 from pkgutil import iter_modules
 
+from quakedesign.arguments import check_arguments
 from quakedesign.controllers.base import Controller, Law, LoopField, Signals
 from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.errors import UnknownNameError
@@ -160,3 +161,5 @@ def family(name: str) -> tuple[BaseGains, ...]:
         if group["law"] == name
         for gains in group["gains"]
     )
+
+check_arguments(__name__)

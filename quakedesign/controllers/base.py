@@ -20,6 +20,7 @@ from quakedesign.controllers.soundness import (
 )
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
+from quakedesign.text import shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,6 +126,11 @@ class Law(ABC):
     gains: Mapping[str, Fraction]
 
     def __post_init__(self) -> None:
+        if not isinstance(self.gains, Mapping):
+            raise ParameterError(
+                f"gains of {self.name} must be a mapping of name to number. Received {shown(self.gains)}. "
+                "Take from_values for gains in order."
+            )
         if set(self.gains) != set(self.gain_units):
             raise ParameterError(
                 f"{self.name} needs the gains {', '.join(self.gain_units)}. Received {', '.join(self.gains) or 'none'}."

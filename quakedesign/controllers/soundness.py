@@ -33,8 +33,7 @@ def sound_states(states: Mapping[sp.Symbol, int], domain: str) -> dict[sp.Symbol
             f"a state takes both signs. Received {signed[0]}, declared otherwise. Declare it with real=True only."
         )
     most = _HEAVIEST if domain == "cells" else 1
-    weights = {s: sp.sympify(w) for s, w in states.items()}
-    wrong = {s: w for s, w in weights.items() if not (w.is_Integer and 1 <= w <= most)}
+    wrong = {s: w for s, w in states.items() if not 1 <= w <= most}
     if wrong:
         (state, weight), *_ = wrong.items()
         allowed = f"integers from 1 to {most}" if most > 1 else "1"
@@ -42,7 +41,7 @@ def sound_states(states: Mapping[sp.Symbol, int], domain: str) -> dict[sp.Symbol
             f"weights must be {allowed} on {domain}. Received {weight} for {state}. "
             "Multiply all weights by one number, or divide them."
         )
-    return {s: int(w) for s, w in weights.items()}
+    return {s: int(w) for s, w in states.items()}
 
 
 def sound_field(

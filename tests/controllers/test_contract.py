@@ -94,6 +94,12 @@ def test_gains_are_exact_and_in_order(law):
     assert controller == law(gains=dict(reversed(list(zip(law.gain_units, written, strict=True)))))
 
 
+def test_gains_without_names_are_refused(law):
+    for given in (None, 3, ["1"], "1"):
+        with pytest.raises(ParameterError, match=rf"gains of {law.name} must be a mapping.*Take from_values"):
+            law(gains=given)
+
+
 def test_it_cannot_be_changed(law):
     controller = law.from_values(some_gains(law))
     with pytest.raises(TypeError):
