@@ -162,4 +162,5 @@ def family(name: str) -> tuple[BaseGains, ...]:
         for gains in group["gains"]
     )
 
+
 check_arguments(__name__)
