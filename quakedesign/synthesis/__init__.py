@@ -1,6 +1,9 @@
 """Every search: gains with a proof, and verdicts on given gains."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.synthesis.analysis.certify import certify
 from quakedesign.synthesis.design import DESIGNABLE, Design, assess, design
 
 __all__ = ["DESIGNABLE", "Design", "assess", "certify", "design"]
+
+check_arguments(__name__)
