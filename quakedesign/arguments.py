@@ -247,7 +247,7 @@ def _said(hint: Any) -> str:
         return f"a {name.lower()} of {', '.join(_said(part) for part in inner if part is not Ellipsis)}"
     if name == "type":
         return f"a class derived from {', '.join(_said(part) for part in inner)}"
-    return _WORDS.get(name, f"a {name}")
+    return _WORDS.get(name, f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
 
 
 def _name(function: Callable[..., Any]) -> str:

@@ -77,18 +77,22 @@ def test_a_folder_without_results_is_never_replaced(comparison, tmp_path):
         write_folder(comparison, tmp_path / "precious", force=True)
 
 
-def entry(verdict, *premises, controller="a controller", **more):
+FAULT = qd.load_fault("lab-fault")
+CONTROLLER = qd.published("lab-fault")["cta"]
+
+
+def entry(verdict, *premises, controller=CONTROLLER, **more):
     design = Design(
-        fault=None, name="cta", verdict=verdict, controller=controller, certificate=None, premises=tuple(premises)
+        fault=FAULT, name="cta", verdict=verdict, controller=controller, certificate=None, premises=tuple(premises)
     )
     return Entry(label="x", origin="designed", design=design, run=None, **more)
 
 
 def test_a_broken_premise_is_said_with_its_factor():
-    chatter = Premise(name="on_trajectory", required=5.7, certified=1.0, unit="m/s^3", measured=True)
+    chatter = Premise(name="on_trajectory", required=5.75, certified=1.0, unit="m/s^3", measured=True)
     said = headline(entry(Verdict.PROVED, chatter, largest_step=0.012))
     assert said == (
-        "proved in continuous time; this run leaves the premise on |h'| 5.7-fold; "
+        "proved in continuous time; this run leaves the premise on |h'| 5.75-fold; "
         "it would stay inside for T_s up to about 0.012 s"
     )
 

@@ -190,7 +190,7 @@ def test_gains_from_the_literature_are_carried_over_to_other_ranges():
     [
         ({"objective": "speed"}, UnknownNameError, "objective must be one of norm, decay, beta"),
         ({"lipschitz": 0}, ParameterError, "positive bound on"),
-        ({"starts": 0}, ParameterError, "starts and workers"),
+        ({"starts": 0}, ParameterError, "starts must be a whole number from 1"),
         ({"objective": "beta", "bound": -1}, ParameterError, "positive bound on the norm"),
         ({"gain_range": (2, 1)}, ParameterError, "0 < b_m <= b_M"),
         ({"degrees": (-1,)}, ParameterError, "degree of V must be from 5 to 12"),

@@ -175,4 +175,4 @@ def _above(value: Fraction) -> Fraction:
 
 
 def _seconds(value: Fraction) -> str:
-    return f"{float(value):.6g} s"
+    return f"{UpperBound(value):.6g} s"

@@ -20,12 +20,15 @@ from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.synthesis.analysis.parametric_matrix import Matrix, scales_of
 from quakedesign.synthesis.lyapunov.balancing import balance, exponents_of
 from quakedesign.synthesis.lyapunov.parametric_forms import ends_of, rows_of, values_of
-from quakedesign.synthesis.lyapunov.search import SURE, Family
+from quakedesign.synthesis.lyapunov.search import Family
 
 ACCURACY = 1e-10
 """What the solver is asked for unless told."""
-CLEAR = 100 * SURE
-"""Margins above this decide what is chosen once for many points, such as a degree."""
+SURE = 5e-10
+"""Margins above this count as found; the solver's answers are about as accurate as that."""
+CLEAR = 1e-6
+"""Margins above this decide what is chosen once for many points, such as a degree, on every processor alike: kernels of
+linear algebra move margins near zero by up to 2e-9."""
 _TOO_FAR = "the gains are too far apart for a search in floating point."
 _KEPT = 64  # scales whose numbers are kept
 

@@ -4,8 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from quakedesign.synthesis.analysis.parametric_program import Screened
-from quakedesign.synthesis.lyapunov.search import SURE
+from quakedesign.synthesis.analysis.parametric_program import SURE, Screened
 
 TOLERANCE = Fraction(1, 10_000)
 """Relative width of a bracket: the search succeeds at x and not at x(1 + TOLERANCE)."""

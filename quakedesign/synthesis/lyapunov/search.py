@@ -19,8 +19,8 @@ from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov.balancing import balance, below, exponents_of, lifted_scale, scaled
 from quakedesign.synthesis.lyapunov.certify_exactly import bounds_of, claims_of, finish
 
-SURE = 1e-8
-"""Margins above this count as found: near zero they differ by up to 2e-9 between kernels of linear algebra."""
+_WORTH_A_PROOF = 1e-9
+"""Margins above this are worth a proof in exact arithmetic, which decides."""
 _DIGITS = (1 << 14, 1 << 20, 1 << 30)
 _HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # beyond, rounding errors or seconds of search outweigh what is gained
 
@@ -64,7 +64,7 @@ def _of_degree(loop: Loop, degree: int, subject: Subject | None) -> Certificate 
     if family is None:
         return None
     proposal = JointProgram(family.demands).solve(family.demands)
-    if proposal is None or not proposal.margin > SURE:
+    if proposal is None or not proposal.margin > _WORTH_A_PROOF:
         return None
     return finished(loop, family, proposal, scale, subject)
 

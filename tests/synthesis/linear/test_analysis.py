@@ -31,7 +31,7 @@ def test_a_destabilising_gain_is_refuted_at_a_vertex_with_an_unstable_pole():
     assert found.certificates == {}
     matrix = np.array([[float(v) for v in row] for row in loop_for(LAB, bad).matrix(*found.unstable_at)])
     assert np.linalg.eigvals(matrix).real.max() > 0
-    assert "not stable at beta" in why_undecided(loop_for(LAB, bad))
+    assert "not stable near beta" in why_undecided(loop_for(LAB, bad))
 
 
 def test_stable_vertices_without_a_v_are_said_to_be_so():

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import quakedesign as qd
+from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict, certificate_text, parse_certificate
 from quakedesign.certificates.command import check_files
 from quakedesign.certificates.linear_premises import sectors
@@ -49,7 +50,7 @@ def test_the_file_holds_the_bounds_and_is_proved(which, request, tmp_path):
     assert read == certificate
     ((verdict, said),) = check_files([path], "real-fault").values()
     assert verdict == "proved"
-    assert any(f"never exceeds {float(peaks.peak_slip_rate):.6g} m/s" in line for line in said)
+    assert any(f"never exceeds {UpperBound(peaks.peak_slip_rate):.6g} m/s" in line for line in said)
     kinds = {"designed": "feedback of the error", "printed": "feedback of the error or state"}
     assert any(line.endswith(kinds[which]) for line in said)
 
@@ -129,7 +130,7 @@ def test_the_slip_rate_is_read_off_the_rows_under_any_name(designed, tmp_path):
     with_outputs(certificate, {"slip_rate_error": "y", "slip_error": "z"}).save(path)
     ((verdict, said),) = check_files([path], "real-fault").values()
     assert verdict == "proved"
-    assert any(f"never exceeds {float(peaks.peak_slip_rate):.6g} m/s" in line for line in said)
+    assert any(f"never exceeds {UpperBound(peaks.peak_slip_rate):.6g} m/s" in line for line in said)
 
 
 def test_gains_count_by_their_names_not_by_their_order(designed):
