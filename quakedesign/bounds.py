@@ -17,7 +17,7 @@ from quakedesign.rationals import float_above, float_below
 _SPEC = re.compile(
     r"(?P<align>.?[<>^])?(?P<sign>[-+ ]?)(?P<width>([1-9]\d*)?)(\.(?P<digits>\d+))?(?P<kind>[eEfFgG%]?)", re.ASCII
 )
-_PREFIXES = dict(zip(range(-18, 19, 3), "a f p n µ m  k M G T P E".split(" "), strict=True))
+_PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate("a f p n µ m  k M G T P E".split(" "))}
 
 
 class Bound(Fraction):
@@ -46,7 +46,7 @@ class Bound(Fraction):
             Significant ones, at least those before the point.
         """
         _, exponent = self._significant(digits)
-        power = min(max(3 * (exponent // 3), -18), 18) if self else 0
+        power = min(max(3 * (exponent // 3), -18), 18)
         shown = format(type(self)(self / Fraction(10) ** power), f".{max(digits - 1 - exponent + power, 0)}f")
         return f"{_bare(shown)} {_PREFIXES[power]}{unit}"
 
@@ -164,7 +164,7 @@ class Enclosure:
 def _mantissa(number: Decimal, exponent: int, digits: int) -> str:
     """Number over its power of ten, with so many places; exact, since it has no more digits."""
     sign, figures, _ = number.as_tuple()
-    written = "".join(map(str, figures)).ljust(digits + 1, "0")[: digits + 1]
+    written = "".join(map(str, figures)).ljust(digits + 1, "0")
     whole = f"{written[0]}.{written[1:]}" if digits else written[0]
     return f"-{whole}" if sign else whole
 

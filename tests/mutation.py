@@ -26,7 +26,7 @@ import time
 import tomllib
 import types
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -153,7 +153,7 @@ class Mutant:
     text: str
     mutation: str
     code: types.CodeType | None
-    names: list[str] = field(default_factory=list)  # that the statement assigns, none where it is a class
+    names: list[str] = field(default_factory=list)  # that the statement assigns
     function: str = ""
 
     def key(self) -> tuple[str, str, str]:
@@ -169,7 +169,7 @@ def mutants_of(path: Path, *, compiled: bool = True) -> Iterator[Mutant]:
     for top in (top for kind in kinds for top in ast.parse(source).body if isinstance(top, kind)):
         targets = top.targets if isinstance(top, ast.Assign) else [getattr(top, "target", None)]
         names = [node.id for target in targets if target for node in ast.walk(target) if isinstance(node, ast.Name)]
-        names += [top.name] if isinstance(top, ast.FunctionDef) else []
+        names += [top.name] if isinstance(top, ast.FunctionDef | ast.ClassDef) else []
         tree = ast.Module([top], [])
         for parent, name, index, node, flag in list(places(tree, False)):
             for new in (*variants(node, flag), *forced(parent, name, node)):
@@ -212,16 +212,23 @@ def apply(mutant: Mutant, functions: list[types.FunctionType], modules: list[typ
             function.__code__ = codes[key_of(function.__code__)]
     for home in [module for module in modules if getattr(module, "__file__", None) == mutant.path]:
         scope = dict(vars(home))
-        if mutant.names:
-            exec(mutant.code, scope)
+        exec(mutant.code, scope)
         for name in mutant.names:
             old, new = vars(home)[name], scope[name]
-            if isinstance(new, types.FunctionType) and isinstance(old, types.FunctionType):
-                old.__defaults__, old.__kwdefaults__ = new.__defaults__, new.__kwdefaults__
-            elif name != mutant.function:
+            if name == mutant.function:
+                exchange_defaults({name: old}, {name: new})
+                exchange_defaults(vars(old), vars(new))
+            else:
                 for module in modules:
                     if vars(module).get(name) is old:
                         setattr(module, name, new)
+
+
+def exchange_defaults(old: Mapping[str, object], new: Mapping[str, object]) -> None:
+    """Give functions the defaults of others of the same name."""
+    for name, function in old.items():
+        if isinstance(function, types.FunctionType) and isinstance(new.get(name), types.FunctionType):
+            function.__defaults__, function.__kwdefaults__ = new[name].__defaults__, new[name].__kwdefaults__
 
 
 # ---------------------------------------------------------------- running tests

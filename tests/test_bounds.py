@@ -37,6 +37,17 @@ def last_place(text, figures):
     return F(10) ** (int(exponent or 0) - places)
 
 
+def outside_by_less_than_a_unit(kind, number, spec):
+    """Whether the text lies on the outer side of the number, within a unit of its last digit."""
+    text = format(kind(number), spec).strip(" _")
+    scale = 100 if text.endswith("%") else 1
+    text = text.removesuffix("%")
+    beyond = (F(text) / scale - number) * (1 if kind is UpperBound else -1)
+    digits = int(spec.rstrip("eEfFgG%").partition(".")[2] or 6)
+    general = spec == "" or spec[-1] not in "eEfF%"
+    return 0 <= beyond < last_place(text, max(digits, 1) if general else 0) / scale
+
+
 @given(KINDS, NUMBERS, SPECS)
 @example(UpperBound, F("0.9999996"), ".6g")
 @example(LowerBound, F("-0.9999996"), ".6g")
@@ -45,13 +56,16 @@ def last_place(text, figures):
 @example(UpperBound, F(-1, 10**9), ".2f")
 @example(UpperBound, F(5e-324), "")
 def test_every_format_prints_on_the_outer_side_within_a_unit_of_the_last_digit(kind, number, spec):
-    text = format(kind(number), spec).strip(" _")
-    scale = 100 if text.endswith("%") else 1
-    text = text.removesuffix("%")
-    beyond = (F(text) / scale - number) * (1 if kind is UpperBound else -1)
-    digits = int(spec.rstrip("eEfFgG%").partition(".")[2] or 6)
-    general = spec == "" or spec[-1] not in "eEfF%"
-    assert 0 <= beyond < last_place(text, max(digits, 1) if general else 0) / scale
+    assert outside_by_less_than_a_unit(kind, number, spec)
+
+
+@pytest.mark.parametrize("letter", "efg%")
+@pytest.mark.parametrize("kind", [UpperBound, LowerBound])
+def test_every_number_of_digits_is_on_the_outer_side(kind, letter):
+    for number in map(
+        F, ("1/3", "-2/3", "1.25", "9.9996", "-0.00012345678", "123456.789", "-12345678901", "1/7000000")
+    ):
+        assert all(outside_by_less_than_a_unit(kind, number, f".{digits}{letter}") for digits in range(10))
 
 
 @given(KINDS, st.integers(-(10**15), 10**15), st.integers(-30, 10), st.integers(0, 14), st.sampled_from("eEfFgG"))
@@ -83,6 +97,11 @@ def test_examples_by_hand():
     assert f"{UpperBound('20134567').quantity('Pa')}, {LowerBound('0.000999999').quantity('m/s', 2)}" == (
         "20.2 MPa, 999 µm/s"
     )
+    assert f"{LowerBound('0.00012')} {LowerBound('0.000012')} {LowerBound(10):.1g} {LowerBound(10):.2g}" == (
+        "0.00012 1.2e-05 1e+01 10"
+    )
+    assert f"{UpperBound('1/3'):<6.2f}{UpperBound('1/3'):_^8.2f}{UpperBound('1/3'):6.2f}" == "0.34  __0.34__  0.34"
+    assert UpperBound(0).quantity("Pa") == "0 Pa"
     assert (str(LowerBound("2/3")), repr(UpperBound("2/3"))) == ("0.666666", "UpperBound('0.666667')")
     assert float(UpperBound(F(1, 10))) == 0.1  # the float nearest to 1/10 lies above it
     assert float(LowerBound(F(1, 10))) == math.nextafter(0.1, 0)
@@ -110,5 +129,6 @@ def test_an_enclosure_still_contains_what_it_encloses_when_printed():
     found = Enclosure.of(F(1, 3), F(2, 3))
     assert f"{found:.2g}" == "0.33 to 0.67"
     assert str(found) == "0.333333 to 0.666667"
+    assert str(Enclosure.of(F(1), F(1))) == "1 to 1"
     with pytest.raises(ParameterError, match="from low to high"):
         Enclosure.of(F(1), F(0))

@@ -59,3 +59,30 @@ def test_code_is_changed_in_one_place_at_a_time(tmp_path):
     assert [mutant.text for mutant in found][-1] == "LIMIT = 7"
     assert len({mutant.code for mutant in found}) == len(MUTATIONS)
     assert ast.parse(module.read_text())
+
+
+CLASS = """
+from dataclasses import dataclass
+
+
+@dataclass
+class Size:
+    value: int = 3
+
+    def times(self, factor: int = 5) -> int:
+        return self.value * factor
+"""
+
+
+def test_defaults_of_fields_and_methods_are_changed_in_place(tmp_path):
+    path = tmp_path / "size.py"
+    path.write_text(CLASS)
+    specification = importlib.util.spec_from_file_location("size", path)
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    size = module.Size
+    found = {mutant.mutation: mutant for mutant in tool.mutants_of(path)}
+    for mutation, product in (("3 → 4", 4 * 5), ("5 → 6", 3 * 6), ("5 → 10", 3 * 10)):
+        tool.apply(found[mutation], [size.times], [module])
+        assert size().times() == product
+    assert size(2).times(7) == 14
