@@ -16,7 +16,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
-from importlib.util import module_from_spec, spec_from_file_location
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import module_from_spec
 from itertools import accumulate, chain, product
 from math import comb, lcm, prod
 from pathlib import Path
@@ -1354,11 +1355,12 @@ def check(text: str) -> Result:
 def check_guarantee(document: dict[str, Any]) -> Result:
     """Verify a file of the kind ``guarantee``, by the module beside this one."""
     need(document["kind"] == "guarantee", "kind", "guarantee", document["kind"])
-    specification = spec_from_file_location("guarantee", Path(__file__).with_name("guarantee.py"))
-    if specification is None or specification.loader is None or specification.origin is None:
+    path = Path(__file__).with_name("guarantee.py")
+    if not path.is_file():
         raise OSError("guarantee.py must stand beside check.py")
-    module = sys.modules[specification.name] = module_from_spec(specification)
-    specification.loader.exec_module(module)
+    loader = SourceFileLoader("guarantee", str(path))
+    module = sys.modules[loader.name] = module_from_spec(ModuleSpec(loader.name, loader))
+    loader.exec_module(module)
     try:
         return Result("proved", tuple(module.verify(document)))
     except module.Refused as error:

@@ -212,7 +212,7 @@ def loop_of(
 
 
 def root_enclosure(number: Fraction) -> Range:
-    """Rational interval around the square root of a number ≥ 0: a point if rational, else of relative width 1e-6.
+    """Rational interval around the square root of a number ≥ 0: a point if rational, else of relative width 2e-6.
 
     Raises
     ------
@@ -270,7 +270,7 @@ def unit_ranges(loop: Loop, units: Mapping[str, sp.Expr]) -> dict[str, Range]:
     values = {**{n: (v, v) for n, v in loop.parameters.items()}, **{n: ends for n, (_, ends) in loop.roots.items()}}
     found: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))
     for state, unit in units.items():
-        ball = enclose(unit, {s: values[s.name] for s in unit.free_symbols if isinstance(s, sp.Symbol)})
+        ball = enclose(unit, {s: values[str(s)] for s in unit.free_symbols})
         low, high = (fraction_of(end.fmpq()) for end in (ball.lower(), ball.upper()))
         require(low > 0, f"the unit of {state} must be positive. Received {unit}.")
         found[state] = (low, high)

@@ -52,12 +52,12 @@ def in_error_coordinates(model: LoopField) -> LoopField:
 
 
 def _control_factor(model: LoopField, integrals: Sequence[sp.Symbol]) -> sp.Expr:
-    """What multiplies k·ξ in x2′, the same for every integral."""
+    """What multiplies k·ξ in x2′, the same for every integral; zero where none acts."""
     rate = list(model.states)[1]
     found = {sp.expand(model.field[rate]).coeff(xi).subs(dict.fromkeys(model.gains, 1)) for xi in integrals} - {0}
     if len(found) > 1:
         raise CertificateError("error coordinates need integrals that act through one control.")
-    return found.pop() if found else sp.Integer(1)
+    return sum(found, sp.Integer(0))
 
 
 def _split(expression: sp.Expr, integrals: Sequence[sp.Symbol]) -> tuple[sp.Expr, sp.Expr]:

@@ -49,7 +49,7 @@ class LevelSets:
         loop = self.certificate.loop
         first, second, *rest = (loop.symbols[s] for s in loop.states)
         units = {loop.symbols[s]: low for s, (low, _) in error_units(loop, self.model).items()}
-        sizes = {first: slip, second: rate, **dict.fromkeys(rest[:-1], Fraction(0)), rest[-1]: matched}
+        sizes = {first: slip, second: rate, **dict.fromkeys(rest, Fraction(0)), rest[-1]: matched}
         sizes = {symbol: size / units[symbol] for symbol, size in sizes.items()}
         box = {symbol: (-v / self.scale, v / self.scale) for symbol, v in sizes.items()}
         return _top(enclose(from_terms(self.certificate.lyapunov, loop.symbols), box))
@@ -61,7 +61,7 @@ class LevelSets:
         for state, weight in loop.states.items():
             gamma = self.certificate.claims[f"bound_{state}"]
             quotient = enclose((_BASE / _OTHER) ** self._power(weight), {_BASE: (level,) * 2, _OTHER: (gamma,) * 2})
-            sizes[state] = _top(quotient) if level else level
+            sizes[state] = _top(quotient)
         box = {loop.symbols[s]: (-v, v) for s, v in sizes.items()} | {
             loop.symbols[n]: ends for n, ends in loop.uncertain.items()
         }
@@ -81,10 +81,10 @@ class LevelSets:
         loop = self.certificate.loop
         function, found = from_terms(self.certificate.lyapunov, loop.symbols), []
         for state, weight in loop.states.items():
-            rest = {loop.symbols[s]: 0 for s in loop.states if s != state}
-            peak = max(_top(enclose(function.subs(rest | {loop.symbols[state]: sign}), {})) for sign in (1, -1))
+            alone = ({loop.symbols[s]: sign * (s == state) for s in loop.states} for sign in (1, -1))
+            peak = max(_top(enclose(function.subs(point), {})) for point in alone)
             size = enclose((_BASE / _OTHER) ** self._power(weight), {_BASE: (level,) * 2, _OTHER: (peak,) * 2})
-            found.append(self.scale * _bottom(size) * error_units(loop, self.model)[state][0] if level else level)
+            found.append(self.scale * _bottom(size) * error_units(loop, self.model)[state][0])
         return tuple(found)
 
     def _power(self, weight: int) -> sp.Rational:

@@ -74,7 +74,7 @@ def sectors(fault: Fault) -> Sectors:
     one_sided = positive and friction.weakens
     slip = ((Fraction(0) if one_sided else -slip_chord) - k[1] + slip_growth, slip_chord - k[0] + slip_growth)
     rate = (eta[0] - rate_chord - rate_growth, eta[1] + rate_chord - rate_growth)
-    nominal = {name: _fraction(v) for name, v in plant.plant_values(fault).items()}
+    nominal = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
     return Sectors(
         authority=b,
         beta=coefficient_range(fault, b),
@@ -137,10 +137,8 @@ def rest_pressure(
     box = box | {_drift: (Fraction(0), drift)}
     step, ends = (slip[1] - slip[0]) / pieces, list[Fraction]()
     for n in range(pieces if step else 1):
-        part = box | {_r: (slip[0] + n * step, slip[0] + (n + 1) * step)}
-        if not nominal:
-            part |= {_mu: _friction_at(fault, part[_r])}
-        found = enclose(expression, part)
+        part = (slip[0] + n * step, slip[0] + (n + 1) * step)
+        found = enclose(expression, box | {_r: part, _mu: _friction_at(fault, part)})
         if not found.is_finite():
             raise ParameterError("no finite pressure at rest was found. Positive friction is expected. Narrow the box.")
         ends += [_end(found.lower()), _end(found.upper())]
@@ -281,8 +279,3 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
             note="inside the limits of the law; the proof is about deviations that do not reach them",
         )
     ]
-
-
-def _fraction(value) -> Fraction:
-    exact = sp.nsimplify(value, rational=True)
-    return fraction_of(exact)

@@ -1,6 +1,5 @@
 """What the matched perturbation h of a fault asks for, with and without feed-forward. Ball arithmetic only."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -41,7 +40,7 @@ def friction_range(fault: Fault) -> Range:
 
 def plant_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
     """Ranges of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] over the uncertainty box; σ'_n [Pa] is known."""
-    values = {symbol: _fraction(v) for symbol, v in plant.plant_values(fault).items()}
+    values = {symbol: fraction_of(v) for symbol, v in plant.plant_values(fault).items()}
     widths = {plant.k_hat: fault.box.stiffness, plant.eta_hat: fault.box.damping, plant.N_hat: fault.box.authority}
     return {s: (v * (1 - widths.get(s, 0)), v * (1 + widths.get(s, 0))) for s, v in values.items()}
 
@@ -105,9 +104,7 @@ def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedFo
 def _insert(h: sp.Expr, value: sp.Expr, force: sp.Expr) -> sp.Expr:
     """Stand-ins for μ and φ̂_e where they act."""
     kinds = {plant.mu: value, plant.disturbance: force}
-    return h.replace(
-        lambda e: isinstance(e, sp.core.function.AppliedUndef) and e.func in kinds, lambda e: kinds[e.func]
-    )
+    return h.replace(lambda e: e.func in kinds, lambda e: kinds[e.func])
 
 
 def _named(h: sp.Expr) -> sp.Expr:
@@ -156,7 +153,8 @@ def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
 
 def static_friction(fault: Fault) -> Fraction:
     """μ* [-], friction at rest where the fault starts, exact or rounded."""
-    return _fraction(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)))
+    start = fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0))
+    return fraction_of(sp.nsimplify(start, rational=True))
 
 
 @lru_cache(maxsize=256)
@@ -194,24 +192,7 @@ def largest_sensitivities(
     return upper_bound(first, box, pieces=pieces), upper_bound(second, box, pieces=pieces)
 
 
-def shares(expression: sp.Expr, box: Mapping[sp.Symbol, Range], kinds: Mapping[str, tuple[sp.Symbol, ...]]):
-    """Rigorous bound on what each kind of symbols contributes to an expression, largest first.
-
-    The symbols of all other kinds are set to zero.
-    """
-    found = {}
-    for kind in kinds:
-        others = {s: 0 for other, group in kinds.items() if other != kind for s in group}
-        found[kind] = upper_bound(expression.subs(others), box, pieces=60)
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
-
-
 def initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
     """Bound on |h| at t = 0, x = 0: the disturbance over β, friction at its static value; no feed-forward there."""
     static, least = static_friction(fault), plant_ranges(fault)[plant.N_hat][0]
     return rational(fault.disturbance.largest_explicit) * divisor / (static * least)
-
-
-def _fraction(value: sp.Rational) -> Fraction:
-    exact = sp.nsimplify(value, rational=True)
-    return fraction_of(exact)

@@ -319,7 +319,7 @@ def with_decay(obligations: Obligations, cell: Cell, one: Obligation, rate: Frac
         return {(*e, 0): c for e, c in p.items()}
 
     return Obligation(
-        name=one.name.replace("decrease", "decay", 1),
+        name="decay" + one.name.removeprefix("decrease"),
         polynomial=less(wider(one.polynomial), rate, {(*(0,) * (width - 1), n): Fraction(1)}),
         equalities=(*map(wider, one.equalities), less(last, Fraction(1), potential)),
         inequalities=tuple(map(wider, one.inequalities)),

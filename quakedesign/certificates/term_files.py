@@ -46,7 +46,7 @@ def _term(raw: Any, loop: Loop, powers: Sequence[str]) -> Term:
 def _factor(raw: Any, powers: Sequence[str]) -> tuple[str, Fraction, str]:
     state, exponent, kind = listed(raw, "a factor", length=3)
     power = read_rational(exponent)
-    need(isinstance(state, str) and state in powers, "a factor has an unknown state")
+    need(state in powers, "a factor has an unknown state")
     need(
         kind in ("s", "a") and 0 <= power <= 24 and (kind == "s" or power > 0), "a factor has a wrong kind or exponent"
     )

@@ -88,3 +88,12 @@ def test_integrals_act_through_one_control():
     apart = linear(lambda x1, x2, a, b, k1, k2, k3: (x2, -x1 - k1 * a - 2 * k2 * b, x1, a), "x1 x2 xi1 xi2")
     with pytest.raises(CertificateError, match="one control"):
         in_error_coordinates(apart)
+
+
+def test_an_integral_of_an_integral_may_act_alone():
+    moved = in_error_coordinates(
+        linear(lambda x1, x2, a, b, k1, k2, k3: (x2, -x1 - 3 * k1 * a, b, x1), "x1 x2 xi1 xi2")
+    )
+    e1, e2, zeta, chi = moved.states
+    k1, *_ = moved.gains
+    assert [sp.expand(moved.field[s]) for s in moved.states] == [e2, -e1 - 3 * zeta, chi, k1 * e1]

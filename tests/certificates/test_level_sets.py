@@ -169,3 +169,15 @@ def test_the_unit_of_the_slip_is_uncertain_too():
     assert about(sets.errors(LEVEL).slip, F(24))
     assert about(sets.starts(LEVEL)[0], 16 * F(7, 5), below=True)
     assert about(sets.level_of(slip=16 * F(7, 5), matched=F(0)), F(64))
+
+
+def test_the_level_zero_is_the_origin_alone():
+    sets = LevelSets(certificate(), SCALE)
+    found = sets.errors(F(0))
+    assert (found.slip, found.rate, found.acceleration) == (0, 0, 0)
+    assert sets.starts(F(0)) == (0, 0, 0)
+
+
+def test_a_start_is_at_rest_unless_told():
+    sets = LevelSets(certificate(), SCALE)
+    assert sets.level_of(matched=F(6)) == sets.level_of(slip=F(0), rate=F(0), matched=F(6)) == sets.level(F(6))

@@ -1,5 +1,6 @@
 """What a certificate says about a fault comes from its rows and its field, never from what they are called."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
 
@@ -46,6 +47,13 @@ def test_terms_that_add_up_and_gains_in_a_row_are_numbers_too():
     assert meaning(LOOP, halves) == "slip_rate_error"
     by_name = (Term(F(2, 5), ("k2",), (("e2", F(1), "s"),)),)
     assert meaning(LOOP, by_name) == "slip_rate_error"
+
+
+def test_a_loop_without_integrals_has_the_same_rows():
+    e2 = tuple(t for t in LOOP.field["e2"] if not any(state == "zeta" for state, *_ in t.factors))
+    short = replace(LOOP, states={"e1": 1, "e2": 1}, field={"e1": LOOP.field["e1"], "e2": e2})
+    assert meaning(short, row(e1=1)) == "slip_error"
+    assert meaning(short, row(e1=-7, e2=F(-5, 2))) == "pressure_offset"
 
 
 def test_a_loop_in_other_coordinates_has_no_such_rows():

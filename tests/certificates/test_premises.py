@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction as F
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,12 +13,18 @@ from quakedesign.certificates.premises import (
     Errors,
     LevelSets,
     Premise,
+    Variant,
+    _level_set,
     coefficient_range,
+    control_coefficient,
+    feedforward_variants,
     largest_matched_rate,
     least_authority,
+    matched_rate_premise,
     sliding_mode_premises,
 )
 from quakedesign.controllers import control_law, published
+from quakedesign.controllers.feed_forward import FEED_FORWARDS, feed_forward
 from quakedesign.errors import CertificateError
 from quakedesign.fault import Disturbance
 
@@ -189,3 +196,120 @@ def test_a_linear_certificate_of_another_fault_is_refused(real):
     design = qd.design(real, "elqr")
     with pytest.raises(CertificateError, match="another fault"):
         linear_premises(replace(real, density=2600.0), design.controller, design.certificate)
+
+
+# ---------------------------------------------------------------- numbers of the premises, by hand
+
+
+@pytest.mark.parametrize(
+    ("certified", "required"),
+    [((F(1, 8), F(2)), F(3353, 4706)), ((F(9, 20), F(2)), F(9, 10) * 2), ((F(11, 20), F(3)), F(11, 10) * 3)],
+)
+def test_both_ends_of_beta_count(real, certified, required):
+    # with twice the designed divisor beta is from 1/2 to 3353/4706 = 0.7125
+    found = control_coefficient(real, 2 * least_authority(real), certified)
+    assert (found.required, found.certified, found.ratio) == (required, certified[1], required / certified[1])
+    assert found.holds is (certified[0] <= F(1, 2))
+    assert found.note.startswith("β from 0.5 to 0.712495; certified from 0.")
+    assert found.note.endswith(f"certified from {float(certified[0])}")
+
+
+def law_of(fault, name="none", scale=F(1)):
+    law = control_law("cta").from_values(("7", "5", "2.3", "1.1"), divisor=least_authority(fault)).scaled(scale)
+    return law.with_feedforward(feed_forward(name, fault, law.divisor))
+
+
+def test_the_certified_rate_grows_with_the_scale_of_the_gains(real, monkeypatch):
+    monkeypatch.setattr("quakedesign.certificates.premises.largest_matched_rate", lambda *_, **__: F(3))
+    law = law_of(real, "nominal", F(4))
+    found = matched_rate_premise(real, law, "x", ZERO, F(1, 2), "on a set")
+    assert (found.required, found.certified, found.ratio, found.holds) == (3, 2, F(3, 2), False)
+    assert found.note == "on a set; with nominal feed-forward"
+    assert matched_rate_premise(real, law, "x", ZERO, F(3, 4), "").holds
+    without = matched_rate_premise(real, law_of(real, scale=F(100)), "x", ZERO, None, "on a set")
+    assert without.certified == law_of(real, scale=F(100)).lipschitz_limit > 3
+    assert not without.holds
+    assert without.note == "on a set; no certificate: compared with the limit that no V can exceed"
+
+
+@pytest.fixture
+def stubs(monkeypatch):
+    """Searches replaced by their names, so that only what is put together from them is looked at."""
+    module = "quakedesign.certificates.premises."
+    monkeypatch.setattr(module + "largest_matched_rate", lambda *_, **__: F(1, 10**9))
+    monkeypatch.setattr(module + "robustness", lambda certificate, model: ("robust", model))
+    monkeypatch.setattr(module + "certified_domain", lambda question: ("domain", question.robustness))
+    monkeypatch.setattr(module + "_level_set", lambda question: ("level set", question.robustness))
+
+
+def test_a_certificate_with_bounds_has_a_level_set_and_a_domain(real, proof, stubs):
+    law = law_of(real)
+    premises, domain = sliding_mode_premises(real, law, proof)
+    assert [getattr(p, "name", p) for p in premises] == [
+        "control_coefficient", "along_reference", ("level set", ("robust", law.loop_field())),
+    ]  # fmt: skip
+    assert domain == ("domain", ("robust", law.loop_field()))
+    assert all(p.holds for p in premises[:2])
+
+
+@pytest.mark.parametrize("state", ["e1", "e2", "e3"])
+def test_a_certificate_without_every_bound_has_neither(real, proof, stubs, state):
+    less = replace(proof, claims={k: v for k, v in proof.claims.items() if k != f"bound_{state}"})
+    assert len(less.claims) == len(proof.claims) - 1
+    premises, domain = sliding_mode_premises(real, law_of(real), less)
+    assert [p.name for p in premises] == ["control_coefficient", "along_reference"]
+    assert domain is None
+
+
+def test_a_refutation_and_no_certificate_prove_no_premise(real, proof, stubs):
+    for nothing in (None, replace(proof, refutation=object())):
+        premises, domain = sliding_mode_premises(real, law_of(real), nothing)
+        assert [(p.name, p.proved, p.holds) for p in premises] == [("along_reference", False, False)]
+        assert domain is None
+        variants = feedforward_variants(real, law_of(real), nothing)
+        assert [v.feedforward.name for v in variants] == list(FEED_FORWARDS)
+        assert [len(v.premises) for v in variants] == [1] * len(FEED_FORWARDS)
+
+
+def test_the_certificate_of_another_law_is_refused(real, proof, stubs):
+    other = replace(proof, loop=replace(proof.loop, law="dia"))
+    with pytest.raises(CertificateError, match="other gains"):
+        sliding_mode_premises(real, law_of(real), other)
+
+
+def test_a_variant_in_plain_values(real):
+    premise = Premise(name="x", required=0.0, certified=1.0, unit="-")
+    plain = Variant(feedforward=law_of(real).feedforward, premises=(premise,), domain=None).to_dict()
+    assert plain["domain"] is None
+    assert plain["premises"] == [premise.to_dict()]
+    domain = SimpleNamespace(to_dict=lambda: {"level": 1})
+    assert Variant(feedforward=law_of(real).feedforward, premises=(), domain=domain).to_dict()["domain"] == {"level": 1}
+
+
+@pytest.mark.parametrize(
+    ("parts", "whole", "required", "certified"),
+    [
+        ({"slip": F(1, 4), "rate": F(1, 8)}, F(1, 2), F(3, 8), 1),
+        ({"slip": F(1, 4), "rate": F(1, 8)}, F(3, 8), F(7), F(1)),
+        ({"slip": F(1, 4), "rate": F(1, 8)}, F(1, 4), F(7), F(1)),
+        (None, F(3), F(7), F(1)),
+        ({}, F(3), F(7), F(1)),
+    ],
+)
+def test_the_closer_one_of_two_methods_counts_on_a_level_set(
+    real, proof, monkeypatch, parts, whole, required, certified
+):
+    module = "quakedesign.certificates.premises."
+    monkeypatch.setattr(module + "largest_matched_rate", lambda fault, divisor, errors, **_: F(7) * errors.slip)
+    monkeypatch.setattr(module + "initial_perturbation", lambda fault, divisor: F(5))
+    sets = SimpleNamespace(level=lambda matched: 3 * matched, errors=lambda level: Errors(slip=level / 15, rate=F(2)))
+    question = SimpleNamespace(
+        fault=real, controller=law_of(real, "nominal"), certificate=proof, sets=sets,
+        split=lambda level: parts if level == 15 else None, whole=lambda level: whole,
+    )  # fmt: skip
+    found = _level_set(question)
+    assert (found.name, found.required, found.certified) == ("level_set", required, certified)
+    assert found.note.startswith("rigorous on the level set of V that holds the start: |e1| <= 1 m, |e2| <= 2 m/s")
+    assert found.note.endswith("; with nominal feed-forward")
+    assert ("share of the decrease" in found.note) is (required == F(3, 8))
+    assert found.holds is (required <= 1)

@@ -188,3 +188,17 @@ def test_without_one_of_both_bounds_nothing_is_said(missing, monkeypatch):
     found = iter([None, F(1)] if missing == 0 else [F(1), None])
     monkeypatch.setattr("quakedesign.certificates.robustness.largest_ratio", lambda _: next(found))
     assert robustness(certificate()) is None
+
+
+def test_what_lowers_a_function_is_not_counted_in_its_size():
+    """V = e1^2 + e2^2 - |e1||e2| is at most 1 (u^2 + w^2); with its negative term counted it would be 1/2."""
+    less = replace(certificate(decrease=3), lyapunov=(*certificate().lyapunov, product(-1, "a")))
+    assert float(decay_by_norms(less)) == pytest.approx(3, rel=1e-9)
+
+
+def test_where_no_largest_ratio_is_found_nothing_is_said(monkeypatch):
+    monkeypatch.setattr("quakedesign.certificates.robustness.largest_ratio", lambda problems: None)
+    one = certificate(decay="1/2")
+    nested = replace(one.loop, lifts={"n": (power(1, "e1", 1, "s"),)})
+    assert robustness(one) is None
+    assert robustness(replace(one, loop=nested)) is None

@@ -137,6 +137,29 @@ def test_a_root_lies_within_a_millionth(number):
     assert high - low <= low / 10**5
 
 
+@pytest.mark.parametrize("number", [F(2), F(8), F(3, 2), F(2**15 - 1), F(1, 2**15 + 1), F(2**25 + 1, 2**24 - 1)])
+def test_a_root_is_two_millionths_wide_and_no_longer_than_that_takes(number):
+    low, high = root_enclosure(number)
+    assert low**2 < number < high**2
+    assert high - low <= low * F(2, 10**6)
+    assert (high - low).numerator == 1
+    assert low.numerator.bit_length() <= 21
+
+
+def test_the_root_of_a_large_number_lies_between_neighbouring_integers():
+    assert root_enclosure(F(10**40 + 1)) == (10**20, 10**20 + 1)
+
+
+def test_a_root_may_be_that_of_a_constant():
+    x, c, r = sp.symbols("x c r", real=True)
+    model = LoopField(
+        states={x: 1}, field={x: -r * x}, gains=(), constants=(c,), uncertain=(), domain="reals", roots={r: c}
+    )  # fmt: skip
+    assert loop_of("own", model, gains={}, constants={"c": F(49, 4)}, uncertain={}).roots == {
+        "r": ("c", (F(7, 2), F(7, 2)))
+    }
+
+
 def test_a_rational_root_is_a_point_and_a_negative_number_has_none():
     assert root_enclosure(F(25, 16)) == (F(5, 4), F(5, 4))
     assert root_enclosure(F(0)) == (0, 0)

@@ -60,6 +60,12 @@ def test_the_inputs_of_a_moving_reference_by_hand():
     assert set(tracking_inputs(REAL, replace(LAW, feedback="error"), needed)) == {"force", "drift"}
 
 
+def test_in_a_quick_task_the_third_derivative_counts_too():
+    quick = replace(REAL, reference=replace(REAL.reference, operation_time=1.0), sampling_time=1e-3)
+    found = tracking_inputs(quick, LAW, sectors(REAL))
+    assert covers(found["drift_rate"], TARGET * (1.88e9 * 10 / sqrt(3) + 5.79e8 * 60))
+
+
 def test_the_drift_is_that_of_the_worst_friction_but_for_a_tenth():
     # friction falls as steeply as the box allows and ends where r' is largest; p* by hand from the balance at rest
     law, N, sigma, task = REAL.friction, REAL.authority, REAL.effective_normal_stress, REAL.reference

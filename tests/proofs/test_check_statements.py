@@ -431,3 +431,26 @@ def test_a_product_beyond_the_degree_is_left_out():
     beyond = POLYNOMIALS.file({"2": "1", "0": "-1"}, "not-sos", functional, names="x", on=[{"12": "1"}])
     beyond["products"] = [[], [0]]
     assert POLYNOMIALS.verify(beyond).verdict == "refuted"
+
+
+def test_a_diagonal_entry_that_is_dropped_hinders_nothing_and_frees_only_what_it_hindered():
+    # on 1 + x^2 >= 0, squares in (1, x, x^2): x^6 has the entry of x^2 alone, so that goes; x^4 = 1 * x^4 of the plain
+    # squares still balances the entry of x
+    bases, factors = {(): [0, 4], (0,): [0, 1, 2]}, {(): {0: 1}, (0,): {0: 1, 2: 1}}
+    assert checker.reduce(bases, factors, {0, 2, 8}) == {(): {0, 4}, (0,): {0, 1}}
+    assert checker.reduce(bases, factors, {0, 8}) == {(): {0, 4}, (0,): set()}
+
+
+def test_a_file_of_a_kind_is_a_guarantee():
+    with pytest.raises(checker.Refused, match="kind must be guarantee"):
+        checker.check('{"format": 1, "kind": "other"}')
+    with pytest.raises(checker.Refused, match="fault, reference"):
+        checker.check('{"format": 1, "kind": "guarantee"}')
+
+
+def test_a_guarantee_needs_the_module_beside_the_checker(tmp_path, capsys):
+    (tmp_path / "check.py").write_text(PATH.read_text())
+    (tmp_path / "guarantee.json").write_text('{"format": 1, "kind": "guarantee"}')
+    alone = module("checker_alone", tmp_path / "check.py")
+    assert alone.main([str(tmp_path / "guarantee.json")]) == 2
+    assert "guarantee.py must stand beside check.py" in capsys.readouterr().err
