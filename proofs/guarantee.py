@@ -19,6 +19,8 @@ DOUBLINGS = 12  # at most 4096 periods are summed
 SHARE = 256  # what is left of the past after those is below a 256th
 MAX_STATES, MAX_LAW_STATES, MAX_PERIODS, MAX_DEGREE = 20, 12, 8, 12
 MAX_WORK = 3 * 10**7  # products of integers
+STRETCHES, PARTS = 128, 6  # of time without samples, each of 2^PARTS pieces
+LATE = 1 << 12  # what is left of the past after those is below a 4096th
 LARGEST = 1 << 2 * BITS  # entries beyond 2^BITS
 HALVINGS = 7
 
@@ -221,7 +223,7 @@ def effective_stress(
 
 @dataclass
 class Loop:
-    """Flow x' = Ax, then events (map, time until the next one), and the directions of both inputs."""
+    """Flow x' = Ax, then events (map, time until the next one; none in continuous time), and both inputs."""
 
     flow: list[Row]
     events: list[tuple[list[Row], Fraction]]
@@ -232,13 +234,12 @@ class Loop:
 
 def read_loop(value: Any, task: Task) -> Loop:
     """Build the error loop: e1, e2, the law's states, pressures on their way, valve, with a lag the fault's."""
+    if type(value) is dict and "rates" in value:
+        return read_continuous(value, task)
     given = keys(value, "loop", "step", "delay", "lag", "states", "update", "measured", "output", "feedback")
     step, delay, lag = (number(given[k], k) for k in ("step", "delay", "lag"))
     need(step > 0 and 0 <= delay <= MAX_PERIODS * step and lag >= 0, "step > 0, delay of 0 to 8 steps, lag >= 0")
-    names = given["states"]
-    sound = type(names) is list and len(names) <= MAX_LAW_STATES and all(type(v) is str for v in names)
-    need(sound and all(NAME.fullmatch(v) for v in names) and len(set(names)) == len(names), "states must be names")
-    n = len(names)
+    n = count_states(given["states"])
     update, seen = matrix(given["update"], "update", n, n), matrix(given["measured"], "measured", n, 2)
     output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2)
     whole, part = delay // step, delay % step
@@ -266,12 +267,35 @@ def read_loop(value: Any, task: Task) -> Loop:
         arrival[valve] = unit(size)[valve - 1]
         events.append((arrival, step - part))
     pressures = [Fraction(0)] * (2 + n) + [Fraction(-1)] * (waiting + 1) + [Fraction(0)] * (lag > 0)
-    drift = [*pressures[:2], *(-v / task.b for v in steady_states(update, output)), *pressures[2 + n :]]
+    still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(update)]
+    drift = [*pressures[:2], *(-v / task.b for v in steady_states(still, output)), *pressures[2 + n :]]
     push = [Fraction(i >= valve) for i in range(size)]
     if lag > 0:  # the fault's pressure stays while the valve's jumps
         moved = events[-1][0][valve]
         events[-1][0][valve + 1] = [p - v for p, v in zip(push, moved, strict=True)]
     return Loop(flow, events, [unit(size)[0], unit(size)[1], push], unit(size)[1], drift)
+
+
+def read_continuous(value: Any, task: Task) -> Loop:
+    """Build the error loop of a law whose pressure acts at once: e1, e2 and the law's states."""
+    given = keys(value, "loop", "states", "rates", "measured", "output", "feedback")
+    n = count_states(given["states"])
+    rates, seen = matrix(given["rates"], "rates", n, n), matrix(given["measured"], "measured", n, 2)
+    output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2)
+    push = [task.b * v for v in (*feedback, *output)]
+    middles = [sum(task.s) / 2, -sum(task.w) / 2] + [Fraction(0)] * n
+    flow = [unit(2 + n)[1]]
+    flow.append([v + sum(task.beta) / 2 * p for v, p in zip(middles, push, strict=True)])
+    flow += [[*fed, *kept] for fed, kept in zip(seen, rates, strict=True)]
+    drift = [Fraction(0)] * 2 + [-v / task.b for v in steady_states(rates, output)]
+    return Loop(flow, [], [unit(2 + n)[0], unit(2 + n)[1], push], unit(2 + n)[1], drift)
+
+
+def count_states(names: Any) -> int:
+    """Number of a law's states, after checking their names."""
+    sound = type(names) is list and len(names) <= MAX_LAW_STATES and all(type(v) is str for v in names)
+    need(sound and all(NAME.fullmatch(v) for v in names) and len(set(names)) == len(names), "states must be names")
+    return len(names)
 
 
 def zeros(size: int) -> list[Row]:
@@ -284,10 +308,10 @@ def unit(size: int) -> list[Row]:
     return [[Fraction(i == j) for j in range(size)] for i in range(size)]
 
 
-def steady_states(update: list[Row], output: Row) -> Row:
-    """Some z with Fz = z and Cz = 1, by elimination."""
+def steady_states(own: list[Row], output: Row) -> Row:
+    """Some z with Mz = 0 and Cz = 1, by elimination."""
     n = len(output)
-    table = [[v - (i == j) for j, v in enumerate(line)] + [Fraction(0)] for i, line in enumerate(update)]
+    table = [[*line, Fraction(0)] for line in own]
     table.append([*output, Fraction(1)])
     found = [Fraction(0)] * n
     pivots: list[tuple[int, Row]] = []
@@ -482,6 +506,8 @@ def past(flows: list[Flow], rows: int) -> Past:
 
 def gains(loop: Loop, entry: Row) -> list[list[Fraction]]:
     """Bounds of e1, e2 and the push for an input of size 1, on every piece of the period."""
+    if not loop.events:
+        return [[v] for v in flow_gains(loop, entry)]
     flows, size = cut(loop, entry), len(loop.flow)
     start = fixed(loop.outputs)
     before = past(flows, len(flows) * (3 * (PIECES + 1) + size))
@@ -506,6 +532,56 @@ def gains(loop: Loop, entry: Row) -> list[list[Fraction]]:
                 bent = bending.sums()[k] + slopes[i]
                 found[k].append((max(total[i], total[i + 1]) + bent * flow.piece**2 / 8) / (1 << BITS))
     return found
+
+
+def flow_gains(loop: Loop, entry: Row) -> Row:
+    """The same without events, for ever: stretches of pieces, each twice as long as the one before."""
+    flow, outputs, now = balanced(loop, entry)
+    size, piece = len(flow), Fraction(1)
+    while max(sum(map(abs, line)) for line in flow) * piece > Fraction(1, 1 << PARTS):
+        piece /= 2
+    step, near = exponential(flow, piece), exponential(majorant(flow), piece).size()
+    square, sums, work = fixed(flow) * fixed(flow), [[0] * (size + 1) for _ in outputs.rows], 0
+    for _ in range(STRETCHES):
+        work += 4 * size**2 * (size + 1) << PARTS
+        need(work <= MAX_WORK, "the loop must forget its past sooner: it takes too long")
+        ends, power = now, step
+        for _ in range(PARTS):
+            ends, power = ends.beside(power * ends), power * power
+        now = power * now
+        bends = ((outputs.size() * near).size() * (square * ends).size()).size()
+        add_areas(sums, (outputs * ends.beside(now)).size(), bends, piece)
+        late = (Fixed([line[:size] for line in sums], 0) * now.size()).size()
+        pairs = list(zip(late.rows, sums, strict=True))
+        if all(v * LATE <= total for far, line in pairs for v, total in zip(far[:size], line[:size], strict=True)):
+            return [(line[size] + Fraction(LATE * far[size], LATE - 1)) / (1 << BITS) for far, line in pairs]
+        further = (step.size() * near).size()
+        near = Fixed([list(map(max, *lines)) for lines in zip(near.rows, further.rows, strict=True)], 0)
+        step, piece = step * step, 2 * piece
+    raise Refused("the nominal loop must be stable, and seen to be")
+
+
+def add_areas(sums: list[list[int]], heights: Fixed, bends: Fixed, piece: Fraction) -> None:
+    """Add, to every entry of the sums, bounds of the integrals over all pieces whose ends have these heights."""
+    for total, line, bent in zip(sums, heights.rows, bends.rows, strict=True):
+        for i, bend in enumerate(bent):
+            area = (line[i] + line[i + len(total)]) * piece / 2 + bend * piece**3 / 12
+            total[i % len(total)] += int(area) + 1
+
+
+def balanced(loop: Loop, entry: Row) -> tuple[list[Row], Fixed, Fixed]:
+    """A, outputs, and unit columns with the entry, in units of the states that make A's rows and columns alike."""
+    size = len(loop.flow)
+    units = [Fraction(1)] * size
+    for i in list(range(size)) * 16:
+        line = sum(abs(v) * units[j] / units[i] for j, v in enumerate(loop.flow[i]) if j != i)
+        under = sum(abs(loop.flow[j][i]) * units[i] / units[j] for j in range(size) if j != i)
+        if line and under:
+            ratio = Fraction(line / under)
+            units[i] *= Fraction(2) ** ((ratio.numerator.bit_length() - ratio.denominator.bit_length()) // 2)
+    flow = [[v * u / own for v, u in zip(line, units, strict=True)] for line, own in zip(loop.flow, units, strict=True)]
+    outputs = fixed([[v * u for v, u in zip(line, units, strict=True)] for line in loop.outputs])
+    return flow, outputs, fixed(unit(size)).beside(column([v / u for v, u in zip(entry, units, strict=True)]))
 
 
 def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:
@@ -580,6 +656,9 @@ def verify(document: dict[str, Any]) -> list[str]:
 def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction], small: Fraction) -> list[str]:
     """What was verified, in ASCII; bounds on their outer side."""
     loop = document["loop"]
+    when = "for a pressure that acts at once (continuous time), which no sampled controller has"
+    if "step" in loop:
+        when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s"
     kind = f"|phi| <= {upper(task.amplitude)} m/s^2"
     if task.change is not None:
         kind += f", |phi'| <= {upper(task.change)} m/s^3, phi(0) = 0"
@@ -588,7 +667,7 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         "bounds and slopes, continued to negative slip rates",
         f"s in [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, w in [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, "
         f"beta in [1, {upper(task.beta[1])}], b = {upper(task.b)} m^2/kg, derived",
-        f"law with {len(loop['states'])} states, every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s",
+        f"law with {len(loop['states'])} states, {when}",
         f"disturbance: {kind}; from rest, along the reference, for ever; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",
         f"|slip - reference| <= {upper(claims['slip_error'])} m, "

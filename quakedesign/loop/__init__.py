@@ -1,19 +1,23 @@
 """What stands between law and fault, each element stated once, as exact matrices."""
 
 from quakedesign.arguments import check_arguments
+from quakedesign.loop.continuous import ContinuousLaw, continuous_loop, exact_integrals
 from quakedesign.loop.held import held_loop
 from quakedesign.loop.laws import LinearLaw, Model, Prediction, disturbance_estimate, summed_integrals
 from quakedesign.loop.periodic import PeriodicLoop, Segment
 from quakedesign.loop.running import SampledController
 
 __all__ = [
+    "ContinuousLaw",
     "LinearLaw",
     "Model",
     "PeriodicLoop",
     "Prediction",
     "SampledController",
     "Segment",
+    "continuous_loop",
     "disturbance_estimate",
+    "exact_integrals",
     "held_loop",
     "summed_integrals",
 ]

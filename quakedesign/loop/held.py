@@ -3,8 +3,8 @@
 from fractions import Fraction
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop.laws import LinearLaw, Model
-from quakedesign.loop.periodic import Matrix, PeriodicLoop, Row, Segment
+from quakedesign.loop.laws import LinearLaw, Matrix, Model, Row
+from quakedesign.loop.periodic import PeriodicLoop, Segment
 
 MOST_PERIODS = 8
 
@@ -51,7 +51,9 @@ def held_loop(
     whole, part = delay // step, delay % step
     waiting = int(whole) + (1 if part else 0)
     names = ("e1", "e2", *law.states, *(f"waiting{i}" for i in range(waiting)), "valve", *(("behind",) if lag else ()))
-    n, valve, steady = len(names), len(names) - (2 if lag else 1), _steady(law)
+    n, valve = len(names), len(names) - (2 if lag else 1)
+    still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
+    steady = steady_states(still, law.output)
     zero, one = Fraction(0), Fraction(1)
     return PeriodicLoop(
         states=names,
@@ -69,11 +71,17 @@ def held_loop(
     )
 
 
-def _steady(law: LinearLaw) -> Row:
-    """States of a law that asks for 1 Pa without errors for ever: (F − I)z = 0 and Cz = 1, by elimination."""
-    n = len(law.states)
-    rows = [[v - (i == j) for j, v in enumerate(row)] + [Fraction(0)] for i, row in enumerate(law.update)]
-    rows.append([*law.output, Fraction(1)])
+def steady_states(own: Matrix, output: Row) -> Row:
+    """States of a law that asks for 1 Pa without errors for ever: Mz = 0 and Cz = 1, by elimination.
+
+    Raises
+    ------
+    ParameterError
+        When there are none.
+    """
+    n = len(output)
+    rows = [[*row, Fraction(0)] for row in own]
+    rows.append([*output, Fraction(1)])
     pivots: list[tuple[int, list[Fraction]]] = []
     for column in range(n):
         pivot = next((row for row in rows if row[column]), None)

@@ -42,20 +42,30 @@ class LinearLaw:
     feedback: Row
 
     def __post_init__(self) -> None:
-        n = len(self.states)
-        fits = (
-            n <= MOST_STATES
-            and len(set(self.states)) == n
-            and [len(row) for row in self.update] == [n] * n
-            and [len(row) for row in self.measured] == [len(MEASURED)] * n
-            and len(self.output) == n
-            and len(self.feedback) == len(MEASURED)
+        require_sizes(self.states, self.update, self.measured, self.output, self.feedback)
+
+
+def require_sizes(states: tuple[str, ...], own: Matrix, measured: Matrix, output: Row, feedback: Row) -> None:
+    """Refuse matrices of a law whose sizes do not fit, and too many states.
+
+    Raises
+    ------
+    ParameterError
+    """
+    n = len(states)
+    fits = (
+        n <= MOST_STATES
+        and len(set(states)) == n
+        and [len(row) for row in own] == [n] * n
+        and [len(row) for row in measured] == [len(MEASURED)] * n
+        and len(output) == n
+        and len(feedback) == len(MEASURED)
+    )
+    if not fits:
+        raise ParameterError(
+            f"a linear law needs F of n × n, G of n × 2, C of n and D of 2 entries, n at most {MOST_STATES} states "
+            f"of different names. Received {n} states ({', '.join(states)}) and other sizes. Complete them."
         )
-        if not fits:
-            raise ParameterError(
-                f"a linear law needs F of n × n, G of n × 2, C of n and D of 2 entries, n at most {MOST_STATES} states "
-                f"of different names. Received {n} states ({', '.join(self.states)}) and other sizes. Complete them."
-            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

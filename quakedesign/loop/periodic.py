@@ -26,6 +26,8 @@ class Segment:
 class PeriodicLoop:
     """x' = Ax + Σ b_i·w_i between jumps; the segments follow each other for ever, the first one at time 0.
 
+    Without any segment there are no jumps: it flows for ever.
+
     Attributes
     ----------
     states : tuple of str

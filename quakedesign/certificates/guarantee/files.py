@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
 from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held
 from quakedesign.certificates.guarantee.task import Friction, Task
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.loop import LinearLaw
+from quakedesign.loop import ContinuousLaw, LinearLaw
 from quakedesign.output import write_whole
 from quakedesign.sos.exact.strict import NAME, listed, need, parse, read_rational, with_keys
 
@@ -19,19 +20,20 @@ _ROCK = ("density", "shear_modulus", "length", "damping", "normal_stress")
 _SPREADS = ("stiffness", "damping", "authority")
 _FRICTION = ("static", "least", "largest", "weakening", "strengthening", "rate_slope")
 _TIMES = ("step", "delay", "lag")
+_LAW = ("states", "measured", "output", "feedback")
 _FAULT = re.compile(r"\w[\w .+-]{0,59}")
 _MOST_COEFFICIENTS = 13
 _MOST_STATES = 20
 
 
 def is_guarantee(raw: Any) -> bool:
-    """Whether a parsed file is about a loop that runs."""
+    """Whether a parsed file bounds the peaks of a loop, with samples or in continuous time."""
     return isinstance(raw, dict) and raw.get("kind") == "guarantee"
 
 
-def guarantee_text(claim: Guarantee) -> str:
+def guarantee_text(claim: Guarantee | ContinuousPeaks) -> str:
     """Text of the file."""
-    task, held, law = claim.task, claim.held, claim.held.law
+    task = claim.task
     change = {} if task.change is None else {"change": str(task.change)}
     document = {
         "format": 1,
@@ -52,31 +54,42 @@ def guarantee_text(claim: Guarantee) -> str:
             **change,
             "growths": {"slip": str(task.growths[0]), "rate": str(task.growths[1])},
         },
-        "loop": {
-            **{name: str(getattr(held, name)) for name in _TIMES},
-            "states": list(law.states),
-            "update": [_texts(row) for row in law.update],
-            "measured": [_texts(row) for row in law.measured],
-            "output": _texts(law.output),
-            "feedback": _texts(law.feedback),
-        },
+        "loop": _loop(claim),
         "claims": {name: value.exact for name, value in _claims(claim.claims).items()},
     }
     return json.dumps(document, indent=1) + "\n"
 
 
-def save_guarantee(claim: Guarantee, path: str | Path) -> None:
+def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
+    """What the file says of the law; `rates` in place of `update` and times where the pressure acts at once."""
+    if isinstance(claim, ContinuousPeaks):
+        law: LinearLaw | ContinuousLaw = claim.law
+        times, own = dict[str, str](), {"rates": [_texts(row) for row in claim.law.rates]}
+    else:
+        law, times = claim.held.law, {name: str(getattr(claim.held, name)) for name in _TIMES}
+        own = {"update": [_texts(row) for row in claim.held.law.update]}
+    return {
+        **times,
+        "states": list(law.states),
+        **own,
+        "measured": [_texts(row) for row in law.measured],
+        "output": _texts(law.output),
+        "feedback": _texts(law.feedback),
+    }
+
+
+def save_guarantee(claim: Guarantee | ContinuousPeaks, path: str | Path) -> None:
     """Write the file whole."""
     write_whole(Path(path), guarantee_text(claim))
 
 
-def parse_guarantee(text: str) -> Guarantee:
-    """Guarantee from the text of a file; reading verifies nothing. Raises as `read_guarantee`."""
+def parse_guarantee(text: str) -> Guarantee | ContinuousPeaks:
+    """Claim from the text of a file; reading verifies nothing. Raises as `read_guarantee`."""
     return read_guarantee(parse(text))
 
 
-def read_guarantee(raw: Any) -> Guarantee:
-    """Guarantee from a parsed file.
+def read_guarantee(raw: Any) -> Guarantee | ContinuousPeaks:
+    """Claim from a parsed file.
 
     Raises
     ------
@@ -87,8 +100,13 @@ def read_guarantee(raw: Any) -> Guarantee:
     need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
     need(raw["kind"] == "guarantee", "kind must be guarantee")
     try:
-        claim = Guarantee(task=_task(raw), held=_held(raw["loop"]), claims=_read_claims(raw["claims"]))
-        need(len(claim.held.loop(claim.task).states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
+        task, claims, loop = _task(raw), _read_claims(raw["claims"]), raw["loop"]
+        if isinstance(loop, dict) and "rates" in loop:
+            claim: Guarantee | ContinuousPeaks = ContinuousPeaks(task=task, law=_continuous(loop), claims=claims)
+        else:
+            claim = Guarantee(task=task, held=_held(loop), claims=claims)
+        nominal = claim.loop if isinstance(claim, ContinuousPeaks) else claim.held.loop(task)
+        need(len(nominal.states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
     except ParameterError as error:
         raise CertificateError(str(error)) from None
     return claim
@@ -118,17 +136,31 @@ def _task(raw: dict[str, Any]) -> Task:
 
 
 def _held(raw: Any) -> Held:
-    with_keys(raw, {*_TIMES, "states", "update", "measured", "output", "feedback"})
+    with_keys(raw, {*_TIMES, "update", *_LAW})
+    law = LinearLaw(update=_square(raw, "update"), **_rest(raw))
+    return Held(law=law, **{name: read_rational(raw[name]) for name in _TIMES})
+
+
+def _continuous(raw: Any) -> ContinuousLaw:
+    with_keys(raw, {"rates", *_LAW})
+    return ContinuousLaw(rates=_square(raw, "rates"), **_rest(raw))
+
+
+def _square(raw: dict[str, Any], name: str) -> tuple[tuple[Fraction, ...], ...]:
+    size = len(listed(raw["states"], "states", _MOST_STATES))
+    return tuple(_rationals(row, name, size) for row in listed(raw[name], name, size))
+
+
+def _rest(raw: dict[str, Any]) -> dict[str, Any]:
+    """Everything of a law but the matrix of its own states."""
     names = listed(raw["states"], "states", _MOST_STATES)
     need(all(isinstance(n, str) and NAME.fullmatch(n) for n in names), "states must be names")
-    law = LinearLaw(
-        states=tuple(names),
-        update=tuple(_rationals(row, "update", len(names)) for row in listed(raw["update"], "update", len(names))),
-        measured=tuple(_rationals(row, "measured", 2) for row in listed(raw["measured"], "measured", len(names))),
-        output=_rationals(raw["output"], "output", len(names)),
-        feedback=_rationals(raw["feedback"], "feedback", 2),
-    )
-    return Held(law=law, **{name: read_rational(raw[name]) for name in _TIMES})
+    return {
+        "states": tuple(names),
+        "measured": tuple(_rationals(row, "measured", 2) for row in listed(raw["measured"], "measured", len(names))),
+        "output": _rationals(raw["output"], "output", len(names)),
+        "feedback": _rationals(raw["feedback"], "feedback", 2),
+    }
 
 
 def _read_claims(raw: Any) -> Claims:

@@ -22,15 +22,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
-from itertools import accumulate, chain, pairwise
+from itertools import accumulate, pairwise
 from operator import add, mul
 from typing import Any
 
-from flint import arb, arb_mat, ctx, fmpq
+from flint import arb, arb_mat, ctx
 
+from quakedesign.certificates.guarantee.ball_matrices import (
+    absolute,
+    ball,
+    beside,
+    column,
+    identity,
+    majorant,
+    matrix,
+    upper,
+)
 from quakedesign.errors import ParameterError
 from quakedesign.loop import PeriodicLoop
-from quakedesign.rationals import fraction_of
 
 _BITS = 128
 _PIECES = 8
@@ -47,14 +56,14 @@ def norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
         When the nominal loop is not found to be stable within 8192 periods.
     """
     with ctx.workprec(_BITS):
-        flow = _matrix(loop.flow)
-        rows = _matrix(tuple(loop.outputs.values()))
+        flow = matrix(loop.flow)
+        rows = matrix(tuple(loop.outputs.values()))
         found: dict[tuple[str, str], tuple[Fraction, ...]] = {}
         for name, entry in loop.inputs.items():
-            flows = [_Flow.of(flow, _matrix(s.jump), s.duration / _PIECES, _column(entry)) for s in loop.segments]
+            flows = [_Flow.of(flow, matrix(s.jump), s.duration / _PIECES, column(entry)) for s in loop.segments]
             gains = _gains(flows, _Past.of(flows), rows)
             found |= {
-                (output, name): tuple(map(_upper, parts)) for output, parts in zip(loop.outputs, gains, strict=True)
+                (output, name): tuple(map(upper, parts)) for output, parts in zip(loop.outputs, gains, strict=True)
             }
         return found
 
@@ -89,8 +98,8 @@ class _Flow:
 
     @classmethod
     def of(cls, flow: Any, jump: Any, piece: Fraction, entry: Any) -> "_Flow":
-        h = _ball(piece)
-        step, within = (flow * h).exp(), _absolute((_majorant(flow) * h).exp())
+        h = ball(piece)
+        step, within = (flow * h).exp(), absolute((majorant(flow) * h).exp())
         response = list(accumulate([step] * _PIECES, lambda now, e: e * now, initial=entry))
         return cls(
             jump=jump,
@@ -98,8 +107,8 @@ class _Flow:
             whole=reduce(mul, [step] * _PIECES) * jump,
             piece=h,
             response=response,
-            curvature=[within * _absolute(flow * (flow * now)) for now in response[:-1]],
-            slope=[within * _absolute(flow * now) for now in response[:-1]],
+            curvature=[within * absolute(flow * (flow * now)) for now in response[:-1]],
+            slope=[within * absolute(flow * now) for now in response[:-1]],
             square=flow * flow,
             within=within,
         )
@@ -108,8 +117,8 @@ class _Flow:
         """Weighted ends of the pieces, mapped by what comes later, and the remainders' entries."""
         half = self.piece / 2
         ends = [later * now * (half if i in (0, _PIECES) else self.piece) for i, now in enumerate(self.response)]
-        rest = _absolute(later) * reduce(add, self.curvature)
-        return ends, _absolute(rest * (self.piece**3 / 12))
+        rest = absolute(later) * reduce(add, self.curvature)
+        return ends, absolute(rest * (self.piece**3 / 12))
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,11 +132,11 @@ class _Past:
     @classmethod
     def of(cls, flows: list[_Flow]) -> "_Past":
         size = flows[0].jump.nrows()
-        later, ends, rest = _identity(size), list[Any](), arb_mat(size, 1)
+        later, ends, rest = identity(size), list[Any](), arb_mat(size, 1)
         for flow in reversed(flows):
             own, remainder = flow.columns(later)
             ends, rest, later = [*own, *ends], rest + remainder, later * flow.whole
-        return cls._summed(later, _beside([*ends, _diagonal(rest)]))
+        return cls._summed(later, beside([*ends, _diagonal(rest)]))
 
     @classmethod
     def _summed(cls, period: Any, columns: Any) -> "_Past":
@@ -135,11 +144,11 @@ class _Past:
         for _ in range(_MOST_DOUBLINGS):
             following = period * columns
             sums = [a + b for a, b in zip(sums, _row_sums(following), strict=True)]
-            columns, period = _beside([columns, following]), period * period
-            far = _absolute(period) * _as_column(sums)
+            columns, period = beside([columns, following]), period * period
+            far = absolute(period) * _as_column(sums)
             shares = [a / b for a, b in zip(far.entries(), sums, strict=True) if not a == 0]
-            if all(share < _ball(_SMALL) for share in shares):
-                return cls(columns, period, _as_column(sums) / (1 - _ball(_SMALL)))
+            if all(share < ball(_SMALL) for share in shares):
+                return cls(columns, period, _as_column(sums) / (1 - ball(_SMALL)))
         raise ParameterError(
             f"the nominal loop must be stable. Received one that is not seen to be in {2**_MOST_DOUBLINGS} periods. "
             "Change the gains, or shorten T_s."
@@ -147,7 +156,7 @@ class _Past:
 
     def of_rows(self, rows: Any) -> list[Any]:
         """N of every row."""
-        near, far = _row_sums(rows * self.columns), _absolute(rows * self.far) * self.bound
+        near, far = _row_sums(rows * self.columns), absolute(rows * self.far) * self.bound
         return [a + b for a, b in zip(near, far.entries(), strict=True)]
 
 
@@ -157,15 +166,15 @@ def _gains(flows: list[_Flow], past: _Past, outputs: Any) -> list[list[Any]]:
     found: list[list[Any]] = [[] for _ in range(count)]
     for number, flow in enumerate(flows):
         phases = list(accumulate([flow.step] * _PIECES, mul, initial=outputs))
-        rows = _above([*phases, _identity(size)]) * flow.jump
+        rows = _above([*phases, identity(size)]) * flow.jump
         before = _before(flows[:number], past, rows)
         units = _as_column(before[-size:])
         for k in range(count):
             own = _since_jump(flow, outputs, k)
             total = [before[i * count + k] + own[i] for i in range(_PIECES + 1)]
             for i, (start, end) in enumerate(pairwise(total)):
-                bent = (_absolute(phases[i] * flow.square) * flow.within * units)[k, 0]
-                bent += (_absolute(outputs) * flow.slope[i])[k, 0]
+                bent = (absolute(phases[i] * flow.square) * flow.within * units)[k, 0]
+                bent += (absolute(outputs) * flow.slope[i])[k, 0]
                 found[k].append(start.max(end) + bent * flow.piece**2 / 8)
     return found
 
@@ -174,39 +183,23 @@ def _before(flows: list[_Flow], past: _Past, rows: Any) -> list[Any]:
     """Bounds for rows that act just before a segment: the segments before it in this period, and the past."""
     if not flows:
         return past.of_rows(rows)
-    ends, rest = flows[-1].columns(_identity(rows.ncols()))
-    own = _row_sums(rows * _beside([*ends, _diagonal(rest)]))
+    ends, rest = flows[-1].columns(identity(rows.ncols()))
+    own = _row_sums(rows * beside([*ends, _diagonal(rest)]))
     return [a + b for a, b in zip(own, _before(flows[:-1], past, rows * flows[-1].whole), strict=True)]
 
 
 def _since_jump(flow: _Flow, outputs: Any, k: int) -> list[Any]:
     """∫|ce^{Aσ}b|dσ from the jump to the end of every piece, from 0 on."""
     values = [abs((outputs * now)[k, 0]) for now in flow.response]
-    bent = [(_absolute(outputs) * now)[k, 0] for now in flow.curvature]
+    bent = [(absolute(outputs) * now)[k, 0] for now in flow.curvature]
     pieces = [
         (a + b) * flow.piece / 2 + c * flow.piece**3 / 12 for (a, b), c in zip(pairwise(values), bent, strict=True)
     ]
     return list(accumulate(pieces, initial=arb(0)))
 
 
-def _ball(value: Fraction) -> Any:
-    return arb(fmpq(value.numerator, value.denominator))
-
-
-def _matrix(rows: tuple[tuple[Fraction, ...], ...]) -> Any:
-    return arb_mat([[_ball(v) for v in row] for row in rows])
-
-
-def _column(values: tuple[Fraction, ...]) -> Any:
-    return arb_mat([[_ball(v)] for v in values])
-
-
 def _as_column(values: list[Any]) -> Any:
     return arb_mat([[v] for v in values])
-
-
-def _identity(size: int) -> Any:
-    return arb_mat(size, size, [int(i == j) for i in range(size) for j in range(size)])
 
 
 def _diagonal(column: Any) -> Any:
@@ -215,29 +208,9 @@ def _diagonal(column: Any) -> Any:
     return arb_mat([[column[i, 0] if i == j else arb(0) for j in kept] for i in range(column.nrows())])
 
 
-def _beside(parts: list[Any]) -> Any:
-    return arb_mat([list(chain(*rows)) for rows in zip(*(part.tolist() for part in parts), strict=True)])
-
-
 def _above(parts: list[Any]) -> Any:
     return arb_mat([list(row) for part in parts for row in part.tolist()])
 
 
-def _majorant(flow: Any) -> Any:
-    table = [[v.abs_upper() for v in row] for row in flow.tolist()]
-    for i in range(len(table)):
-        table[i][i] = arb(0).max(flow[i, i]).abs_upper()
-    return arb_mat(table)
-
-
-def _absolute(matrix: Any) -> Any:
-    """Upper bounds of the absolute values, exact numbers."""
-    return arb_mat([[v.abs_upper() for v in row] for row in matrix.tolist()])
-
-
 def _row_sums(matrix: Any) -> list[Any]:
     return [sum(map(abs, row), arb(0)) for row in matrix.tolist()]
-
-
-def _upper(value: Any) -> Fraction:
-    return fraction_of(value.upper().fmpq())

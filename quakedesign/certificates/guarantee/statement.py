@@ -129,19 +129,24 @@ class Guarantee:
 
     def sentence(self) -> str:
         """What is guaranteed, for people."""
-        task, claims, held = self.task, self.claims, self.held
+        held = self.held
         when = f"held over {_seconds(held.step)}"
         when += f", {_seconds(held.delay)} late" if held.delay else ""
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
-        kind = f"|phi| <= {UpperBound(task.amplitude):.3g} m/s^2"
-        kind += "" if task.change is None else f" that starts at 0 and changes by {UpperBound(task.change):.3g} m/s^3"
-        pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
-        return (
-            f"from rest, {when}, for every disturbance {kind} at most and all friction and parameters of the box: "
-            f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
-            f"{claims.slip_error:.3g} m of the reference, the pressure between {pressures} "
-            "(for a plant continued to negative slip rates)"
-        )
+        return sentence_of(self.task, self.claims, when)
+
+
+def sentence_of(task: Task, claims: Claims, when: str) -> str:
+    """What is claimed of a task, for people; `when` says how the pressure follows the law."""
+    kind = f"|phi| <= {UpperBound(task.amplitude):.3g} m/s^2"
+    kind += "" if task.change is None else f" that starts at 0 and changes by {UpperBound(task.change):.3g} m/s^3"
+    pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
+    return (
+        f"from rest, {when}, for every disturbance {kind} at most and all friction and parameters of the box: "
+        f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
+        f"{claims.slip_error:.3g} m of the reference, the pressure between {pressures} "
+        "(for a plant continued to negative slip rates)"
+    )
 
 
 def guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:

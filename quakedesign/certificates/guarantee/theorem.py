@@ -29,6 +29,7 @@ from typing import Any
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee.flow_norms import flow_norms
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.loop import PeriodicLoop
@@ -102,14 +103,14 @@ class _Inputs:
 
 
 def certified_bounds(task: Task, loop: PeriodicLoop) -> Bounds | NoGuarantee:
-    """Bounds of the theorem for the loop of `quakedesign.loop.held_loop` with the task's model.
+    """Bounds of the theorem for the loop of `held_loop` or `continuous_loop` with the task's model.
 
     Raises
     ------
     ParameterError
         When the nominal loop is not found to be stable.
     """
-    return bounds_from(task, norms(loop))
+    return bounds_from(task, norms(loop) if loop.segments else flow_norms(loop))
 
 
 def bounds_from(task: Task, gains: Mapping[tuple[str, str], tuple[Any, ...]]) -> Bounds | NoGuarantee:

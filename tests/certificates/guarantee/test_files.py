@@ -12,11 +12,11 @@ import pytest
 
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.command import check_files
-from quakedesign.certificates.guarantee import Held, guarantee, task_of
+from quakedesign.certificates.guarantee import Held, continuous_peaks, guarantee, task_of
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, save_guarantee
 from quakedesign.errors import CertificateError
 from quakedesign.fault import load_fault
-from quakedesign.loop import Prediction, disturbance_estimate, summed_integrals
+from quakedesign.loop import Prediction, disturbance_estimate, exact_integrals, summed_integrals
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("guarantee_check", PATH)
@@ -37,10 +37,13 @@ LOOPS = {
     "integrals": Held(law=INTEGRALS, step=STEP),
     "lagging": Held(law=ESTIMATE, step=F("0.1"), lag=F("0.03")),
 }
+CONTINUOUS = exact_integrals(tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5"))))
+EVERY = (*LOOPS, "continuous")
 
 
 def claim(name="estimate", rate_limited=False):
-    return guarantee(task_of(load_fault("real-fault"), rate_limited=rate_limited), LOOPS[name])
+    task = task_of(load_fault("real-fault"), rate_limited=rate_limited)
+    return continuous_peaks(task, CONTINUOUS) if name == "continuous" else guarantee(task, LOOPS[name])
 
 
 def package(text):
@@ -57,7 +60,7 @@ def standalone(text):
         return f"invalid: {error}"
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("rate_limited", [False, True])
 def test_both_checkers_accept_what_the_package_writes(name, rate_limited):
     found = claim(name, rate_limited)
@@ -75,38 +78,54 @@ def test_the_statement_says_the_slip_rate_of_this_fault():
     assert f"the slip rate of this fault never exceeds {float(found.claims.peak_slip_rate):.4g} m/s" in lines
 
 
+def test_the_statement_about_continuous_time_says_so_in_both():
+    found = claim("continuous")
+    said = "for a pressure that acts at once (continuous time)"
+    assert any(said in line for line in checker.check(guarantee_text(found)).statement)
+    assert f"from rest, {said}, for every disturbance" in found.sentence()
+    assert not any("held" in line for line in (found.sentence(), *checker.check(guarantee_text(found)).statement))
+
+
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
 
 
+@pytest.mark.parametrize("loop", ["estimate", "continuous"])
 @pytest.mark.parametrize("name", CLAIMS)
-def test_one_percent_less_is_refused_by_both(name):
-    raw = json.loads(guarantee_text(claim()))
+def test_one_percent_less_is_refused_by_both(name, loop):
+    raw = json.loads(guarantee_text(claim(loop)))
     raw["claims"][name] = str(F(raw["claims"][name]) * F(99, 100))
     text = json.dumps(raw)
     assert name in standalone(text)
     assert package(text) == "undecided"
 
 
-WORSE = [
+ANY = [
     (("disturbance", "amplitude"), F(21, 20)),
     (("fault", "friction", "largest"), F(21, 20)),
     (("fault", "friction", "weakening"), F(21, 20)),
     (("fault", "friction", "least"), F(19, 20)),
     (("fault", "normal_stress"), F(21, 20)),
-    (("loop", "step"), F(21, 20)),
-    (("loop", "feedback", 0), F(3, 2)),
-    (("loop", "feedback", 1), F(4, 3)),
-    (("loop", "measured", 1, 1), F(4, 3)),
     (("loop", "output", 1), F(4, 3)),
-    (("loop", "update", 1, 0), F(4, 3)),
+]
+WORSE = [("estimate", *worse) for worse in ANY] + [("continuous", *worse) for worse in ANY]
+WORSE += [
+    ("estimate", ("loop", "step"), F(21, 20)),
+    ("estimate", ("loop", "feedback", 0), F(3, 2)),
+    ("estimate", ("loop", "feedback", 1), F(4, 3)),
+    ("estimate", ("loop", "measured", 1, 1), F(4, 3)),
+    ("estimate", ("loop", "update", 1, 0), F(4, 3)),
+    ("continuous", ("loop", "feedback", 0), F(3, 4)),
+    ("continuous", ("loop", "feedback", 1), F(3, 4)),
+    ("continuous", ("loop", "measured", 0, 0), F(4, 3)),
+    ("continuous", ("loop", "rates", 1, 0), F(4, 3)),
 ]
 
 
 @pytest.mark.parametrize(
-    ("place", "factor"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else ""
+    ("loop", "place", "factor"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else ""
 )
-def test_worse_data_under_the_same_claims_are_refused_by_both(place, factor):
-    raw = json.loads(guarantee_text(claim()))
+def test_worse_data_under_the_same_claims_are_refused_by_both(loop, place, factor):
+    raw = json.loads(guarantee_text(claim(loop)))
     holder = raw
     for key in place[:-1]:
         holder = holder[key]
@@ -136,17 +155,59 @@ def changed(raw, path, new):
 
 
 RAW = json.loads(guarantee_text(claim()))
-PATHS = [path for path in places(RAW) if path and path != ("fault", "name")]
+CONTINUOUS_RAW = json.loads(guarantee_text(claim("continuous")))
 
 
+@pytest.mark.parametrize("raw", [RAW, CONTINUOUS_RAW], ids=["estimate", "continuous"])
 @pytest.mark.parametrize("new", [None, "x", "1/0", "2/4", 0.5, True, [], {}, -1], ids=repr)
-def test_entries_of_another_kind_are_refused_by_both_at_every_place(new):
-    for path in PATHS:
+def test_entries_of_another_kind_are_refused_by_both_at_every_place(new, raw):
+    for path in places(raw):
+        if not path or path == ("fault", "name") or (raw is CONTINUOUS_RAW and path[0] != "loop"):
+            continue
         if new == "x" and path[:2] == ("loop", "states") and len(path) == 3:
             continue  # a state may have the name x
-        text = json.dumps(changed(RAW, path, new))
+        text = json.dumps(changed(raw, path, new))
         assert standalone(text).startswith("invalid"), path
         assert package(text).startswith("invalid"), path
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("loop", "feedback"), ["9" * 390, "0"]),
+        (("loop", "feedback"), ["1/" + "9" * 390, "0"]),
+        (("loop", "feedback"), ["0", "0"]),
+        (("loop", "output"), ["0", "0"]),
+        (("loop", "output"), ["9" * 390, "-" + "9" * 390]),
+        (("loop", "output"), ["-1", "-1"]),
+        (("loop", "rates"), [["1", "0"], ["1", "1"]]),
+        (("loop", "rates"), [["0", "0"], ["1/" + "9" * 390, "0"]]),
+        (("loop", "states"), ["a", "a"]),
+        (("loop", "step"), "1"),
+    ],
+)
+def test_hostile_values_in_continuous_time_are_refused_by_both_in_bounded_time(path, value):
+    text = json.dumps(changed(CONTINUOUS_RAW, path, value))
+    began = time.process_time()
+    assert standalone(text).startswith("invalid")
+    assert package(text) != "proved"
+    assert time.process_time() - began < 10
+
+
+def test_a_law_of_many_states_in_continuous_time_is_decided_by_both():
+    """Ten more states that follow e1 and are not used: the same claims, in bounded time."""
+    raw = copy.deepcopy(CONTINUOUS_RAW)
+    loop = raw["loop"]
+    loop["states"] += [f"more{i}" for i in range(10)]
+    loop["rates"] = [row + ["0"] * 10 for row in loop["rates"]] + [
+        ["0"] * (2 + i) + ["-1"] + ["0"] * (9 - i) for i in range(10)
+    ]
+    loop["measured"] += [["1", "0"]] * 10
+    loop["output"] += ["0"] * 10
+    began = time.process_time()
+    assert standalone(json.dumps(raw)) == "proved"
+    assert time.process_time() - began < 30
+    assert package(json.dumps(raw)) == "proved"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,70 @@
+"""Peaks of the idealised loop whose pressure acts at once: the theorem of the loop that runs, in continuous time."""
+
+from dataclasses import dataclass
+
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee.statement import Claims, sentence_of
+from quakedesign.certificates.guarantee.task import Task
+from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
+from quakedesign.errors import ParameterError
+from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop
+
+WHEN = "for a pressure that acts at once (continuous time)"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContinuousPeaks:
+    """Claims about a law in continuous time, which no computer runs; `check` decides them.
+
+    Attributes
+    ----------
+    task : Task
+    law : ContinuousLaw
+    claims : Claims
+    """
+
+    task: Task
+    law: ContinuousLaw
+    claims: Claims
+
+    @property
+    def loop(self) -> PeriodicLoop:
+        """Nominal error loop."""
+        return continuous_loop(self.law, self.task.model, self.task.authority)
+
+    def bounds(self) -> Bounds | NoGuarantee:
+        """What the theorem gives, computed anew."""
+        return _bounds(self.task, self.law)
+
+    def check(self) -> Verdict:
+        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
+        found = self.bounds()
+        proved = isinstance(found, Bounds) and self.claims.covers(Claims.of(self.task, found))
+        return Verdict.PROVED if proved else Verdict.UNDECIDED
+
+    def sentence(self) -> str:
+        """What is proved, for people."""
+        return sentence_of(self.task, self.claims, WHEN)
+
+
+def continuous_peaks(task: Task, law: ContinuousLaw) -> ContinuousPeaks | NoGuarantee:
+    """Tightest rounded claims about a law in continuous time, or why there are none.
+
+    Raises
+    ------
+    ParameterError
+        For a law that leaves an error under a constant pressure at rest.
+    """
+    found = _bounds(task, law)
+    if isinstance(found, NoGuarantee):
+        return found
+    return ContinuousPeaks(task=task, law=law, claims=Claims.of(task, found).rounded())
+
+
+def _bounds(task: Task, law: ContinuousLaw) -> Bounds | NoGuarantee:
+    loop = continuous_loop(law, task.model, task.authority)
+    try:
+        return certified_bounds(task, loop)
+    except ParameterError:
+        reason = f"{WHEN} even the nominal loop is not stable, or too slow to be seen so"
+        return NoGuarantee(reason=reason, small_gain=None)

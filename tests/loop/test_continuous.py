@@ -1,0 +1,64 @@
+"""The loop in continuous time against the law itself and against the limit of the held one."""
+
+from fractions import Fraction as F
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from quakedesign.controllers import Signals
+from quakedesign.controllers.elqr import ExtendedLQR
+from quakedesign.errors import ParameterError
+from quakedesign.loop import ContinuousLaw, Model, continuous_loop, exact_integrals, held_loop, summed_integrals
+
+GAINS = tuple(map(F, ("2e9", "5e8", "3e9", "1e9")))
+MODEL = Model(slip=F("0.45"), rate=F("1.6"), gain=F("2.3e-8"))
+AUTHORITY = F("1.9e-8")
+
+
+def test_the_flow_is_that_of_the_e_lqr():
+    """e2′ = s·e1 − w·e2 + βb·p with the package's own expression of p."""
+    e1, e2, xi1, xi2 = states = sp.symbols("e1 e2 xi1 xi2")
+    law = ExtendedLQR(gains=dict(zip(("k1", "k2", "k3", "k4"), GAINS, strict=True)))
+    signals = Signals(slip=e1, slip_rate=e2, slip_error=e1, slip_rate_error=e2, integrals=(xi1, xi2))
+    pressure = law.pressure(signals)
+    rates = [e2, F("0.45") * e1 - F("1.6") * e2 + F("2.3e-8") * pressure, *law.integral_rates(signals)]
+    loop = continuous_loop(exact_integrals(GAINS), MODEL, AUTHORITY)
+    for row, rate in zip(loop.flow, rates, strict=True):
+        assert [sp.Rational(v) for v in row] == [sp.nsimplify(sp.expand(rate).coeff(x), rational=True) for x in states]
+    push = sp.expand(sp.Rational(AUTHORITY) * pressure)
+    assert [sp.Rational(v) for v in loop.outputs["push"]] == [push.coeff(x) for x in states]
+
+
+def test_a_drift_of_the_pressure_at_rest_enters_where_the_integrals_carry_it():
+    """With p* = t the states less ξ(p*) = (0, −p*/k4) leave e at rest only through their own rate."""
+    loop = continuous_loop(exact_integrals(GAINS), MODEL, AUTHORITY)
+    assert loop.inputs["drift"] == (0, 0, 0, 1 / (AUTHORITY * GAINS[3]))
+    assert loop.inputs["acceleration"] == (0, 1, 0, 0)
+    assert loop.segments == ()
+
+
+def test_the_held_loop_tends_to_it():
+    """Poles of the map of a short period, (λ − 1)/T_s, against those of the flow."""
+    step = F(1, 10**5)
+    held = held_loop(summed_integrals(GAINS, step), MODEL, AUTHORITY, step)
+    (segment,) = held.segments
+    flow, jump = np.array(held.flow, dtype=float) * float(step), np.array(segment.jump, dtype=float)
+    period = (np.eye(5) + flow + flow @ flow / 2) @ jump
+    slow = sorted(np.linalg.eigvals(period), key=abs)[1:]
+    poles = np.linalg.eigvals(np.array(continuous_loop(exact_integrals(GAINS), MODEL, AUTHORITY).flow, dtype=float))
+    found = np.array([np.log(complex(v)) / float(step) for v in slow])
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(poles), rel=1e-3)
+
+
+def test_a_law_without_an_integral_is_refused():
+    law = ContinuousLaw(states=(), rates=(), measured=(), output=(), feedback=(F(-1), F(-1)))
+    with pytest.raises(ParameterError, match="constant pressure"):
+        continuous_loop(law, MODEL, AUTHORITY)
+
+
+def test_sizes_that_do_not_fit_and_missing_gains_are_refused():
+    with pytest.raises(ParameterError, match="four"):
+        exact_integrals(GAINS[:3])
+    with pytest.raises(ParameterError, match="2 entries"):
+        ContinuousLaw(states=("a",), rates=((F(0),),), measured=((F(0),),), output=(F(1),), feedback=(F(0), F(0)))
