@@ -13,8 +13,6 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-import sympy as sp
-
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Certificate
 from quakedesign.certificates.level_sets import LevelSets
@@ -33,13 +31,12 @@ from quakedesign.controllers import SlidingMode
 from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of
 from quakedesign.symbolic import plant
-from quakedesign.symbolic.balls import enclose, upper_bound
+from quakedesign.symbolic.balls import ball, upper_bound
 
 _STEPS = (-640, 160)
 """Range of n in V^{1/m} = (1 + (n mod 8)/8)·2^{n div 8} that is searched."""
 
 _PIECES = 40
-_NOWHERE = LowerBound(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,12 +64,12 @@ class Domain:
     level: float
     slip_error: UpperBound
     slip_rate_error: UpperBound
-    start_slip_error: LowerBound = _NOWHERE
-    start_slip_rate_error: LowerBound = _NOWHERE
-    start_perturbation: LowerBound = _NOWHERE
-    method: str = ""
-    limited_by: str = ""
-    feedforward: str = "none"
+    start_slip_error: LowerBound
+    start_slip_rate_error: LowerBound
+    start_perturbation: LowerBound
+    method: str
+    limited_by: str
+    feedforward: str
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI."""
@@ -110,11 +107,11 @@ class Question:
 
     def along_reference(self) -> Fraction:
         """Bound on |h'| with zero errors [unit of ν per s]."""
-        return self._rate(Errors(), 120)
+        return self._rate(Errors())
 
     def whole(self, level: Fraction, pieces: int = _PIECES) -> Fraction:
         """|h'|/L̄ on {V ≤ level}, errors and control included; at most 1 where the certificate speaks."""
-        return self._rate(self.sets.errors(level), pieces) / self.allowed
+        return self._rate(self.sets.errors(level), pieces=pieces) / self.allowed
 
     def split(self, level: Fraction, errors: Errors | None = None) -> dict[str, Fraction] | None:
         """Shares of the decrease of V that the errors' part of h takes on {V ≤ level}, by error.
@@ -137,8 +134,8 @@ class Question:
     def _added(self) -> dict[str, Any]:
         return {"feedforward": self.controller.feedforward}
 
-    def _rate(self, errors: Errors, pieces: int) -> Fraction:
-        return largest_matched_rate(self.fault, self.controller.divisor, errors, pieces=pieces, **self._added)
+    def _rate(self, errors: Errors, **options: int) -> Fraction:
+        return largest_matched_rate(self.fault, self.controller.divisor, errors, **options, **self._added)
 
 
 def certified_lipschitz(certificate: Certificate) -> Fraction:
@@ -154,7 +151,7 @@ def certified_domain(question: Question) -> Domain:
     """
     low_beta, high_beta = coefficient_range(question.fault, question.controller.divisor)
     certified = question.certificate.loop.uncertain["beta"]
-    if not certified[0] <= low_beta <= high_beta <= certified[1]:
+    if low_beta < certified[0] or high_beta > certified[1]:
         return _domain(question, Fraction(0), "", "the control coefficient β, which leaves its certified range")
 
     def whole(step: int) -> bool:
@@ -192,7 +189,7 @@ def _largest_split(question: Question) -> int | None:
     if not holds(low):
         return None
     guess = _largest(lambda step: holds(step, Errors()), low, high)
-    above, stride = guess + 1, 1
+    above, stride = guess, 1
     while not holds(guess):
         above, guess, stride = guess, max(low, guess - stride), 2 * stride
     return _largest(holds, guess, above)
@@ -201,7 +198,7 @@ def _largest_split(question: Question) -> int | None:
 def _level(step: int, degree: Fraction) -> Fraction:
     """((1 + (n mod 8)/8)·2^{n div 8})^m, m rounded to a whole number."""
     whole, part = divmod(step, 8)
-    return (Fraction(8 + part, 8) * Fraction(2) ** whole) ** max(1, round(degree))
+    return ((1 + Fraction(part, 8)) * Fraction(2) ** whole) ** round(degree)
 
 
 def _domain(question: Question, level: Fraction, method: str, limit: str) -> Domain:
@@ -243,28 +240,32 @@ def _whole_limit(question: Question, errors: Errors) -> str:
     return max(_GIVEN if errors == Errors() else _FROM_ERRORS, key=alone)
 
 
+_ERRORS = {
+    "slip": ("the slip error", plant.slip_slope, "the spring"),
+    "rate": ("the slip-rate error", plant.rate_slope, "viscosity"),
+}
+
+
 def _split_limit(question: Question, level: Fraction) -> str:
     """Which error takes most of the decrease, and through what."""
     parts = question.split(level) or {}
     error = max(parts, key=lambda name: parts[name])
+    name, slope, rest = _ERRORS[error]
     fault, controller = question.fault, question.controller
-    expression = sensitivity_expressions(fault, controller.divisor, controller.feedforward)[error == "rate"]
-    slope = plant.rate_slope if error == "rate" else plant.slip_slope
+    expressions = sensitivity_expressions(fault, controller.divisor, controller.feedforward)
+    expression = dict(zip(_ERRORS, expressions, strict=True))[error]
     box = known_ranges(fault) | question.sets.errors(level).ranges()
     straight = expression.subs(slope, 0)
     calm = straight.subs({plant.phi_1: 0, plant.phi_2: 0})
-    bent, grown, rest = (
-        upper_bound(part, box, pieces=_PIECES) for part in (expression - straight, straight - calm, calm)
-    )
-    name = "the slip-rate error" if error == "rate" else "the slip error"
-    if max(bent, grown) > rest:
-        return f"{name}, through {'friction' if bent >= grown else 'the growth of the disturbance'}"
-    through = f"{name}, through {'viscosity' if error == 'rate' else 'the spring'}"
-    return through if controller.feedforward.name == "none" else f"{through} less its feed-forward"
+    less = "" if controller.feedforward.name == "none" else " less its feed-forward"
+    causes = {
+        f"{rest}{less}": calm,
+        "friction": expression - straight,
+        "the growth of the disturbance": straight - calm,
+    }
+    return f"{name}, through {max(causes, key=lambda cause: upper_bound(causes[cause], box, pieces=_PIECES))}"
 
 
 def _root(level: Fraction, power: Fraction) -> Fraction:
     """Upper bound of level^power."""
-    x = sp.Symbol("x", positive=True)
-    end = enclose(x ** sp.Rational(power.numerator, power.denominator), {x: (level, level)}).upper().fmpq()
-    return fraction_of(end)
+    return fraction_of((ball(level, level) ** ball(power, power)).upper().fmpq())

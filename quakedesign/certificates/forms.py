@@ -14,6 +14,10 @@ from itertools import combinations, count, pairwise, product
 from math import factorial, lcm, prod
 from typing import Any
 
+from flint import arb, fmpq
+
+from quakedesign.rationals import float_above, fraction_of
+
 Polynomial = Mapping[tuple[int, ...], Fraction]
 Edge = tuple[int, int]
 
@@ -139,38 +143,24 @@ def largest_ratio(
 
 def _bound(forms: Sequence[Form], exponents: Sequence[Fraction]) -> float:
     """Float not below the largest ratio on a piece; infinite when a divisor may vanish."""
-    from flint import arb, fmpq
-
     total = arb(1)
     for form, a in zip(forms, exponents, strict=True):
         value = form.largest() if a > 0 else form.least()
         if a < 0 and value <= 0:
             return float("inf")
-        total *= _power(arb(fmpq(value.numerator, value.denominator)), a)
-    return _up(total)
+        total *= _ball(value) ** _ball(a)
+    return float_above(fraction_of(total.upper().fmpq()))
 
 
-def _power(base: Any, exponent: Fraction) -> Any:
-    from flint import arb, fmpq
-
-    if exponent.denominator == 1:
-        return base if exponent == 1 else 1 / base if exponent == -1 else base ** int(exponent)
-    return base ** arb(fmpq(exponent.numerator, exponent.denominator))
-
-
-def _up(value: Any) -> float:
-    from math import inf, nextafter
-
-    end = value.upper()
-    number = float(end)
-    return number if end <= number else nextafter(number, inf)
+def _ball(value: Fraction) -> Any:
+    return arb(fmpq(value.numerator, value.denominator))
 
 
 def _attained(forms: Sequence[Form], exponents: Sequence[Fraction]) -> float:
     """Largest value at the corners of a piece; only decides when to stop."""
     values = [[abs(float(v)) for v in f.at_corners()] for f in forms]
     return max(
-        prod(v[i] ** float(a) if v[i] or a > 0 else 0.0 for v, a in zip(values, exponents, strict=True))
+        prod(v[i] ** float(a) if v[i] else 0.0 for v, a in zip(values, exponents, strict=True))
         for i in range(forms[0].variables)
     )
 

@@ -137,7 +137,7 @@ def longest_reaction(task: Task, withdrawal: Fraction) -> UpperBound | None:
 
     def longest(plant: _Pushed) -> Any:
         ratio = _ball(plant.authority * withdrawal / task.amplitude)
-        return ratio.log() / plant.pole if ratio > 1 else arb(0)
+        return _at_least_one(ratio).log() / plant.pole
 
     return _least(task, longest)
 
@@ -149,7 +149,7 @@ def longest_diffusion(task: Task, withdrawal: Fraction, step: Fraction) -> Upper
     def longest(plant: _Pushed) -> Any:
         pole = plant.pole
         ratio = _ball(plant.authority * withdrawal / task.amplitude) * (-pole * _ball(step)).exp()
-        return ratio.acosh() ** 2 / pole if ratio > 1 else arb(0)
+        return _at_least_one(ratio).acosh() ** 2 / pole
 
     return _least(task, longest)
 
@@ -203,8 +203,7 @@ def _surprised(task: Task) -> Iterator[_Surprised]:
             middle = max(law.least + law.weakening * reach, law.static - law.weakening * target)
             stress = (law.static * task.normal_stress - kappa / area * target) / middle
             slip = area * law.weakening * stress - kappa
-            if slip > 0:
-                yield _Surprised(slip, w, law.weakening, middle - law.weakening * reach, reach)
+            yield _Surprised(slip, w, law.weakening, middle - law.weakening * reach, reach)
 
 
 def _surprise(plant: _Surprised, step: Fraction, delay: Fraction, amplitude: Fraction) -> Fraction:
@@ -240,6 +239,11 @@ def _require(holds: bool, what: str, *values: Fraction) -> None:
 
 def _ball(value: Fraction) -> Any:
     return arb(fmpq(value.numerator, value.denominator))
+
+
+def _at_least_one(value: Any) -> Any:
+    """Upper end of a ball, or one."""
+    return value.upper().max(arb(1))
 
 
 def _upper(value: Any) -> Fraction:

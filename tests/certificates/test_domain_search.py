@@ -4,12 +4,17 @@ from dataclasses import dataclass, replace
 from fractions import Fraction as F
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import quakedesign as qd
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Certificate, Loop, domain
 from quakedesign.certificates.domain import Question, certified_domain, certified_lipschitz
 from quakedesign.certificates.matched import Errors, least_authority
 from quakedesign.certificates.robustness import Robustness
+from quakedesign.controllers.feed_forward import NONE, feed_forward
+from quakedesign.fault import Disturbance
 from quakedesign.symbolic.terms import Term
 
 REAL = qd.load_fault("real-fault")
@@ -52,7 +57,7 @@ class Feedforward:
 def simple(monkeypatch):
     """|h'| = 1 + 3|e1| and sensitivities 2 + |e1| and 4 + |e2|; the cause is not asked for."""
 
-    def rate(fault, divisor, errors, *, pieces, feedforward):
+    def rate(fault, divisor, errors, *, pieces=None, feedforward):
         return 1 + 3 * errors.slip
 
     def sensitivities(fault, divisor, errors, *, feedforward):
@@ -158,3 +163,89 @@ def test_the_domain_is_empty_where_the_reference_alone_is_too_fast(simple):
     assert (found.level, found.slip_error, found.start_perturbation, found.method) == (0, 0, 0, "")
     assert found.limited_by == "not asked"
     assert certified_domain(question(d=("-1", "1"))).level == 0
+
+
+def test_the_domain_is_found_where_the_coefficient_is_known(simple):
+    certain = replace(REAL, friction=replace(REAL.friction, drop=0.0))
+    law = Law(divisor=least_authority(certain), feedforward=Feedforward())
+    assert certified_domain(replace(question(WITHSTANDS), fault=certain, controller=law)).level > 0
+
+
+def test_plain_values_are_floats_on_the_outer_side():
+    found = domain.Domain(
+        level=0.5,
+        slip_error=UpperBound(F(1, 3)),
+        slip_rate_error=UpperBound(2),
+        start_slip_error=LowerBound(F(1, 3)),
+        start_slip_rate_error=LowerBound(1),
+        start_perturbation=LowerBound(0),
+        method="split",
+        limited_by="friction",
+        feedforward="none",
+    )
+    plain = found.to_dict()
+    assert plain["start_slip_error"] < F(1, 3) < plain["slip_error"]
+    assert [plain[name] for name in ("level", "slip_rate_error", "start_slip_rate_error")] == [0.5, 2.0, 1.0]
+    assert [plain[name] for name in ("method", "limited_by", "feedforward")] == ["split", "friction", "none"]
+    assert {type(value) for value in plain.values()} == {float, str}
+
+
+# ---------------------------------------------------------------- what keeps a domain from being larger
+
+QUIET = REAL.with_disturbance(Disturbance())
+STEADY = replace(QUIET, friction=replace(REAL.friction, drop=0.0))  # its friction does not change
+GROWTH = "the growth of the disturbance"
+SHAKEN = REAL.with_disturbance(Disturbance(amplitude=1.0, frequency=1.0))
+
+
+@pytest.mark.parametrize(
+    ("fault", "errors", "cause"),
+    [
+        (QUIET, Errors(), "the moving reference"),
+        (SHAKEN, Errors(), "the disturbance"),
+        (QUIET, Errors(acceleration=F(1)), "the control itself, through viscosity and rate weakening (e2')"),
+        (QUIET, Errors(rate=F(1)), "the slip-rate error, through spring and weakening friction"),
+        (SHAKEN, Errors(acceleration=F(1)), "the control itself, through viscosity and rate weakening (e2')"),
+        (SHAKEN, Errors(rate=F(1)), "the slip-rate error, through spring and weakening friction"),
+    ],
+)
+def test_the_cause_of_the_rate_is_the_only_one_that_is_large(fault, errors, cause):
+    asked = replace(question(), fault=fault, controller=Law(feedforward=NONE))
+    assert domain._whole_limit(asked, errors) == cause
+
+
+@pytest.mark.parametrize(
+    ("fault", "sensitivities", "cause"),
+    [
+        (REAL, (2, 1), "the slip error, through friction"),
+        (STEADY, (2, 1), "the slip error, through the spring"),
+        (STEADY, (1, 2), "the slip-rate error, through viscosity"),
+        (REAL, (1, 2), "the slip-rate error, through viscosity"),
+        (STEADY.with_disturbance(Disturbance(slip_growth=100.0)), (2, 1), GROWTH),
+        (STEADY.with_disturbance(Disturbance(rate_growth=100.0)), (1, 2), GROWTH),
+    ],
+)
+def test_the_cause_of_the_sensitivity_is_the_only_one_that_is_large(fault, sensitivities, cause, monkeypatch):
+    monkeypatch.setattr(domain, "largest_matched_rate", lambda *_, **__: F(0))
+    monkeypatch.setattr(domain, "largest_sensitivities", lambda *_, **__: tuple(map(F, sensitivities)))
+    even = replace(WITHSTANDS, slip=F(1), rate=F(1), slip_power=F(1))
+    asked = replace(question(even), fault=fault, controller=Law(feedforward=NONE))
+    found = domain._split_limit(asked, F(1))
+    assert found.endswith(cause)
+    assert found.startswith("the slip error" if sensitivities[0] > sensitivities[1] else "the slip-rate error")
+
+
+def test_what_the_feed_forward_leaves_is_named_so(monkeypatch):
+    """A tenth of the spring is left where the stiffness is known up to a tenth, and friction does nothing."""
+    monkeypatch.setattr(domain, "largest_matched_rate", lambda *_, **__: F(0))
+    monkeypatch.setattr(domain, "largest_sensitivities", lambda *_, **__: (F(2), F(1)))
+    wide = STEADY.with_box("ten-percent")
+    law = Law(divisor=least_authority(wide), feedforward=feed_forward("nominal", wide, least_authority(wide)))
+    asked = replace(question(WITHSTANDS), fault=wide, controller=law)
+    assert domain._split_limit(asked, F(1)) == "the slip error, through the spring less its feed-forward"
+
+
+@given(st.fractions(F(1, 10**6), 10**6), st.sampled_from([F(1), F(1, 2), F(2, 5), F(7, 3)]))
+def test_a_root_is_rounded_up_by_little(level, power):
+    found, exact = domain._root(level, power) ** power.denominator, level**power.numerator
+    assert exact <= found <= exact * (1 + F(1, 2**40))

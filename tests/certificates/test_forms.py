@@ -5,6 +5,8 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from quakedesign.certificates.forms import Form, largest_ratio
 
@@ -28,6 +30,8 @@ def power(variables, degree):
         ({(1, 1, 1): -1}, power(3, 3), (1, -1), 1 / 27),  # arithmetic and geometric mean
         ({(4, 0): 1, (0, 4): 1}, {(5, 0): 1, (0, 5): 1}, (1, F(-4, 5)), 2**0.2),  # norms of order 4 and 5
         ({(2, 1): 3, (1, 2): -3}, power(2, 3), (1, -1), 1 / 12**0.5),  # 3xy(x − y) with x − y = 3^−½
+        ({(1, 0): 1}, {(1, 0): 2, (0, 1): 1}, (1, -1), 1 / 2),  # at a corner, zero at the other
+        ({(2, 0): 1, (0, 2): 1}, {(1, 0): 1, (0, 1): 2}, (F(1, 2), -2), 1),  # at a corner, with other powers
     ],
 )
 def test_known_maxima(top, bottom, powers, exact):
@@ -64,6 +68,42 @@ def test_the_largest_of_several_problems_counts():
     small, large = ({(1, 1): 1}, {(2, 0): 1, (0, 2): 1}), ({(1, 1): 3}, {(2, 0): 1, (0, 2): 1})
     problems = [([form(p, 2, 2) for p in pair], (F(1), F(-1))) for pair in (small, large)]
     assert float(largest_ratio(problems, tolerance=F(1, 100))) == pytest.approx(1.5, rel=0.02)
+
+
+def test_the_largest_counts_before_anything_is_cut_too():
+    problems = [([form({(1, 0): c, (0, 1): c}, 2, 1)], (F(1),)) for c in (3, 2, 5, 4)]
+    assert largest_ratio(problems, pieces=0) == 5
+
+
+ATTAINED = {
+    "at a corner": ([{(1, 0): 1}, power(2, 1)], (1, -1), 1),
+    "everywhere": ([power(2, 1)], (F(3, 7),), 1),
+    "zero": ([{}], (1,), 0),
+    "root of zero": ([{}], (F(1, 2),), 0),
+    "power zero": ([{(1, 0): 1, (0, 1): -1}], (0,), 1),
+}
+
+
+@pytest.mark.parametrize("tolerance", [F(0), F(1, 2)])
+@pytest.mark.parametrize(("polynomials", "powers", "exact"), ATTAINED.values(), ids=ATTAINED)
+def test_the_search_ends_where_the_bound_is_attained(polynomials, powers, exact, tolerance):
+    problem = [form(p, 2, 1) for p in polynomials], [F(p) for p in powers]
+    assert largest_ratio([problem], tolerance=tolerance, pieces=10**9) == exact
+
+
+@given(st.fractions(min_value=F(1, 10**9), max_value=10**9), st.sampled_from([F(1), F(-1), F(1, 3), F(-5, 2), F(4)]))
+def test_a_bound_is_rounded_up_by_little(value, exponent):
+    found = largest_ratio([([form({(1,): value}, 1, 1)], (exponent,))], pieces=0)
+    exact = value**exponent.numerator
+    assert exact <= found**exponent.denominator <= exact * (1 + F(1, 2**40))
+
+
+def test_sizes_stretch_the_variables():
+    """x²y + 4z³ at the corners of the simplex of (3/2, 1/4, 2) and at its middle, by hand."""
+    found = form({(2, 1, 0): 1, (0, 0, 3): 4, (3, 0, 0): 8}, 3, 3, (F(3, 2), F(1, 4), F(2)))
+    assert found.at_corners() == [27, 0, 32]
+    half, _ = found.bisected((0, 1))
+    assert half.at_corners() == [27, F(9, 16) * F(1, 8) + F(27, 8), 32]
 
 
 def test_a_divisor_that_vanishes_has_no_bound():

@@ -93,9 +93,11 @@ def answer_in_slip(slip, rate, time):
     return exp(-rate * time / 2) * sinh(root * time) / root
 
 
-def test_what_friction_gains_by_its_own_pressure_is_given_away():
+@pytest.mark.parametrize("target", [REAL.target_slip, REAL.target_slip / 4], ids=["weak", "still weakening"])
+def test_what_friction_gains_by_its_own_pressure_is_given_away(target):
     """X = 2H·h with σ of X, at steps at which σ matters."""
-    s, w, _, middle, m, reach = steep(REAL)
+    task = replace(REAL, target_slip=target)
+    s, w, _, middle, m, reach = steep(task)
 
     def sigma(peak, step):
         return s - m * (2 * peak / step + s * reach + w * peak) / (middle - m * reach)
@@ -103,8 +105,9 @@ def test_what_friction_gains_by_its_own_pressure_is_given_away():
     for step in (1.0, 10.0):
         top = 2 * 3.2e-4 * answer_in_slip(s, w, step)
         exact = brentq(lambda x, t=step: 2 * 3.2e-4 * answer_in_slip(sigma(x, t), w, t) - x, 0, top)
-        found = float(smallest_peak(REAL, F(step)).slip_rate_error)
-        assert exact * (1 - 2e-3) < found <= exact * (1 + 1e-9)
+        found = smallest_peak(task, F(step))
+        assert exact * (1 - 2e-3) < float(found.slip_rate_error) <= exact * (1 + 1e-9)
+        assert float(found.slip_error) == pytest.approx(reach)
     assert exact < 0.95 * top
 
 
@@ -119,6 +122,42 @@ def test_a_long_step_of_a_stable_fault_counts_as_a_part_of_it():
     found = smallest_peak(replace(STEADY, growths=REAL.growths), F(20))
     exact = 2 * 3.2e-4 * answer_in_slip(-0.4799968, 1.6, 20 / 14)
     assert float(found.slip_rate_error) == pytest.approx(exact, rel=1e-12)
+
+
+def test_so_does_a_long_delay_of_it():
+    found = smallest_peak(replace(STEADY, growths=REAL.growths), F(1, 10), F(20))
+    exact = 2 * 3.2e-4 * answer_in_slip(-0.4799968, 1.6, 0.1 + 1 / sqrt(0.4799968))
+    assert float(found.slip_rate_error) == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_disturbance_that_grows_with_the_rate_takes_from_the_damping():
+    found = smallest_peak(replace(STEADY, growths=(STEADY.growths[0], F(1, 10))), STEP)
+    exact = 2 * 3.2e-4 * (1 - exp(-1.5 * 0.184)) / 1.5
+    assert float(found.slip_rate_error) == pytest.approx(exact, rel=1e-12)
+
+
+CALM = {
+    "falls without an end": {"least": REAL.friction.static},
+    "does not fall": {"weakening": F(0)},
+}
+
+
+@pytest.mark.parametrize("changes", CALM.values(), ids=CALM)
+def test_friction_that_cannot_fall_forbids_nothing_by_falling(changes):
+    task = replace(REAL, friction=replace(REAL.friction, **changes))
+    found = smallest_peak(task, STEP)
+    exact = 2 * 3.2e-4 * answer_in_slip(-0.4799968, 1.6, 0.184)
+    assert found.slip_error is None
+    assert float(found.slip_rate_error) == pytest.approx(exact, rel=1e-12)
+    assert longest_reaction(task, F(2 * 10**7)) is None
+
+
+def test_friction_that_falls_no_faster_than_the_springs_take_is_not_unstable():
+    gained = REAL.area_per_mass[0] * REAL.friction.weakening * REAL.normal_stress
+    for left in (0, 1):
+        calm = replace(REAL, growths=(REAL.stiffness[0] - gained - left, F(0)))
+        assert longest_reaction(calm, F(2 * 10**7)) is None
+        assert smallest_withdrawal(calm, STEP) is None
 
 
 def test_a_delay_counts_as_a_longer_step():
@@ -152,8 +191,9 @@ def test_nothing_is_impossible_without_a_disturbance_and_little_without_an_insta
     assert longest_reaction(still, F(1)) is None
     assert smallest_withdrawal(STEADY, STEP) is None
     assert longest_diffusion(STEADY, F(1), STEP) is None
-    assert longest_reaction(REAL, F(1)) == 0  # 1 Pa holds nothing
-    assert longest_diffusion(REAL, F(1), STEP) == 0
+    for little in (F(0), F(1)):  # 1 Pa holds nothing
+        assert longest_reaction(REAL, little) == 0
+        assert longest_diffusion(REAL, little, F(0)) == 0
 
 
 @pytest.mark.parametrize(
@@ -163,6 +203,7 @@ def test_nothing_is_impossible_without_a_disturbance_and_little_without_an_insta
         lambda: smallest_peak(REAL, F(1), F(-1)),
         lambda: longest_reaction(REAL, F(-1)),
         lambda: longest_diffusion(REAL, F(1), F(-1)),
+        lambda: longest_diffusion(REAL, F(-1), F(1)),
         lambda: smallest_withdrawal(REAL, F(-1)),
         lambda: farthest_well(UpperBound(1), F(0)),
     ],
@@ -178,6 +219,7 @@ def test_more_uncertainty_and_larger_disturbances_forbid_more():
     plain = smallest_peak(REAL, STEP).slip_rate_error
     assert smallest_peak(wide, STEP).slip_rate_error > plain
     assert float(smallest_peak(loud, STEP).slip_rate_error) == pytest.approx(2 * float(plain), rel=1e-3)
+    assert smallest_withdrawal(wide, STEP) > smallest_withdrawal(REAL, STEP)
     for task in (wide, loud):
         assert longest_reaction(task, F(2 * 10**7)) < longest_reaction(REAL, F(2 * 10**7))
 
