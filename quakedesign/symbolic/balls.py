@@ -58,7 +58,7 @@ def _compiled(expression: sp.Expr) -> Callable[[Mapping[sp.Symbol, Any]], Any]:
 
     def place(e: sp.Expr) -> int:
         if e not in places:
-            arguments = [] if e.is_number else [place(a) for a in _arguments(e)]
+            arguments = [place(a) for a in e.args]
             places[e] = len(steps)
             steps.append((_operation(e), arguments))
             if e.is_Symbol:
@@ -83,10 +83,6 @@ def _compiled(expression: sp.Expr) -> Callable[[Mapping[sp.Symbol, Any]], Any]:
     return evaluate
 
 
-def _arguments(e: sp.Expr) -> tuple[sp.Expr, ...]:
-    return e.args[:1] if e.is_Pow or isinstance(e, AbsolutePower | SignedPower) else e.args
-
-
 def _number(e: sp.Expr) -> Any:
     from flint import arb, fmpq
 
@@ -99,7 +95,7 @@ def _number(e: sp.Expr) -> Any:
         return arb.pi()
     if e is sp.E:
         return arb(1).exp()
-    return _operation(e)([_number(a) for a in _arguments(e)])
+    return _operation(e)([_number(a) for a in e.args])
 
 
 def _operation(e: sp.Expr) -> Operation:
@@ -143,7 +139,7 @@ def _power(exponent: sp.Expr) -> Operation:
 
     if exponent.is_Integer:
         n = abs(int(exponent))
-        if exponent > 0:
+        if exponent.is_positive:
             return lambda values: _integer_power(values[0], n)
         return lambda values: 1 / _integer_power(values[0], n)
     if exponent.is_Rational:
@@ -171,12 +167,11 @@ def _monotone(exponent: sp.Expr, *, signed: bool) -> Operation:
     if not exponent.is_Rational:
         return _without(f"the exponent {exponent}")
     power = arb(fmpq(int(exponent.p), int(exponent.q)))
-    negative, constant = bool(exponent < 0), bool(exponent == 0)
+    negative, jumps = bool(exponent < 0), signed and bool(exponent == 0)
 
     def at(end: Any) -> Any:
-        size = abs(end)
-        value = arb(0) if size.is_zero() else size**power
-        return -value if signed and end < 0 else value
+        value = abs(end) ** power
+        return value * end.sgn() if signed else value
 
     def operation(values: list[Any]) -> Any:
         x = values[0]
@@ -184,8 +179,8 @@ def _monotone(exponent: sp.Expr, *, signed: bool) -> Operation:
         straddles = not (low > 0 or high < 0)
         if not x.is_finite() or (straddles and negative):
             return arb("nan")
-        if signed and constant:
-            return arb(1) if low > 0 else (arb(-1) if high < 0 else arb(-1).union(arb(1)))
+        if straddles and jumps:
+            return arb(-1).union(arb(1))
         hull = at(low).union(at(high))
         return hull.union(arb(0)) if straddles and not signed else hull
 

@@ -66,6 +66,23 @@ def test_an_enclosure_contains_every_value(expression, first, second, along, acr
     assert enclose(expression, box).overlaps(exact(expression, at))
 
 
+@settings(max_examples=30, deadline=None)
+@given(expressions, numbers, numbers)
+def test_an_enclosure_of_a_point_is_as_narrow_as_the_arithmetic(expression, first, second):
+    """With 200 bits the value to 25 digits: what a number such as pi or 1/3 is rounded to is not taken for it."""
+    at = {x: first, y: second}
+    with flint.ctx.workprec(200):
+        found = enclose(expression, {symbol: (value, value) for symbol, value in at.items()})
+        if found.is_finite():  # |x|^a about zero is as wide as a root of the rounding
+            assert found.overlaps(exact(expression, at))
+            assert found.rad() < 1e-12
+
+
+@given(intervals)
+def test_a_reciprocal_is_no_wider_than_that_of_the_ball(ends):
+    assert not ends[0] > 0 or (1 / ball(*ends)).contains(enclose(1 / x, {x: ends}))
+
+
 @given(intervals)
 def test_a_ball_contains_both_ends(ends):
     found = ball(*ends)
@@ -116,9 +133,11 @@ def test_powers_are_enclosed_tightly():
 
 @pytest.mark.parametrize("number", [sp.pi, sp.E, sp.sqrt(2) * sp.exp(sp.Rational(1, 3)), sp.Rational(1, 3)], ids=str)
 def test_numbers(number):
-    found = enclose(number, {})
-    assert found.overlaps(exact(number, {}))
-    assert float(found.rad()) < 1e-14
+    for bits in (53, 200):
+        with flint.ctx.workprec(bits):
+            found = enclose(number + sp.Symbol(f"x{bits}"), {sp.Symbol(f"x{bits}"): (F(0), F(0))})
+            assert found.overlaps(exact(number, {}))
+            assert float(found.rad()) < 2.0 ** (4 - bits)
 
 
 @pytest.mark.parametrize("expression", [sp.gamma(x), sp.Integer(2) ** x, x**sp.pi, SignedPower(x, sp.sqrt(2))], ids=str)
@@ -136,6 +155,7 @@ MAXIMA = [
     (SignedPower(x, sp.Rational(1, 3)) - x, {x: (F(-1), F(1))}, 0.38490017945975052),  # at 3^{-3/2}: 2/3^{3/2}
     (-AbsolutePower(x, sp.Rational(3, 2)), {x: (F(-4), F(1))}, 8),
     (sp.Max(x, 1 - x), {x: (F(0), F(1))}, 1),
+    (x * (sp.Rational(33, 10) - x), {x: (F(2), F(3))}, 2.6),  # at the end; larger values lie outside
     (sp.Integer(0) * x, {x: (F(0), F(1))}, 0),
     (sp.Integer(-2), {}, 2),
 ]
@@ -238,7 +258,9 @@ def test_the_size_to_the_power_zero_is_one():
 def test_what_is_not_finite_stays_so():
     """1/x over an interval with zero, under a signed power."""
     for kind in (SignedPower, AbsolutePower):
-        assert not enclose(kind(1 / x, sp.Rational(1, 3)), {x: (F(-1), F(1))}).is_finite()
+        for exponent in (sp.Rational(1, 3), sp.Integer(0)):
+            undefined = sp.Add(kind(1 / x, exponent, evaluate=False), y, evaluate=False)
+            assert not enclose(undefined, {x: (F(-1), F(1)), y: (F(0), F(0))}).is_finite()
 
 
 def test_numbers_are_enclosed():
@@ -269,6 +291,34 @@ def test_a_bound_stops_near_a_value_that_is_attained():
     assert F(1, 4) * F(11, 10) < one <= 1
 
 
+@pytest.mark.parametrize("tolerance", [F(0), F(1, 2)])
+@pytest.mark.parametrize("value", [0, -7])
+def test_the_search_ends_where_the_bound_is_attained(value, tolerance):
+    assert upper_bound(sp.Integer(value) + 0 * x, {x: (F(0), F(1))}, tolerance=tolerance, pieces=10**9) == abs(value)
+
+
+@pytest.mark.parametrize("other", [(F(1), F(1)), (F(0), F(1))], ids=["known", "idle"])
+def test_no_cuts_are_spent_on_what_cannot_matter(other):
+    """Neither half of x lowers the bound 3/4 of max(x, 1 − x), so that any other cut would be as good."""
+    known = other[0] == other[1]
+    expression = sp.Max(x, 1 - x) + (y if known else 0)
+    found = upper_bound(expression, {y: other, x: (F(1, 4), F(3, 4))}, pieces=10**9)
+    assert F(3, 4) <= found - known <= F(3, 4) + F(1, 50)
+
+
+@pytest.mark.parametrize("order", [(x, y), (y, x)], ids=str)
+def test_the_range_that_lowers_the_bound_most_is_cut(order):
+    """x (1 − x) + 100 y: 101, but 100.5 once x is halved, and at most 100.375 once both halves are."""
+    box = {symbol: (F(0), F(1)) for symbol in order}
+    found = upper_bound(x * (1 - x) + 100 * y, box, tolerance=F(1, 10**6), pieces=3)
+    assert F(401, 4) <= found <= F(1003751, 10**4)
+
+
+def test_a_point_whose_bound_is_not_attained_is_kept():
+    found = upper_bound(sp.exp(x), {x: (F(1), F(1))}, tolerance=F(0), pieces=3)
+    assert 0 < float(found - F("2.718281828459045235360287")) < 1e-14
+
+
 def test_a_bound_is_of_the_size():
     assert F(4) <= upper_bound(-(x**2), {x: (F(-2), F(1))}) <= F(404, 100)
     assert F(3) <= upper_bound(x - y, {x: (F(0), F(1)), y: (F(1), F(3))}) <= F(303, 100)
@@ -279,3 +329,13 @@ def test_a_bound_is_of_the_size():
 def test_the_sign_of_zero_alone_is_any():
     found = enclose(SignedPower(x, 0), {x: (F(0), F(0))})
     assert [float(found.lower()), float(found.upper())] == pytest.approx([-1, 1], abs=SLACK)
+
+
+@pytest.mark.parametrize("expression", [SignedPower(sp.Abs(x), 0), SignedPower(y - sp.Abs(x), 0)], ids=str)
+def test_the_sign_at_an_end_that_is_zero_exactly_is_any(expression):
+    found = enclose(expression, {x: (F(-1), F(1)), y: (F(0), F(0))})
+    assert [float(found.lower()), float(found.upper())] == pytest.approx([-1, 1], abs=SLACK)
+
+
+def test_the_first_power_is_no_reciprocal():
+    assert float(enclose(sp.Pow(x, 1, evaluate=False), {x: (F(4), F(4))})) == 4

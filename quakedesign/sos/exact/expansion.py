@@ -125,7 +125,7 @@ class Expansion:
         """p to the whole number that the token must be."""
         from flint import fmpq
 
-        if token.kind != "number" or not token.text.isdigit() or len(token.text) > 9 or int(token.text) > DEGREE:
+        if not token.text.isdigit() or len(token.text) > 9 or int(token.text) > DEGREE:
             expected = f"a whole number from 0 to {DEGREE} as exponent"
             refuse(self._text, token, expected, "Write for example x^2; only digits make an exponent.")
         exponent = int(token.text)

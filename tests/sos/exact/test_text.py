@@ -294,9 +294,71 @@ def test_a_written_rational_polynomial_is_read_back():
     assert parse(text, ["x", "y"]) == (("x", "y"), polynomial)
 
 
-def test_the_bound_of_a_power_is_never_below_its_size():
-    for text, exponent in [("x+y+1", 7), ("x^2+y^2", 9), ("x", 5), ("0", 3), ("x^3+x+1", 10), ("2", 4)]:
-        order, polynomial = parse(text)
-        packed = expansion.Expansion(text, order)
-        base = {sum(e << 7 * i for i, e in enumerate(k)) + (sum(k) << 7 * len(k)): c for k, c in polynomial.items()}
-        assert packed._size_of_power(base, exponent) >= len(parse(f"({text})^{exponent}")[1])
+def packed(polynomial):
+    """Terms as `Expansion` keeps them: seven bits an exponent, the degree on top."""
+    return {sum(e << 7 * i for i, e in enumerate(k)) + (sum(k) << 7 * len(k)): c for k, c in polynomial.items()}
+
+
+@pytest.mark.parametrize(
+    ("text", "exponent", "size"),
+    [
+        ("x^2 + y^2", 9, 10),  # products of terms: 9 out of 2 with repetition
+        ("x^3", 4, 1),
+        ("0", 3, 1),
+        ("2", 4, 1),
+        ("(1 + x)*(1 + y)", 10, 11**2),  # the box of exponents
+        ("1 + x + x^2 + x^3 + x^4", 10, 41),
+        ("(x + y + 1)^2", 5, 66),  # degree 10 in two variables: 12 over 2
+        ("(x + y + 1)^2 + 0*z", 5, 66),
+    ],
+)
+def test_the_bound_of_a_power_is_the_least_of_three_counts(text, exponent, size):
+    order, polynomial = parse(text)
+    assert expansion.Expansion(text, order)._size_of_power(packed(polynomial), exponent) == size
+    assert size >= len(parse(f"({text})^{exponent}")[1])
+
+
+ALPHABET = "abcdefghijklmnopqrstuvwxyz"
+
+
+@pytest.mark.parametrize(
+    ("start", "length", "shown"),
+    [
+        (30, 30, "…ghijklmnopqrstuvwxyzabcd⟦efghijklmnopqrstuvwxyzab⟧cdefghijklmnopqrstuvwxyz…"),
+        (24, 2, "abcdefghijklmnopqrstuvwx⟦yz⟧abcdefghijklmnopqrstuvwx…"),
+        (25, 1, "…bcdefghijklmnopqrstuvwxy⟦z⟧abcdefghijklmnopqrstuvwx…"),
+        (3, 1, "abc⟦d⟧efghijklmnopqrstuvwxyzab…"),
+        (78, 2, "…cdefghijklmnopqrstuvwxyz⟦ab⟧cdefghijklmnopqrstuvwxyz"),
+        (77, 2, "…bcdefghijklmnopqrstuvwxy⟦za⟧bcdefghijklmnopqrstuvwxy…"),
+    ],
+)
+def test_a_refusal_shows_24_characters_on_either_side(start, length, shown):
+    text = 4 * ALPHABET
+    token = expansion.Token("name", text[start : start + length], start)
+    with pytest.raises(PolynomialError) as caught:
+        expansion.refuse(text, token, "another", "Write it.")
+    assert str(caught.value) == f"another expected at character {start + 1}. Received {shown} there. Write it."
+
+
+LIMITS = [  # allowed, and refused
+    ("1e400", "1e401"),
+    ("1e-400", "1e-401"),
+    ("1e00001", "1e000001"),
+    ("0e400", "0e401"),
+    ("9" * 395 + "e5", "9" * 396 + "e5"),
+    ("0." + "9" * 398, "0." + "9" * 399),
+    ("0" * 399 + "1", "0" * 400 + "1"),
+    ("x^000000060", "x^0000000060"),
+    ("1^60", "1^61"),
+    ("x^59*x", "x^59*x^2"),
+    ("(x^30)^2", "(x^31)^2"),
+    ("(a + b + c + d)^30*e + a*f", "(a + b + c + d)^30*e + (a + b + c + d)^30*f"),
+    ("2^60", "((2^60)^60)"),
+]
+
+
+@pytest.mark.parametrize(("allowed", "refused"), LIMITS, ids=lambda text: text[:20])
+def test_what_is_just_allowed_is_read_and_what_is_just_beyond_refused(allowed, refused):
+    parse(allowed)
+    with pytest.raises(PolynomialError, match=r"at most|from 0 to 60"):
+        parse(refused)
