@@ -37,8 +37,8 @@ class LevelSets:
     @property
     def degree(self) -> Fraction:
         """m, the degree of V."""
-        loop = self.certificate.loop
-        return sum((f[1] * loop.states[f[0]] for f in self.certificate.lyapunov[0].factors), Fraction(0))
+        loop, (term, *_) = self.certificate.loop, self.certificate.lyapunov
+        return sum((exponent * loop.states[state] for state, exponent, _ in term.factors), Fraction(0))
 
     def level(self, matched: Fraction) -> Fraction:
         """Upper bound of V where e1 = e2 = 0 and |e3| ≤ matched [unit of ν]."""

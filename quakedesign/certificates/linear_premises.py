@@ -198,7 +198,7 @@ def _friction_at(fault: Fault, slip: Range) -> Range:
     """Friction at rest at a slip, anywhere between its bounds and its slope bound from the static value."""
     friction, start = friction_bounds(fault.friction), static_friction(fault)
     most = friction.slip_slope * slip[1]
-    return max(friction.least, start - most), start if friction.weakens else min(friction.most, start + most)
+    return max(friction.least, start - most), min(friction.most, start + most)
 
 
 def _end(end) -> Fraction:

@@ -20,6 +20,7 @@ def test_what_is_required_is_rounded_up_and_what_is_certified_down():
     assert type(one.certified) is LowerBound
     assert (one.required, one.certified, one.ratio) == (F(1, 3), F(2, 3), F(1, 2))
     assert f"{one.required:.2g} {one.certified:.2g}" == "0.34 0.66"
+    assert type(premise(0.5, 1.0).required) is type(premise(0.5, 1.0).ratio) is UpperBound
 
 
 def test_a_premise_is_about_a_proof_and_no_measurement_unless_told():

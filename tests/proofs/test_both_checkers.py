@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.certificates import checking, parse_certificate
+from quakedesign.certificates import checking, parse_certificate, term_files
 from quakedesign.errors import CertificateError
+from quakedesign.sos.exact import files, reduction, strict, work
 from quakedesign.sos.exact.files import load
 from quakedesign.sos.exact.proofs import SumOfSquares, holds
 
@@ -73,3 +74,21 @@ def test_a_changed_number_is_decided_alike(kind, make):
         for new in kind.other_numbers(value):
             changed = kind.edited(document, (*path, new))
             assert by_package(changed) == by_itself(kind, changed), (path, new)
+
+
+LIMITS = {
+    "ROOTS": "roots", "LIFTS": "lifts", "STATES": "states", "UNCERTAIN": "uncertain", "NUMBERS": "parameters",
+    "TERMS": "terms", "BASIS": "basis", "OBLIGATIONS": "witnesses",
+}  # fmt: skip
+
+
+def test_both_checkers_have_the_same_limits():
+    def standalone(*names):
+        return [getattr(LOOPS.checker, f"MAX_{name}") for name in names]
+
+    assert standalone(*LIMITS) == [term_files.LIMITS[name] for name in LIMITS.values()]
+    assert standalone("POLYNOMIAL", "VARIABLES", "CONSTRAINTS", "PRODUCTS", "REDUCED") == [
+        files._TERMS, files._VARIABLES, files._CONSTRAINTS, files._PRODUCTS, files._BASIS
+    ]  # fmt: skip
+    assert standalone("BYTES", "DENOMINATOR_BITS", "NESTING") == [strict.LARGEST_FILE, strict._GRID_BITS, strict._DEPTH]
+    assert standalone("STEPS", "POLYNOMIAL", "MONOMIALS") == [work.STEPS, work.TERMS, reduction._MONOMIALS]

@@ -328,6 +328,65 @@ def test_steps_are_counted_with_the_square_of_the_length():
         budget.spend(1, 0)
 
 
+def plain(*equalities, inequalities=(), degree=0):
+    return checker.Statement(("x",), {}, {(0,): F(1)}, inequalities, equalities, ((),), degree)
+
+
+STEPS_BY_HAND = {
+    "a sum": (lambda budget: checker.add({}, (0,), F(1), budget), 6),
+    "a square, and a product of one factor": (lambda budget: checker.multiply([], [F(3)], (2,), budget), 1 + 6),
+    "a product of two factors": (lambda budget: checker.multiply([F(1), F(3)], [], (), budget), 12),
+    "an elimination of three rows": (
+        lambda budget: checker.is_positive_definite([[int(i == j) for j in range(3)] for i in range(3)], budget), 3 + 1,
+    ),
+    "the reach of two terms": (lambda budget: checker.reach_of({(1,): F(1), (0,): F(1)}, {}, 1, budget), 2 * 6),
+    "a product that is kept": (
+        lambda budget: checker.product_expander(plain(inequalities=({(1,): F(1)},)), budget)((0,)), 6 + 300,
+    ),
+    "a value of two terms": (lambda budget: checker.apply({0: 1}, 0, {0: 1, 1: 1}, budget), 2),
+    "an equality of two terms beyond the degree": (
+        lambda budget: checker.check_equalities({}, plain({(1,): F(1), (0,): F(1)}), budget), 2,
+    ),
+    "pairs of a basis of three": (lambda budget: list(checker.survivors(plain(degree=4), set(), budget)), 6),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STEPS_BY_HAND)
+def test_steps_are_counted_before_they_are_done(name):
+    work, steps = STEPS_BY_HAND[name]
+    budget = checker.Budget()
+    budget.left = steps
+    work(budget)
+    assert budget.left == 0
+    budget.left = steps - 1
+    with pytest.raises(checker.Refused, match="fewer steps"):
+        work(budget)
+
+
+def test_polynomials_and_denominators_are_limited(monkeypatch):
+    monkeypatch.setattr(checker, "MAX_POLYNOMIAL", 2)
+    monkeypatch.setattr(checker, "MAX_DENOMINATOR_BITS", 3)
+    one, two, three = ({(i,): F(1) for i in range(n)} for n in (1, 2, 3))
+    assert checker.add_product({}, one, two, checker.Budget()) == two
+    with pytest.raises(checker.Refused, match="an expanded polynomial must be of at most 2 terms"):
+        checker.add_product({}, one, three, checker.Budget())
+    assert checker.read_polynomial({"0": "1", "1": "1"}, "p", 1) == two
+    with pytest.raises(checker.Refused, match="p must be of at most 2 terms"):
+        checker.read_polynomial({"0": "1", "1": "1", "2": "1"}, "p", 1)
+    assert checker.to_integers([F(1, 7)], "g") == ([1], 7)
+    with pytest.raises(checker.Refused, match="g must be of common denominator"):
+        checker.to_integers([F(1, 8)], "g")
+
+
+def test_a_long_file_is_not_read_to_its_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(checker, "MAX_BYTES", 4)
+    (tmp_path / "fine").write_text("éé", encoding="utf-8")
+    (tmp_path / "long").write_text("ééé", encoding="utf-8")  # cut within a character
+    assert checker.read_file(str(tmp_path / "fine")) == "éé"
+    with pytest.raises(checker.Refused, match="at most 4 bytes"):
+        checker.read_file(str(tmp_path / "long"))
+
+
 def test_the_limits_are_those_of_the_format():
     text = (PATH.parent / "FORMAT.md").read_text(encoding="utf-8")
     for limit in (
@@ -342,6 +401,9 @@ def test_the_limits_are_those_of_the_format():
         f"{checker.MAX_POLYNOMIAL} terms in one polynomial",
         f"at most {checker.MAX_REDUCED} elements in a square, {checker.MAX_MONOMIALS} monomials before",
         f"and {checker.MAX_REDUCED} after reduction",
+        f"names, different, 1 … {checker.MAX_VARIABLES} |",
+        f"no g_i twice; at most {checker.MAX_CONSTRAINTS} together",
+        f"the empty one among them, at most {checker.MAX_PRODUCTS} |",
     ):
         assert limit in text, limit
     assert checker.MAX_BYTES % 2**20 == 0

@@ -9,8 +9,17 @@ import pytest
 
 from quakedesign.certificates.command import check_files
 from quakedesign.errors import WorkError
-from quakedesign.sos.exact.definiteness import nonnegative_definite, positive_definite
+from quakedesign.sos.exact.definiteness import (
+    _eliminates,
+    nonnegative_definite,
+    positive_definite,
+    positive_definite_integers,
+)
 from quakedesign.sos.exact.polynomial import evaluate, product
+from quakedesign.sos.exact.proofs import Functional, _functional_holds, _sum, localizing_matrix
+from quakedesign.sos.exact.reduction import _contributions, reach
+from quakedesign.sos.exact.squares import IntegerGram, Square, form
+from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.exact.work import STEPS, TERMS, expanded, limited, longest, spend
 
 RANDOM = random.Random(5)
@@ -124,4 +133,52 @@ def test_the_common_denominator_counts():
 def test_every_kind_of_work_is_counted(work):
     work()
     with limited(200), pytest.raises(WorkError):
+        work()
+
+
+def statement(*equalities):
+    """-1 >= 0 with squares of degree 2 in x, on where the equalities hold."""
+    return Statement(
+        variables=("x",), polynomial={(0,): F(-1)}, equalities=equalities, degree=2, multiplier={(0,): F(1)}
+    )  # fmt: skip
+
+
+ONE, X, LINE = (0,), (1,), {(0,): F(1), (1,): F(1)}
+UNIT = IntegerGram([[1, 0], [0, 1]], 1)
+STEPS_BY_HAND = {
+    "four entries, their common denominator, and a determinant": (lambda: positive_definite([[F(3), F(1)]] * 2), 9),
+    "a determinant of integers": (lambda: positive_definite_integers([[2]]), 1),
+    "one of thirty rows of 90 bits": (
+        lambda: positive_definite_integers([[2**89 * (i == j) for j in range(30)] for i in range(30)]),
+        1 + 30**4 * (90 + 10) // 100_000,
+    ),
+    "an elimination of three rows, of two, of one": (
+        lambda: _eliminates([[F(i == j) for j in range(3)] for i in range(3)]), 6 * (9 + 4 + 1),
+    ),
+    "three products of monomials": (lambda: form([ONE, X], UNIT, 1), 3),
+    "two coefficients, two of another element, 2*2*(2 + 2) for their products, and three": (
+        lambda: form([LINE, {ONE: F(2)}], UNIT, 1), 3 + 16 + 3,
+    ),
+    "three entries for each of two pairs of a weight of two terms": (
+        lambda: localizing_matrix(LINE, [ONE, X], {ONE: F(1)}), 2**2 * 2,
+    ),
+    "pairs of a basis of two": (lambda: _contributions(statement(), [{ONE: None, X: None}]), 3),
+    "two multiples of an equality of two terms": (lambda: reach(statement(LINE)), 2 * 2),
+    "one of one term, of the whole degree": (lambda: reach(statement({(2,): F(1)})), 1),
+    "a square of two terms, times one, added": (
+        lambda: _sum(statement(), [(Square(basis=(ONE, X), gram=(F(1), F(0), F(1))), UNIT)]), 3 + 2 + 2,
+    ),
+    "each coefficient twice of values, target, equality and weight, and two multiples of the equality": (
+        lambda: _functional_holds(statement(LINE), Functional(values={ONE: F(1), X: F(-1)})),
+        2 * (2 + 1 + 2 + 1) + 10 * 2 * 2 + 2,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STEPS_BY_HAND)
+def test_work_is_counted_before_it_is_done(name):
+    work, steps = STEPS_BY_HAND[name]
+    with limited(steps):
+        work()
+    with limited(steps - 1), pytest.raises(WorkError):
         work()
