@@ -4,7 +4,8 @@ Usage: ``python tests/mutation.py MODULE.py... --tests TEST... [--results FILE]`
 run once to learn which of them reaches which line. Every mutant then gets a forked child, in which the code of
 the functions is exchanged and the tests that reach the line run, quickest first, until one fails. Results are
 JSON lines: a mutant that was killed is not tried again, one that survived is, unless ``mutation_equivalents.toml``
-explains it by module, line, mutation and reason. Without tests the results so far are reported.
+explains it with a reason: by module, line and mutation, or by a rule for all lines and mutations that match its
+patterns. A rule says which tests hold what it leaves free. Without tests the results so far are reported.
 
 Not mutated: annotations, strings, messages of errors, imports, and ``strict`` of ``zip``, which guards no input.
 """
@@ -12,6 +13,7 @@ Not mutated: annotations, strings, messages of errors, imports, and ``strict`` o
 import argparse
 import ast
 import copy
+import fnmatch
 import gc
 import importlib
 import json
@@ -353,7 +355,7 @@ class Mutation:
         for name, (_, passed, _) in reached.items():
             if not passed:
                 print(f"fails or takes too long without a mutation, left out: {name}")
-        past, known = read_results(self.options.results), explained()
+        past, known = read_results(self.options.results), Explanations()
         kills: Counter[tuple[str, str, str]] = Counter()
         with open(self.options.results, "a", encoding="utf-8") as stream:
             for path in self.paths:
@@ -362,7 +364,7 @@ class Mutation:
                     key, count = mutant.key(), seen[mutant.key()]
                     seen[key] += 1
                     skipped = self.options.skip and re.search(self.options.skip, mutant.text)
-                    if skipped or key in known or past.get((*key, count), "survived") != "survived":
+                    if skipped or known.of(key) or past.get((*key, count), "survived") != "survived":
                         continue
                     names = self.choose(mutant, reached, kills)
                     status, killer = self.try_out(mutant, by_path[mutant.path], modules, [items[n] for n in names])
@@ -412,7 +414,7 @@ class Mutation:
         if not mutant.function:  # a constant: any test may read it
             names = list(known)
         elif not names:  # a default, or a line that is not traced
-            names = [name for name, lines in known.items() if lines.intersection(mutant.within)]
+            names = [name for name, lines in known.items() if lines.intersection(mutant.within)] or list(known)
         reaching = {name: reached[name][0] / (1 + kills[mutant.path, mutant.function, name]) for name in names}
         chosen, left = [], self.options.seconds
         for name in sorted(reaching, key=reaching.__getitem__):
@@ -431,27 +433,65 @@ def read_results(path: Path) -> dict[tuple[str, str, str, int], str]:
     return {tuple(row[:4]): row[5] for row in rows}
 
 
-def explained() -> set[tuple[str, str, str]]:
-    """Return the mutants that no test can tell from the original."""
-    entries = tomllib.loads(EQUIVALENTS.read_text(encoding="utf-8"))["equivalent"]
-    return {(row["module"], row["line"], row["mutation"]) for row in entries}
+@dataclass(frozen=True)
+class Rule:
+    """Mutants of one kind, for one reason.
+
+    Attributes
+    ----------
+    module : str
+        Pattern of paths, as of a shell.
+    line, mutation : str
+        Regular expressions.
+    reason : str
+    held : list of str
+        Tests that fail where what the lines do is left out altogether.
+    """
+
+    module: str
+    line: str
+    mutation: str
+    reason: str
+    held: list[str] = field(default_factory=list)
+
+    def explains(self, key: tuple[str, str, str]) -> bool:
+        """Tell whether a mutant is of the kind."""
+        module, line, mutation = key
+        return bool(
+            fnmatch.fnmatch(module, self.module) and re.search(self.line, line) and re.search(self.mutation, mutation)
+        )
+
+
+class Explanations:
+    """Mutants that no test needs to tell from the original, with the reason."""
+
+    def __init__(self) -> None:
+        entries = tomllib.loads(EQUIVALENTS.read_text(encoding="utf-8"))
+        self.single = {(row["module"], row["line"], row["mutation"]): row["reason"] for row in entries["equivalent"]}
+        self.rules = [Rule(**row) for row in entries["rule"]]
+
+    def of(self, key: tuple[str, str, str]) -> str:
+        """Say whether a mutant is ``equivalent``, explained ``by rule``, or neither (an empty text)."""
+        if key in self.single:
+            return "equivalent"
+        return "by rule" if any(rule.explains(key) for rule in self.rules) else ""
 
 
 def report(options: argparse.Namespace) -> int:
     """Print survivors without explanation, and the number of mutants by module and result."""
-    known, results, totals = explained(), read_results(options.results), defaultdict(Counter)
+    known, results, totals = Explanations(), read_results(options.results), defaultdict(Counter)
     for path in options.modules:
         seen: Counter[tuple[str, str, str]] = Counter()
         for mutant in mutants_of(path.resolve(), compiled=False):
             key = mutant.key()
             status = results.get((*key, seen[key]), "not tried")
             seen[key] += 1
-            if status in ("survived", "not tried") and key in known:
-                status = "equivalent"
+            if status in ("survived", "not tried"):
+                status = known.of(key) or status
             if status == "survived":
                 print(f"{key[0]}:{mutant.lines[0]}: {mutant.text}\n    {mutant.mutation}")
             totals[key[0]][status] += 1
-        for key in sorted(key for key in known - seen.keys() if ROOT / key[0] == path.resolve()):
+        for key in sorted(key for key in known.single.keys() - seen.keys() if ROOT / key[0] == path.resolve()):
             print(f"explained, but no mutant any more: {key}")
     for name, counts in totals.items():
         print(f"{name}: {sum(counts.values())} mutants; {', '.join(f'{n} {s}' for s, n in sorted(counts.items()))}")

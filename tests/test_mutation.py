@@ -2,7 +2,9 @@
 
 import ast
 import importlib.util
+import re
 import sys
+from fnmatch import fnmatch
 from pathlib import Path
 
 PATH = Path(__file__).with_name("mutation.py")
@@ -86,3 +88,28 @@ def test_defaults_of_fields_and_methods_are_changed_in_place(tmp_path):
         tool.apply(found[mutation], [size.times], [module])
         assert size().times() == product
     assert size(2).times(7) == 14
+
+
+def test_a_rule_explains_what_tests_hold_and_leaves_no_check_out():
+    explanations = tool.Explanations()
+    for rule in explanations.rules:
+        paths = [path for path in tool.ROOT.glob("**/*.py") if fnmatch(str(path.relative_to(tool.ROOT)), rule.module)]
+        rows = [row.strip() for path in paths for row in path.read_text(encoding="utf-8").splitlines()]
+        assert any(re.search(rule.line, row) for row in rows), rule.line
+        for left_out in ("need(a <= B, 'c', d) → pass", "raise Refused → pass", "a <= B → True", "a <= B → False",
+                         "spend(1) → pass", "budget.spend(1, 2) → pass"):  # fmt: skip
+            assert not re.search(rule.mutation, left_out), left_out
+        for held in rule.held:
+            path, _, name = held.partition("::")
+            assert f"def {name}(" in (tool.ROOT / path).read_text(encoding="utf-8"), held
+
+
+def test_single_mutants_and_kinds_are_explained():
+    explanations = tool.Explanations()
+    limit = ("proofs/check.py", "MAX_ROOTS, MAX_LIFTS = 4, 4", "4 → 5")
+    assert explanations.of(limit) == "by rule"
+    assert explanations.of(("quakedesign/certificates/claim.py", *limit[1:])) == ""
+    assert (
+        explanations.of(("proofs/check.py", "need(x <= MAX_ROOTS, where)", "need(x <= MAX_ROOTS, where) → pass")) == ""
+    )
+    assert {explanations.of(key) for key in explanations.single} == {"equivalent"}

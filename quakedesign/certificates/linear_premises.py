@@ -104,9 +104,13 @@ def effective_stress(fault: Fault) -> tuple[Fraction, bool]:
     box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)} | {_r: (Fraction(0), target)}
     stress = upper_bound(numerator / least, box, pieces=400)
     lowest = numerator.subs(_r, to_sympy(target)).subs(
-        {plant.k_hat: to_sympy(box[plant.k_hat][1]), plant.N_hat: to_sympy(box[plant.N_hat][0])}
+        {
+            plant.k_hat: to_sympy(box[plant.k_hat][1]),
+            plant.N_hat: to_sympy(box[plant.N_hat][0]),
+            plant.sigma: to_sympy(box[plant.sigma][0]),
+        }
     )
-    return stress, bool(lowest.subs(plant.sigma, to_sympy(box[plant.sigma][0])) > 0)
+    return stress, bool(lowest > 0)
 
 
 def rest_pressure(
