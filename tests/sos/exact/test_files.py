@@ -218,6 +218,7 @@ def test_an_answer_is_its_proof(tmp_path):
     statement, proof = load(json.dumps(BY_HAND))
     answer = Answer(statement=statement, proof=proof)
     assert (str(answer.verdict), answer.check()) == ("sos", True)
+    assert (answer.blocks, answer.seconds, answer.versions) == ({}, 0, {})
     wrong = Answer(statement=dataclasses.replace(statement, polynomial={(2, 0): Fraction(1)}), proof=proof)
     assert (str(wrong.verdict), wrong.check()) == ("sos", False)
     undecided = Answer(statement=statement, proof=None)

@@ -30,6 +30,7 @@ def test_variables_are_found_in_order_or_given():
     assert read("y + x", ("z >= 0",), None, None)[0] == ("y", "x", "z")
     assert read(z * y, (x >= 0,), None, None)[0] == ("y", "z", "x")
     assert read("x", (), "z^2", None)[0] == ("x", "z")
+    assert read("x", (), "auto", None)[0] == ("x",)
     assert read("x", (), None, ("z", "x"))[:2] == (("z", "x"), {(0, 1): 1})
     assert read(3, (), None, None)[:2] == (("x",), {(0,): 3})
     assert read("0", (), None, ("x", "y"))[1] == {}
@@ -65,3 +66,10 @@ def test_a_multiplier_is_read_like_a_polynomial():
 def test_everything_else_is_refused(polynomial, on, variables):
     with pytest.raises((PolynomialError, ParameterError)):
         read(polynomial, on, None, variables)
+
+
+def test_what_the_variables_lack_is_said():
+    with pytest.raises(PolynomialError, match="needs its variables"):
+        read({(1, 0): 1}, (), None, None)
+    with pytest.raises(PolynomialError, match=r"variables must be among x, y\. Received z as well"):
+        read(x * z, (), None, ("x", "y"))

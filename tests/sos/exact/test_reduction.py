@@ -1,3 +1,4 @@
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
@@ -59,6 +60,12 @@ def test_monomials_of_known_squares_survive(squares):
                 total[key] = total.get(key, Fraction(0)) + c * d
     found = reduced_bases(statement(("x", "y"), total))[0]
     assert {e for square in squares for e in square} <= set(found)
+
+
+def test_a_product_beyond_the_degree_has_no_basis():
+    quartic = asked("x^4 + 1", on=("1 - x^4 >= 0",))
+    assert list(map(len, full_bases(quartic))) == [3, 1]
+    assert list(map(len, full_bases(replace(quartic, degree=0)))) == [1, 0]
 
 
 def test_on_the_orthant_parity_of_the_degree_is_kept():
