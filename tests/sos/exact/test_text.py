@@ -180,10 +180,10 @@ HOSTILE = {
 @pytest.mark.parametrize(("text", "message"), HOSTILE.values(), ids=HOSTILE)
 def test_hostile_text_is_refused_in_bounded_time(text, message):
     parse("x")  # python-flint is loaded
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(PolynomialError, match=message) as caught:
         parse(text)
-    assert time.perf_counter() - began < 5
+    assert time.process_time() - began < 5
     assert len(str(caught.value)) < 250
 
 
@@ -362,3 +362,9 @@ def test_what_is_just_allowed_is_read_and_what_is_just_beyond_refused(allowed, r
     parse(allowed)
     with pytest.raises(PolynomialError, match=r"at most|from 0 to 60"):
         parse(refused)
+
+
+def test_a_refusal_writes_what_cannot_be_printed_and_nothing_else_differently():
+    with pytest.raises(PolynomialError) as caught:
+        expansion.refuse("é\\'\n\x1b\u2028", expansion.Token("other", "é", 0), "another", "Write it.")
+    assert str(caught.value) == "another expected at character 1. Received ⟦é⟧\\'\\n\\x1b\\u2028 there. Write it."
