@@ -16,6 +16,7 @@ import copy
 import fnmatch
 import gc
 import importlib
+import inspect
 import json
 import os
 import pickle
@@ -227,10 +228,11 @@ def apply(mutant: Mutant, functions: list[types.FunctionType], modules: list[typ
 
 
 def exchange_defaults(old: Mapping[str, object], new: Mapping[str, object]) -> None:
-    """Give functions the defaults of others of the same name."""
+    """Give functions, inside of what is wrapped around them, the defaults of others of the same name."""
     for name, function in old.items():
-        if isinstance(function, types.FunctionType) and isinstance(new.get(name), types.FunctionType):
-            function.__defaults__, function.__kwdefaults__ = new[name].__defaults__, new[name].__kwdefaults__
+        inner, other = (inspect.unwrap(one) if callable(one) else one for one in (function, new.get(name)))
+        if isinstance(inner, types.FunctionType) and isinstance(other, types.FunctionType):
+            inner.__defaults__, inner.__kwdefaults__ = other.__defaults__, other.__kwdefaults__
 
 
 # ---------------------------------------------------------------- running tests

@@ -65,6 +65,7 @@ def test_code_is_changed_in_one_place_at_a_time(tmp_path):
 
 CLASS = """
 from dataclasses import dataclass
+from functools import cache
 
 
 @dataclass
@@ -73,6 +74,11 @@ class Size:
 
     def times(self, factor: int = 5) -> int:
         return self.value * factor
+
+
+@cache
+def half(value: int = 8) -> int:
+    return value // 2
 """
 
 
@@ -88,6 +94,11 @@ def test_defaults_of_fields_and_methods_are_changed_in_place(tmp_path):
         tool.apply(found[mutation], [size.times], [module])
         assert size().times() == product
     assert size(2).times(7) == 14
+    tool.apply(found["8 → 9"], [module.half.__wrapped__], [module])
+    assert module.half() == 4
+    tool.apply(found["8 → 16"], [module.half.__wrapped__], [module])
+    module.half.cache_clear()
+    assert module.half() == 8
 
 
 def test_a_rule_explains_what_tests_hold_and_leaves_no_check_out():

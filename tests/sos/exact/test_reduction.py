@@ -62,6 +62,14 @@ def test_monomials_of_known_squares_survive(squares):
     assert {e for square in squares for e in square} <= set(found)
 
 
+def test_what_only_a_condition_took_from_goes_after_it():
+    """Of x − x² the basis {1} goes with x; only then x·x alone feeds x², so that x goes, where the rest went before."""
+    found = statement(
+        ("x",), {(4,): Fraction(-1)}, inequalities=({(1,): Fraction(1), (2,): Fraction(-1)},), degree_bound=2
+    )
+    assert reduced_bases(found) == ((), ())
+
+
 def test_a_product_beyond_the_degree_has_no_basis():
     quartic = asked("x^4 + 1", on=("1 - x^4 >= 0",))
     assert list(map(len, full_bases(quartic))) == [3, 1]

@@ -3,12 +3,14 @@
 import json
 import random
 import time
+from contextlib import nullcontext
 from fractions import Fraction as F
 
 import pytest
 
 from quakedesign.certificates.command import check_files
 from quakedesign.errors import WorkError
+from quakedesign.sos.exact import work
 from quakedesign.sos.exact.definiteness import (
     _eliminates,
     nonnegative_definite,
@@ -16,10 +18,11 @@ from quakedesign.sos.exact.definiteness import (
     positive_definite_integers,
 )
 from quakedesign.sos.exact.polynomial import evaluate, product
-from quakedesign.sos.exact.proofs import Functional, _functional_holds, _sum, localizing_matrix
+from quakedesign.sos.exact.proofs import Functional, SumOfSquares, _functional_holds, _sum, holds, localizing_matrix
 from quakedesign.sos.exact.reduction import _contributions, reach
 from quakedesign.sos.exact.squares import IntegerGram, Square, form
 from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.statement import statement as usual
 from quakedesign.sos.exact.work import STEPS, TERMS, expanded, limited, longest, spend
 
 RANDOM = random.Random(5)
@@ -182,3 +185,16 @@ def test_work_is_counted_before_it_is_done(name):
         work()
     with limited(steps - 1), pytest.raises(WorkError):
         work()
+
+
+def test_the_terms_of_a_sum_are_counted_beyond_those_of_its_squares(monkeypatch):
+    """Three of either square, six of their sum."""
+    squares = tuple(
+        Square(product=(), basis=((low,), (high,)), gram=(F(1), F(1), F(2))) for low, high in ((0, 1), (3, 5))
+    )
+    total = {(0,): F(1), (1,): F(2), (2,): F(2), (6,): F(1), (8,): F(2), (10,): F(2)}
+    proof = SumOfSquares(squares=squares)
+    for terms, fits in ((6, True), (5, False)):
+        monkeypatch.setattr(work, "TERMS", terms)
+        with limited(), nullcontext() if fits else pytest.raises(WorkError, match="more than 5 terms"):
+            assert holds(usual(("x",), total), proof)
