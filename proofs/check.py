@@ -1355,16 +1355,23 @@ def check(text: str) -> Result:
 def check_guarantee(document: dict[str, Any]) -> Result:
     """Verify a file of the kind ``guarantee``, by the module beside this one."""
     need(document["kind"] == "guarantee", "kind", "guarantee", document["kind"])
+    module = guarantee_module()
+    try:
+        return Result("proved", tuple(module.verify(document)))
+    except module.Refused as error:
+        raise Refused(str(error)) from None
+
+
+@cache
+def guarantee_module() -> Any:
+    """The module beside this one."""
     path = Path(__file__).with_name("guarantee.py")
     if not path.is_file():
         raise OSError("guarantee.py must stand beside check.py")
     loader = SourceFileLoader("guarantee", str(path))
     module = sys.modules[loader.name] = module_from_spec(ModuleSpec(loader.name, loader))
     loader.exec_module(module)
-    try:
-        return Result("proved", tuple(module.verify(document)))
-    except module.Refused as error:
-        raise Refused(str(error)) from None
+    return module
 
 
 def read_file(name: str) -> str:

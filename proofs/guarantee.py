@@ -18,11 +18,13 @@ PIECES = 8  # into which every flow between two events is cut
 DOUBLINGS = 12  # at most 4096 periods are summed
 SHARE = 256  # what is left of the past after those is below a 256th
 MAX_STATES, MAX_LAW_STATES, MAX_PERIODS, MAX_DEGREE = 20, 12, 8, 12
+MAX_TERMS, MAX_POWER = 16, 6
 MAX_WORK = 3 * 10**7  # products of integers
 STRETCHES, PARTS = 128, 6  # of time without samples, each of 2^PARTS pieces
 LATE = 1 << 12  # what is left of the past after those is below a 4096th
 LARGEST = 1 << 2 * BITS  # entries beyond 2^BITS
 HALVINGS = 7
+CELLS = 10  # how often the range of e1 is halved
 
 RATIONAL = re.compile(r"-?(0|[1-9][0-9]{0,399})(/[1-9][0-9]{0,399})?")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -218,30 +220,124 @@ def effective_stress(
     return hull(found)
 
 
+# ---------------------------------------------------------------- an implicit step
+
+Sum = list[tuple[Row, Fraction, Any]]
+
+
+@dataclass
+class Root:
+    """w of w = e2 - q(e1 + step*w, w), said to lie between two lines: see FORMAT.md."""
+
+    pull: Sum
+    slopes: Row
+    remainder: Fraction
+
+
+def read_root(value: Any) -> Root:
+    """Read q, the slopes of both lines and the remainder."""
+    given = keys(value, "root", "pull", "slopes", "remainder")
+    slopes, remainder = row(given["slopes"], "slopes", 2), number(given["remainder"], "remainder")
+    need(0 <= slopes[0] <= slopes[1] <= 1 and remainder >= 0, "slopes must be ordered in [0, 1], the remainder >= 0")
+    pull = read_sum(given["pull"])
+    need(count_terms(pull) <= MAX_TERMS, f"an implicit step must have at most {MAX_TERMS} terms")
+    return Root(pull, slopes, remainder)
+
+
+def read_sum(value: Any) -> Sum:
+    """Terms: ends of the factor, power, and what it is a power of."""
+    need(type(value) is list and 0 < len(value) <= MAX_TERMS, "a sum must be a list of its terms, at most 16")
+    found = []
+    for term in value:
+        given = keys(term, "a term", "factor", "power", "of")
+        factor, power, inner = row(given["factor"], "factor", 2), number(given["power"], "power"), given["of"]
+        need(0 <= factor[0] <= factor[1], "a factor must have two ends that are ordered and not negative")
+        need(0 <= power.numerator <= MAX_POWER and power.denominator <= MAX_POWER, "powers must be p/q with p, q <= 6")
+        plain = type(inner) is str
+        need(not plain or inner in ("slip", "rate"), "a term must be of slip, of rate or of a sum")
+        found.append((factor, power, inner if plain else read_sum(inner)))
+    return found
+
+
+def count_terms(terms: Sum) -> int:
+    """Terms of a sum and of the sums in it."""
+    return len(terms) + sum(count_terms(inner) for _, _, inner in terms if type(inner) is not str)
+
+
+def least(terms: Sum, slip: Fraction, rate: Fraction) -> Fraction:
+    """Lower bound of q at these arguments or larger ones, the sign of 0 taken as 1; a multiple of 2^-BITS."""
+    total = 0
+    for (low, high), power, inner in terms:
+        value = least(inner, slip, rate) if type(inner) is not str else slip if inner == "slip" else rate
+        factor, shift = (low, 0) if value >= 0 else (-high, 1)
+        size = power_below(abs(value), power) + (shift if value else 0)
+        total += factor.numerator * size // factor.denominator
+    return Fraction(total, 1 << BITS)
+
+
+def power_below(value: Fraction, power: Fraction) -> int:
+    """Floor of value^power in units of 2^-BITS, for a value that is not negative."""
+    p, q = power.numerator, power.denominator
+    return whole_root((value.numerator**p << BITS * q) // value.denominator**p, q)
+
+
+def whole_root(value: int, q: int) -> int:
+    """Floor of the q-th root, by Newton's steps from above."""
+    found = 1 << value.bit_length() // q + 1
+    while value:
+        following = ((q - 1) * found + value // found ** (q - 1)) // q
+        if following >= found:
+            return found
+        found = following
+    return 0
+
+
+def root_within(root: Root, step: Fraction, slip: Fraction, rate: Fraction) -> bool:
+    """Whether |w + g*e1/step| <= remainder, for some g between the slopes, is shown for |e1| <= slip, |e2| <= rate."""
+    low, high = root.slopes
+    parts = [(1 - low, -low, Fraction(0), slip / step, 0), (high - 1, high, Fraction(0), slip / step, 0)]
+    while parts:
+        away, along, start, end, depth = parts.pop()
+        ahead, at = (root.remainder + min(v * start, v * end) for v in (away, along))
+        if at - rate + least(root.pull, step * ahead, at) < 0:
+            if depth == CELLS:
+                return False
+            middle = (start + end) / 2
+            parts += [(away, along, start, middle, depth + 1), (away, along, middle, end, depth + 1)]
+    return True
+
+
 # ---------------------------------------------------------------- the loop
 
 
 @dataclass
 class Loop:
-    """Flow x' = Ax, then events (map, time until the next one; none in continuous time), and both inputs."""
+    """Flow x' = Ax, then events (map, time until the next one; none in continuous time), inputs, the implicit step.
+
+    The first two inputs flow, the third, if there is an implicit step, enters with the first event.
+    """
 
     flow: list[Row]
     events: list[tuple[list[Row], Fraction]]
     outputs: list[Row]
-    acceleration: Row
-    drift: Row
+    inputs: list[Row]
+    root: Root | None
+    step: Fraction
 
 
 def read_loop(value: Any, task: Task) -> Loop:
     """Build the error loop: e1, e2, the law's states, pressures on their way, valve, with a lag the fault's."""
     if type(value) is dict and "rates" in value:
         return read_continuous(value, task)
-    given = keys(value, "loop", "step", "delay", "lag", "states", "update", "measured", "output", "feedback")
+    implicit = type(value) is dict and "root" in value
+    parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
+    given = keys(value, "loop", *parts, *(["root"] if implicit else []))
+    root = read_root(given["root"]) if implicit else None
     step, delay, lag = (number(given[k], k) for k in ("step", "delay", "lag"))
     need(step > 0 and 0 <= delay <= MAX_PERIODS * step and lag >= 0, "step > 0, delay of 0 to 8 steps, lag >= 0")
     n = count_states(given["states"])
-    update, seen = matrix(given["update"], "update", n, n), matrix(given["measured"], "measured", n, 2)
-    output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2)
+    update, seen = matrix(given["update"], "update", n, n), matrix(given["measured"], "measured", n, 2 + implicit)
+    output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2 + implicit)
     whole, part = delay // step, delay % step
     waiting = int(whole) + (part > 0)
     size = 2 + n + waiting + (lag > 0) + 1
@@ -254,26 +350,28 @@ def read_loop(value: Any, task: Task) -> Loop:
     if lag > 0:
         flow[1][valve + 1], flow[valve + 1][valve + 1] = flow[1][valve], -1 / lag
 
-    asked = [task.b * v for v in (*feedback, *output)] + [Fraction(0)] * (size - 2 - n)
-    sample = unit(size)
+    rest = [Fraction(0)] * (size - 2 - n)  # behind it the column of w
+    asked = [*(task.b * v for v in (*feedback[:2], *output)), *rest, task.b * sum(feedback[2:])]
+    sample = [[*line, Fraction(0)] for line in unit(size)]
     for i in range(n):
-        sample[2 + i] = [*seen[i], *update[i]] + [Fraction(0)] * (size - 2 - n)
+        sample[2 + i] = [*seen[i][:2], *update[i], *rest, Fraction(sum(seen[i][2:]))]
     queue = [*range(2 + n, 2 + n + waiting), *([] if part else [valve])]
     for i, place in enumerate(queue):
-        sample[place] = unit(size)[queue[i - 1]] if i else asked
-    events = [(sample, part or step)]
-    if part:
-        arrival = unit(size)
-        arrival[valve] = unit(size)[valve - 1]
-        events.append((arrival, step - part))
+        sample[place] = [*unit(size)[queue[i - 1]], Fraction(0)] if i else asked
+    arrival = unit(size)
+    arrival[valve] = unit(size)[valve - 1]
     pressures = [Fraction(0)] * (2 + n) + [Fraction(-1)] * (waiting + 1) + [Fraction(0)] * (lag > 0)
     still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(update)]
     drift = [*pressures[:2], *(-v / task.b for v in steady_states(still, output)), *pressures[2 + n :]]
     push = [Fraction(i >= valve) for i in range(size)]
     if lag > 0:  # the fault's pressure stays while the valve's jumps
-        moved = events[-1][0][valve]
-        events[-1][0][valve + 1] = [p - v for p, v in zip(push, moved, strict=True)]
-    return Loop(flow, events, [unit(size)[0], unit(size)[1], push], unit(size)[1], drift)
+        last = arrival if part else sample
+        last[valve + 1] = [p - v for p, v in zip([*push, Fraction(0)], last[valve], strict=False)]
+    slope = sum(root.slopes) / (2 * step) if root else Fraction(0)
+    events = [([[line[0] - slope * line[size], *line[1:size]] for line in sample], part or step)]
+    events += [(arrival, step - part)] if part else []
+    inputs = [unit(size)[1], drift, *([[line[size] for line in sample]] if root else [])]
+    return Loop(flow, events, [unit(size)[0], unit(size)[1], push], inputs, root, step)
 
 
 def read_continuous(value: Any, task: Task) -> Loop:
@@ -288,7 +386,7 @@ def read_continuous(value: Any, task: Task) -> Loop:
     flow.append([v + sum(task.beta) / 2 * p for v, p in zip(middles, push, strict=True)])
     flow += [[*fed, *kept] for fed, kept in zip(seen, rates, strict=True)]
     drift = [Fraction(0)] * 2 + [-v / task.b for v in steady_states(rates, output)]
-    return Loop(flow, [], [unit(2 + n)[0], unit(2 + n)[1], push], unit(2 + n)[1], drift)
+    return Loop(flow, [], [unit(2 + n)[0], unit(2 + n)[1], push], [unit(2 + n)[1], drift], None, Fraction(0))
 
 
 def count_states(names: Any) -> int:
@@ -415,7 +513,7 @@ def exponential(flow: list[Row], time: Fraction) -> Fixed:
 
 @dataclass
 class Flow:
-    """One event and the flow after it, cut into pieces, for one input."""
+    """One event and the flow after it, cut into pieces, for one input; `sudden` if it enters with the event alone."""
 
     event: Fixed
     piece: Fraction
@@ -426,13 +524,15 @@ class Flow:
     bends: list[Fixed]
     bend: Fixed
     near: Fixed
+    sudden: bool
 
 
-def cut(loop: Loop, entry: Row) -> list[Flow]:
+def cut(loop: Loop, entry: Row, sudden: bool) -> list[Flow]:
     """Impulse responses over every flow, and bounds of their first two derivatives on every piece."""
     flows = []
     generator = fixed(loop.flow)
-    for event, duration in loop.events:
+    for place, (event, duration) in enumerate(loop.events):
+        entry = [Fraction(0)] * len(entry) if sudden and place else entry
         h = duration / PIECES
         step = exponential(loop.flow, h)
         near = exponential(majorant(loop.flow), h).size()
@@ -443,7 +543,7 @@ def cut(loop: Loop, entry: Row) -> list[Flow]:
         slopes = [near * (generator * end).size() for end in ends[:-1]]
         bends = [near * (generator * (generator * end)).size() for end in ends[:-1]]
         jump = fixed(event)
-        flows.append(Flow(jump, h, step, power * jump, ends, slopes, bends, generator * generator, near))
+        flows.append(Flow(jump, h, step, power * jump, ends, slopes, bends, generator * generator, near, sudden))
     return flows
 
 
@@ -454,6 +554,8 @@ def majorant(flow: list[Row]) -> list[Row]:
 
 def pieces(flow: Flow, later: Fixed) -> Fixed:
     """Columns whose sum of absolute values, after any row, bounds the integral over a flow that `later` follows."""
+    if flow.sudden:
+        return later * flow.ends[-1]
     weights = [flow.piece / (2 if i in (0, PIECES) else 1) for i in range(PIECES + 1)]
     ends = [(later * end).scaled(weight) for end, weight in zip(flow.ends, weights, strict=True)]
     bent = flow.bends[0]
@@ -504,11 +606,11 @@ def past(flows: list[Flow], rows: int) -> Past:
     raise Refused(f"the nominal loop must be stable, and seen to be within {2**DOUBLINGS} periods")
 
 
-def gains(loop: Loop, entry: Row) -> list[list[Fraction]]:
+def gains(loop: Loop, entry: Row, sudden: bool) -> list[list[Fraction]]:
     """Bounds of e1, e2 and the push for an input of size 1, on every piece of the period."""
     if not loop.events:
         return [[v] for v in flow_gains(loop, entry)]
-    flows, size = cut(loop, entry), len(loop.flow)
+    flows, size = cut(loop, entry, sudden), len(loop.flow)
     start = fixed(loop.outputs)
     before = past(flows, len(flows) * (3 * (PIECES + 1) + size))
     found: list[list[Fraction]] = [[], [], []]
@@ -526,6 +628,8 @@ def gains(loop: Loop, entry: Row) -> list[list[Fraction]]:
                 bent = bends[i]
                 area = Fraction(ends[i] + ends[i + 1]) * flow.piece / 2 + bent * flow.piece**3 / 12
                 since.append(since[-1] + int(area) + 1)
+            if sudden:
+                since, slopes = ends, bends
             total = [earlier[3 * i + k] + since[i] for i in range(PIECES + 1)]
             for i in range(PIECES):
                 bending = ((phases[i] * flow.bend).size() * flow.near).size() * units
@@ -597,24 +701,52 @@ def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:
 
 def bounds(task: Task, loop: Loop) -> tuple[Row, Fraction]:
     """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee)."""
-    of_push, of_drift = gains(loop, loop.acceleration), gains(loop, loop.drift)
     half = [(high - low) / 2 for low, high in (task.s, task.w, task.beta)]
-    m, n = (
-        max(sum(h * g for h, g in zip(half, at, strict=True)) for at in zip(*found, strict=True))
-        for found in (of_push, of_drift)
-    )
     force, drift, coupling, shifted = inputs(task, half[2])
-    own, back = coupling * max(of_drift[1]), coupling * max(of_push[1])
-    need(own < 1, "the small gain of the disturbance's shift must be below 1")
-    small = m + n * back / (1 - own)
-    need(small < 1, f"the small gain must be below 1. It is {upper(small)}")
-    acceleration = (force + n * drift / (1 - own)) / (1 - small)
-    drift = (drift + back * acceleration) / (1 - own)
-    found = [
-        max(a * acceleration + d * drift for a, d in zip(*pair, strict=True))
-        for pair in zip(of_push, of_drift, strict=True)
+    own, shares = [force, drift], [half, [Fraction(0), coupling, Fraction(0)]]
+    if loop.root:
+        low, high = loop.root.slopes
+        own.append(loop.root.remainder)
+        shares.append([(high - low) / 2 / loop.step, Fraction(0), Fraction(0)])
+    found = [gains(loop, entry, place == 2) for place, entry in enumerate(loop.inputs)]
+    table = [
+        [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
+        for share in shares
     ]
-    return [found[0], found[1], found[2] + shifted], small
+    small = radius(table)
+    need(small < 1, f"the small gain must be below 1. It is {upper(small)}")
+    sizes = solve(table, own)
+    peaks = [
+        max(sum(g * v for g, v in zip(at, sizes, strict=True)) for at in zip(*of, strict=True))
+        for of in zip(*found, strict=True)
+    ]
+    return [peaks[0], peaks[1], peaks[2] + shifted], small
+
+
+def solve(table: list[Row], own: Row) -> Row:
+    """(1 − M)^-1 F by elimination: M >= 0 has all pivots positive if, and only if, its spectral radius is below 1."""
+    lines = [[(i == j) - v for j, v in enumerate(line)] + [own[i]] for i, line in enumerate(table)]
+    for i, line in enumerate(lines):
+        need(line[i] > 0, "the small gain must be below 1")
+        line[:] = [v / line[i] for v in line]
+        for other in lines:
+            if other is not line:
+                other[:] = [v - other[i] * p for v, p in zip(other, line, strict=True)]
+    return [line[-1] for line in lines]
+
+
+def radius(table: list[Row]) -> Fraction:
+    """Upper bound of the spectral radius of M >= 0, by halving: it is below v where M/v passes `solve`."""
+    low, high = Fraction(0), max(sum(line) for line in table) + 1
+    for _ in range(48):
+        middle = (low + high) / 2
+        try:
+            solve([[v / middle for v in line] for line in table], [Fraction(0)] * len(table))
+        except Refused:
+            low = middle
+        else:
+            high = middle
+    return high
 
 
 def inputs(task: Task, half_beta: Fraction) -> tuple[Fraction, Fraction, Fraction, Fraction]:
@@ -644,6 +776,9 @@ def verify(document: dict[str, Any]) -> list[str]:
     claims = numbers(document["claims"], "claims", *CLAIMS)
     task = read_task(document)
     loop = read_loop(document["loop"], task)
+    errors = claims["slip_error"], claims["slip_rate_error"]
+    within = loop.root is None or root_within(loop.root, loop.step, *errors)
+    need(within, "the root of the implicit step must lie between its lines for all errors that are claimed")
     (slip, rate, push), small = bounds(task, loop)
     low, high = task.rest[0] - push / task.b, task.rest[1] + push / task.b
     found = dict(zip(CLAIMS, (slip, rate, rate + task.reference_rate, low, high), strict=True))
@@ -662,12 +797,13 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
     kind = f"|phi| <= {upper(task.amplitude)} m/s^2"
     if task.change is not None:
         kind += f", |phi'| <= {upper(task.change)} m/s^3, phi(0) = 0"
+    implicit = " and an implicit step" if "root" in loop else ""
     return [
         f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction anything within its "
         "bounds and slopes, continued to negative slip rates",
         f"s in [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, w in [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, "
         f"beta in [1, {upper(task.beta[1])}], b = {upper(task.b)} m^2/kg, derived",
-        f"law with {len(loop['states'])} states, {when}",
+        f"law with {len(loop['states'])} states{implicit}, {when}",
         f"disturbance: {kind}; from rest, along the reference, for ever; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",
         f"|slip - reference| <= {upper(claims['slip_error'])} m, "

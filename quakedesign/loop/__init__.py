@@ -1,20 +1,25 @@
 """What stands between law and fault, each element stated once, as exact matrices."""
 
 from quakedesign.arguments import check_arguments
+from quakedesign.loop.compensation import compensated
 from quakedesign.loop.continuous import ContinuousLaw, continuous_loop, exact_integrals
 from quakedesign.loop.held import held_loop
+from quakedesign.loop.implicit_root import ImplicitRoot, Power
 from quakedesign.loop.laws import LinearLaw, Model, Prediction, disturbance_estimate, summed_integrals
 from quakedesign.loop.periodic import PeriodicLoop, Segment
 from quakedesign.loop.running import SampledController
 
 __all__ = [
     "ContinuousLaw",
+    "ImplicitRoot",
     "LinearLaw",
     "Model",
     "PeriodicLoop",
+    "Power",
     "Prediction",
     "SampledController",
     "Segment",
+    "compensated",
     "continuous_loop",
     "disturbance_estimate",
     "exact_integrals",

@@ -26,7 +26,8 @@ def held_loop(
     the valve's; those of the law less what they are while p = p* holds the fault at rest, pressures as b·(p − p*).
 
     Inputs: ``acceleration`` a in e2' = s·e1 − w·e2 + βb(p − p*) + a [m/s²]; ``drift`` b·dp*/dt [m/s³]. Outputs:
-    ``slip_error`` [m], ``slip_rate_error`` [m/s], ``push`` b·(p − p*) [m/s²].
+    ``slip_error`` [m], ``slip_rate_error`` [m/s], ``push`` b·(p − p*) [m/s²]. With an implicit root the loop has w =
+    −γe1/T_s with the middle of its slopes, and w + γe1/T_s [m/s] is the sampled input ``root``.
 
     Parameters
     ----------
@@ -55,10 +56,16 @@ def held_loop(
     still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
     steady = steady_states(still, law.output)
     zero, one = Fraction(0), Fraction(1)
+    sample, arrival = _events(law, authority, n, waiting, valve, part > 0)
+    slope = Fraction(0) if law.root is None else law.root.middle / step
+    jump = tuple((row[0] - slope * row[n], *row[1:n]) for row in sample)
     return PeriodicLoop(
         states=names,
         flow=_flow(n, model.slip, model.rate, model.gain / authority, valve, lag),
-        segments=_segments(law, authority, n, waiting, valve, step, part),
+        segments=(
+            Segment(jump=jump, duration=part or step),
+            *([Segment(jump=arrival, duration=step - part)] if part else []),
+        ),
         inputs={
             "acceleration": tuple(Fraction(i == 1) for i in range(n)),
             "drift": (zero, zero, *(-v / authority for v in steady), *[-one] * (waiting + 1), *([zero] if lag else [])),
@@ -68,6 +75,7 @@ def held_loop(
             "slip_rate_error": tuple(Fraction(i == 1) for i in range(n)),
             "push": tuple(Fraction(i >= valve) for i in range(n)),
         },
+        sampled={} if law.root is None else {"root": tuple(row[n] for row in sample)},
     )
 
 
@@ -111,27 +119,25 @@ def _flow(n: int, slip: Fraction, rate: Fraction, gain: Fraction, valve: int, la
     return tuple(map(tuple, rows))
 
 
-def _segments(
-    law: LinearLaw, authority: Fraction, n: int, waiting: int, valve: int, step: Fraction, part: Fraction
-) -> tuple[Segment, ...]:
-    """The sample and, if the delay is no whole number of periods, the arrival of a pressure between samples."""
-    own, first = range(2, 2 + len(law.states)), 2 + len(law.states)
-    jump = [[Fraction(i == j) for j in range(n)] for i in range(n)]
-    asked = [Fraction(0)] * n
-    asked[:2] = [authority * v for v in law.feedback]
+def _events(
+    law: LinearLaw, authority: Fraction, n: int, waiting: int, valve: int, between: bool
+) -> tuple[Matrix, Matrix]:
+    """The sample, with one more column for w, and the arrival of a pressure between samples, if that is where it is."""
+    own, first, zero = range(2, 2 + len(law.states)), 2 + len(law.states), Fraction(0)
+    jump = [[Fraction(i == j) for j in range(n + 1)] for i in range(n)]
+    asked = [zero] * (n + 1)
+    asked[:2] = [authority * v for v in law.feedback[:2]]
+    asked[n] = authority * sum(law.feedback[2:], zero)
     for i, fed, kept in zip(own, law.measured, law.update, strict=True):
-        jump[i] = [*fed, *kept, *[Fraction(0)] * (n - first)]
+        jump[i] = [*fed[:2], *kept, *[zero] * (n - first), sum(fed[2:], zero)]
         asked[i] = authority * law.output[i - 2]
-    line = [*range(first, first + waiting), *([] if part else [valve])]
+    line = [*range(first, first + waiting), *([] if between else [valve])]
     for place, before in zip(reversed(line), [*reversed(line[:-1]), None], strict=True):
-        jump[place] = asked if before is None else [Fraction(j == before) for j in range(n)]
-    if not part:
-        return (Segment(jump=_with_lag(jump, valve), duration=step),)
+        jump[place] = asked if before is None else [Fraction(j == before) for j in range(n + 1)]
     arrival = [[Fraction(j == (first + waiting - 1 if i == valve else i)) for j in range(n)] for i in range(n)]
-    return (
-        Segment(jump=tuple(map(tuple, jump)), duration=part),
-        Segment(jump=_with_lag(arrival, valve), duration=step - part),
-    )
+    if between:
+        return tuple(map(tuple, jump)), _with_lag(arrival, valve)
+    return _with_lag(jump, valve), ()
 
 
 def _with_lag(jump: list[list[Fraction]], valve: int) -> Matrix:

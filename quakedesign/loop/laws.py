@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from quakedesign.errors import ParameterError
+from quakedesign.loop.implicit_root import ImplicitRoot
 
 Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
@@ -16,6 +17,8 @@ MOST_STATES = 12
 class LinearLaw:
     """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z from 0.
 
+    With an implicit root the law is linear but for w, the end of an implicit step from e1 and e2, and y = (e1, e2, w).
+
     Attributes
     ----------
     states : tuple of str
@@ -23,11 +26,13 @@ class LinearLaw:
     update : tuple of rows
         F.
     measured : tuple of rows
-        G, two columns: for e1 [m] and e2 [m/s].
+        G, two columns: for e1 [m] and e2 [m/s]; a third for w [m/s].
     output : tuple of Fraction
         C, so that Cz is in Pa.
     feedback : (Fraction, Fraction)
-        D [Pa/m, Pa·s/m].
+        D [Pa/m, Pa·s/m]; a third entry for w [Pa·s/m].
+    root : ImplicitRoot, optional
+        What w solves; None for a linear law.
 
     Raises
     ------
@@ -40,12 +45,16 @@ class LinearLaw:
     measured: Matrix
     output: Row
     feedback: Row
+    root: ImplicitRoot | None = None
 
     def __post_init__(self) -> None:
-        require_sizes(self.states, self.update, self.measured, self.output, self.feedback)
+        seen = len(MEASURED) + (self.root is not None)
+        require_sizes(self.states, self.update, self.measured, self.output, self.feedback, seen)
 
 
-def require_sizes(states: tuple[str, ...], own: Matrix, measured: Matrix, output: Row, feedback: Row) -> None:
+def require_sizes(
+    states: tuple[str, ...], own: Matrix, measured: Matrix, output: Row, feedback: Row, seen: int = len(MEASURED)
+) -> None:
     """Refuse matrices of a law whose sizes do not fit, and too many states.
 
     Raises
@@ -57,14 +66,14 @@ def require_sizes(states: tuple[str, ...], own: Matrix, measured: Matrix, output
         n <= MOST_STATES
         and len(set(states)) == n
         and [len(row) for row in own] == [n] * n
-        and [len(row) for row in measured] == [len(MEASURED)] * n
+        and [len(row) for row in measured] == [seen] * n
         and len(output) == n
-        and len(feedback) == len(MEASURED)
+        and len(feedback) == seen
     )
     if not fits:
         raise ParameterError(
-            f"a linear law needs F of n × n, G of n × 2, C of n and D of 2 entries, n at most {MOST_STATES} states "
-            f"of different names. Received {n} states ({', '.join(states)}) and other sizes. Complete them."
+            f"a linear law needs F of n × n, G of n × {seen}, C of n and D of {seen} entries, n at most {MOST_STATES} "
+            f"states of different names. Received {n} states ({', '.join(states)}) and other sizes. Complete them."
         )
 
 

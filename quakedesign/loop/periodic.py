@@ -1,6 +1,6 @@
 """A loop that flows and jumps with one period, in rationals."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 Row = tuple[Fraction, ...]
@@ -38,6 +38,8 @@ class PeriodicLoop:
         b_i by the name of the input.
     outputs : dict of str to tuple of Fraction
         Rows c with y = cx.
+    sampled : dict of str to tuple of Fraction
+        j_i by the name of an input that adds j_i·w_i to the state once a period, with the jump of the first segment.
     """
 
     states: tuple[str, ...]
@@ -45,6 +47,7 @@ class PeriodicLoop:
     segments: tuple[Segment, ...]
     inputs: dict[str, Row]
     outputs: dict[str, Row]
+    sampled: dict[str, Row] = field(default_factory=dict)
 
     @property
     def period(self) -> Fraction:

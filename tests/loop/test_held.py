@@ -7,7 +7,17 @@ import pytest
 from scipy.linalg import expm
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop import LinearLaw, Model, Prediction, disturbance_estimate, held_loop, summed_integrals
+from quakedesign.loop import (
+    ImplicitRoot,
+    LinearLaw,
+    Model,
+    Power,
+    Prediction,
+    compensated,
+    disturbance_estimate,
+    held_loop,
+    summed_integrals,
+)
 
 STEP = F(1, 5)
 MODEL = Model(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
@@ -77,6 +87,48 @@ def test_a_step_of_p_star_is_a_jump_of_the_states_by_their_steady_values(law, de
             state = expm(np.array(loop.flow, float) * float(segment.duration)) @ np.array(segment.jump, float) @ state
         found.append(state[:2])
     assert np.allclose(found, run_by_hand(law, 8, -float(MODEL.gain), float(F(delay)), 0.0), rtol=1e-5, atol=1e-8)
+
+
+def run_implicit(law, periods, push, delay, ends, fine=2000):
+    """By hand with y = (e1, e2, w), w by a rule of e1, e2 and the number of the sample."""
+    s, w, gain, step = float(MODEL.slip), float(MODEL.rate), float(MODEL.gain), float(STEP)
+    c, d, f, g = (np.array(v, float) for v in (law.output, law.feedback, law.update, law.measured))
+    e, z, valve, arrivals, found, h = np.zeros(2), np.zeros(len(c)), 0.0, [], [], step / fine
+    for k in range(periods):
+        y = np.array([*e, ends(e, k)])
+        arrivals.append((k * fine + round(delay / h), c @ z + d @ y))
+        z = f @ z + g @ y
+        for i in range(k * fine, (k + 1) * fine):
+            while arrivals and arrivals[0][0] <= i:
+                valve = arrivals.pop(0)[1]
+            half = e + h / 2 * np.array([e[1], s * e[0] - w * e[1] + gain * valve + push])
+            e = e + h * np.array([half[1], s * half[0] - w * half[1] + gain * valve + push])
+        found.append(e)
+    return np.array(found)
+
+
+ROOT = ImplicitRoot(
+    pull=(Power(factor=(F(1), F(1)), exponent=F(0), argument="slip"),), slopes=(F("0.8"), F(1)), remainder=F(1, 10)
+)
+
+
+@pytest.mark.parametrize("delay", ["0", "1/5", "3/20", "27/100"])
+def test_the_end_of_an_implicit_step_is_a_line_and_a_sampled_input(delay):
+    """w = −0.9·e1/T_s + v_k with any v_k: by matrices and by hand."""
+    law, random = compensated(ROOT, F(2, 5), F(1, 4)), np.random.default_rng(4)
+    kicks, slope = random.standard_normal(6), 0.9 / float(STEP)
+    loop = held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay))
+    flow, entry = np.array(loop.flow, float), np.array(loop.sampled["root"], float)
+    whole = np.zeros((len(flow) + 1, len(flow) + 1))
+    whole[:-1, :-1], whole[:-1, -1] = flow, 0.3 * np.array(loop.inputs["acceleration"], float)
+    state, found = np.r_[np.zeros(len(flow)), 1.0], []
+    for kick in kicks:
+        for number, segment in enumerate(loop.segments):
+            state[:-1] = np.array(segment.jump, float) @ state[:-1] + (kick * entry if number == 0 else 0)
+            state = expm(whole * float(segment.duration)) @ state
+        found.append(state[:2].copy())
+    by_hand = run_implicit(law, 6, 0.3, float(F(delay)), lambda e, k: -slope * e[0] + kicks[k])
+    assert np.allclose(found, by_hand, rtol=1e-5, atol=1e-7)
 
 
 def test_a_law_without_integral_action_is_refused():

@@ -12,7 +12,8 @@ from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
 from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held
 from quakedesign.certificates.guarantee.task import Friction, Task
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.loop import ContinuousLaw, LinearLaw
+from quakedesign.loop import ContinuousLaw, ImplicitRoot, LinearLaw, Power
+from quakedesign.loop.implicit_root import MOST_TERMS
 from quakedesign.output import write_whole
 from quakedesign.sos.exact.strict import NAME, listed, need, parse, read_rational, with_keys
 
@@ -64,10 +65,12 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
     """What the file says of the law; `rates` in place of `update` and times where the pressure acts at once."""
     if isinstance(claim, ContinuousPeaks):
         law: LinearLaw | ContinuousLaw = claim.law
-        times, own = dict[str, str](), {"rates": [_texts(row) for row in claim.law.rates]}
+        times, own = dict[str, str](), dict[str, Any](rates=[_texts(row) for row in claim.law.rates])
     else:
         law, times = claim.held.law, {name: str(getattr(claim.held, name)) for name in _TIMES}
         own = {"update": [_texts(row) for row in claim.held.law.update]}
+        root = claim.held.law.root
+        own |= {} if root is None else {"root": _root_document(root)}
     return {
         **times,
         "states": list(law.states),
@@ -136,8 +139,10 @@ def _task(raw: dict[str, Any]) -> Task:
 
 
 def _held(raw: Any) -> Held:
-    with_keys(raw, {*_TIMES, "update", *_LAW})
-    law = LinearLaw(update=_square(raw, "update"), **_rest(raw))
+    implicit = isinstance(raw, dict) and "root" in raw
+    with_keys(raw, {*_TIMES, "update", *_LAW} | ({"root"} if implicit else set()))
+    root = _read_root(raw["root"]) if implicit else None
+    law = LinearLaw(update=_square(raw, "update"), root=root, **_rest(raw))
     return Held(law=law, **{name: read_rational(raw[name]) for name in _TIMES})
 
 
@@ -157,10 +162,42 @@ def _rest(raw: dict[str, Any]) -> dict[str, Any]:
     need(all(isinstance(n, str) and NAME.fullmatch(n) for n in names), "states must be names")
     return {
         "states": tuple(names),
-        "measured": tuple(_rationals(row, "measured", 2) for row in listed(raw["measured"], "measured", len(names))),
+        "measured": tuple(_rationals(row, "measured", 3) for row in listed(raw["measured"], "measured", len(names))),
         "output": _rationals(raw["output"], "output", len(names)),
-        "feedback": _rationals(raw["feedback"], "feedback", 2),
+        "feedback": _rationals(raw["feedback"], "feedback", 3),
     }
+
+
+def _root_document(root: ImplicitRoot) -> dict[str, Any]:
+    return {"pull": _sum_document(root.pull), "slopes": _texts(root.slopes), "remainder": str(root.remainder)}
+
+
+def _sum_document(terms: tuple[Power, ...]) -> list[dict[str, Any]]:
+    return [
+        {
+            "factor": _texts(term.factor),
+            "power": str(term.exponent),
+            "of": term.argument if isinstance(term.argument, str) else _sum_document(term.argument),
+        }
+        for term in terms
+    ]
+
+
+def _read_root(raw: Any) -> ImplicitRoot:
+    with_keys(raw, {"pull", "slopes", "remainder"})
+    slopes, remainder = _ends(raw["slopes"], "slopes"), read_rational(raw["remainder"])
+    return ImplicitRoot(pull=_read_sum(raw["pull"]), slopes=slopes, remainder=remainder)
+
+
+def _read_sum(raw: Any) -> tuple[Power, ...]:
+    return tuple(_read_term(term) for term in listed(raw, "a sum of an implicit step", MOST_TERMS))
+
+
+def _read_term(raw: Any) -> Power:
+    with_keys(raw, {"factor", "power", "of"})
+    factor, inner = _ends(raw["factor"], "a factor"), raw["of"]
+    argument = inner if isinstance(inner, str) else _read_sum(inner)
+    return Power(factor=factor, exponent=read_rational(raw["power"]), argument=argument)
 
 
 def _read_claims(raw: Any) -> Claims:
@@ -178,6 +215,11 @@ def _claims(claims: Claims) -> dict[str, Any]:
 
 def _texts(values: tuple[Fraction, ...]) -> list[str]:
     return [str(v) for v in values]
+
+
+def _ends(raw: Any, what: str) -> tuple[Fraction, Fraction]:
+    low, high = (read_rational(v) for v in listed(raw, what, length=2))
+    return low, high
 
 
 def _rationals(raw: Any, what: str, most: int) -> tuple[Fraction, ...]:

@@ -16,6 +16,10 @@ continued periodically to the past and the integral taken over (−∞, t]. That
   is convex: at most the larger end and N of the remainder. The flow since the last jump adds ∫₀^θ|ce^{Aσ}b|dσ, whose
   derivative has the Lipschitz constant max|cAe^{Aσ}b|: it is within (β − α)²/8 times that of its chord. Both together
   are below a chord plus remainders, hence at most the larger of the two ends plus remainders. ∎
+
+**Sampled inputs.** Where Σ j·w_k enters with the jumps at kT and |w_k| ≤ W for every k up to t, |cx(t)| ≤ W·Σ|cΦ(t,
+kT)j|: the same with a sum in place of the integral. A period has the one column e^{Aτ}j without a remainder, the flow
+since the last jump adds |ce^{Aθ}j|, which is within (β − α)²/8·max|cA²e^{Aσ}j| of its chord.
 """
 
 from collections.abc import Mapping
@@ -45,6 +49,7 @@ _BITS = 128
 _PIECES = 8
 _SMALL = Fraction(1, 1 << 8)  # share of the sums that the tail may be
 _MOST_DOUBLINGS = 13
+_ZERO = Fraction(0)
 
 
 def norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
@@ -59,11 +64,14 @@ def norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
         flow = matrix(loop.flow)
         rows = matrix(tuple(loop.outputs.values()))
         found: dict[tuple[str, str], tuple[Fraction, ...]] = {}
-        for name, entry in loop.inputs.items():
-            flows = [_Flow.of(flow, matrix(s.jump), s.duration / _PIECES, column(entry)) for s in loop.segments]
+        for name, entry in (loop.inputs | loop.sampled).items():
+            sudden = name in loop.sampled
+            entries = [column(entry), *[column(entry) * (not sudden)] * (len(loop.segments) - 1)]
+            parts = zip(loop.segments, entries, strict=True)
+            flows = [_Flow.of(flow, matrix(s.jump), s.duration / _PIECES, b, sudden=sudden) for s, b in parts]
             gains = _gains(flows, _Past.of(flows), rows)
             found |= {
-                (output, name): tuple(map(upper, parts)) for output, parts in zip(loop.outputs, gains, strict=True)
+                (output, name): tuple(map(upper, worst)) for output, worst in zip(loop.outputs, gains, strict=True)
             }
         return found
 
@@ -84,6 +92,8 @@ class _Flow:
         Upper bounds of |A²e^{Aσ}b| and |Ae^{Aσ}b| on every piece.
     square, within : arb_mat
         A², and an upper bound of |e^{Aσ}| on the first piece: e^{Mh} with |A| off the diagonal and max(A, 0) on it.
+    sudden : bool
+        Whether b enters with the jump alone.
     """
 
     jump: Any
@@ -95,9 +105,10 @@ class _Flow:
     slope: list[Any]
     square: Any
     within: Any
+    sudden: bool
 
     @classmethod
-    def of(cls, flow: Any, jump: Any, piece: Fraction, entry: Any) -> "_Flow":
+    def of(cls, flow: Any, jump: Any, piece: Fraction, entry: Any, *, sudden: bool) -> "_Flow":
         h = ball(piece)
         step, within = (flow * h).exp(), absolute((majorant(flow) * h).exp())
         response = list(accumulate([step] * _PIECES, lambda now, e: e * now, initial=entry))
@@ -111,10 +122,13 @@ class _Flow:
             slope=[within * absolute(flow * now) for now in response[:-1]],
             square=flow * flow,
             within=within,
+            sudden=sudden,
         )
 
     def columns(self, later: Any) -> tuple[list[Any], Any]:
         """Weighted ends of the pieces, mapped by what comes later, and the remainders' entries."""
+        if self.sudden:
+            return [later * self.response[-1]], column((_ZERO,) * later.nrows())
         half = self.piece / 2
         ends = [later * now * (half if i in (0, _PIECES) else self.piece) for i, now in enumerate(self.response)]
         rest = absolute(later) * reduce(add, self.curvature)
@@ -174,7 +188,7 @@ def _gains(flows: list[_Flow], past: _Past, outputs: Any) -> list[list[Any]]:
             total = [before[i * count + k] + own[i] for i in range(_PIECES + 1)]
             for i, (start, end) in enumerate(pairwise(total)):
                 bent = (absolute(phases[i] * flow.square) * flow.within * units)[k, 0]
-                bent += (absolute(outputs) * flow.slope[i])[k, 0]
+                bent += (absolute(outputs) * (flow.curvature if flow.sudden else flow.slope)[i])[k, 0]
                 found[k].append(start.max(end) + bent * flow.piece**2 / 8)
     return found
 
@@ -189,8 +203,10 @@ def _before(flows: list[_Flow], past: _Past, rows: Any) -> list[Any]:
 
 
 def _since_jump(flow: _Flow, outputs: Any, k: int) -> list[Any]:
-    """∫|ce^{Aσ}b|dσ from the jump to the end of every piece, from 0 on."""
+    """∫|ce^{Aσ}b|dσ from the jump to the end of every piece, from 0 on; |ce^{Aσ}b| of what enters with the jump."""
     values = [abs((outputs * now)[k, 0]) for now in flow.response]
+    if flow.sudden:
+        return values
     bent = [(absolute(outputs) * now)[k, 0] for now in flow.curvature]
     pieces = [
         (a + b) * flow.piece / 2 + c * flow.piece**3 / 12 for (a, b), c in zip(pairwise(values), bent, strict=True)

@@ -6,9 +6,10 @@ from math import ceil, floor, log10
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee import sector
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.loop import LinearLaw, PeriodicLoop, SampledController, held_loop
 
 _DIGITS = 4
@@ -33,7 +34,15 @@ class Held:
 
     @property
     def controller(self) -> SampledController:
-        """The law for `simulate`, with the scheme ``explicit`` and the step T_s; delay and lag are the actuator's."""
+        """The law for `simulate`, with the scheme ``explicit`` and the step T_s; delay and lag are the actuator's.
+
+        Raises
+        ------
+        UnsupportedError
+            For a law with an implicit root, which is a controller of its own with a scheme.
+        """
+        if self.law.root is not None:
+            raise UnsupportedError("a law with an implicit root has no explicit run. Simulate its own controller.")
         return SampledController(law=self.law, step=self.step)
 
     def loop(self, task: Task) -> PeriodicLoop:
@@ -123,7 +132,7 @@ class Guarantee:
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         found = self.bounds()
-        if isinstance(found, NoGuarantee):
+        if isinstance(found, NoGuarantee) or not _root_within(self.held, self.claims):
             return Verdict.UNDECIDED
         return Verdict.PROVED if self.claims.covers(Claims.of(self.task, found)) else Verdict.UNDECIDED
 
@@ -160,12 +169,22 @@ def guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
     found = _bounds(task, held, held.loop(task))
     if isinstance(found, NoGuarantee):
         return found
-    return Guarantee(task=task, held=held, claims=Claims.of(task, found).rounded())
+    claims = Claims.of(task, found).rounded()
+    if not _root_within(held, claims):
+        errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
+        return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
+    return Guarantee(task=task, held=held, claims=claims)
+
+
+def _root_within(held: Held, claims: Claims) -> bool:
+    """Whether an implicit root, if there is one, is as said wherever the claims hold."""
+    root = held.law.root
+    return root is None or sector.holds(root, held.step, claims.slip_error, claims.slip_rate_error)
 
 
 def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
     try:
-        return certified_bounds(task, loop)
+        return certified_bounds(task, loop, held.law.root)
     except ParameterError:
         reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
         return NoGuarantee(reason=reason, small_gain=None)

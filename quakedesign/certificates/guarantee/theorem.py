@@ -1,28 +1,33 @@
 """The robust small-gain theorem for a loop that runs: bounds for ever, in exact arithmetic.
 
-**Theorem.** Let v stand for b·(p − p*) [m/s²] and let the middle of the ranges of s, w and β be the model of the
-nominal loop. Then e2′ = s0·e1 − w0·e2 + β0·v + a with
+**Theorem.** Let a loop be linear with inputs w_1 … w_n, from rest, and g_yi,j gains as those of `norms`: |y(τ)| ≤ Σ_i
+g_yi,j·W_i(t) for τ ≤ t in part j of the period, W_i(t) the essential supremum of |w_i| on [0, t] (for a sampled input,
+over the samples up to t). Let every input in turn be bounded by the outputs, |w_i| ≤ F_i + Σ_y c_iy·|y| at every time,
+c ≥ 0, and M_ik = max_j Σ_y c_iy·g_yk,j. If the spectral radius of M is below 1, then W(t) ≤ (1 − M)⁻¹F for every t,
+and the outputs stay below max_j Σ_i g_yi,j·W_i for ever. For W(t) ≤ F + M·W(t), W(t) is finite, because the solution
+of such a loop is bounded on [0, t], and (1 − M)⁻¹ = 1 + M + M² … has no negative entry. Nothing is assumed about
+stability. ∎
+
+**Inputs.** Let v stand for b·(p − p*) [m/s²] and let the middle of the ranges of s, w and β be the model of the
+nominal loop. Then e2′ = s0·e1 − w0·e2 + β0·v + a with the ``acceleration``
 
     a = φ − w·r′ − r″ + (s − s0)e1 − (w − w0)e2 + (β − β0)v,
 
-and p* drifts by d = b·dp*/dt. With the gains g of `norms` (worst in each part j of the period), half ranges δ, and
-A_t, D_t the essential suprema of |a|, |d| on [0, t], linearity gives |y(τ)| ≤ g_ya,j·A_t + g_yd,j·D_t for τ ≤ t in
-part j. Hence A_t ≤ F + m·A_t + n·D_t with m = max_j Σ δ_y·g_ya,j, n = max_j Σ δ_y·g_yd,j and F a bound of |φ − w·r′ −
-r″|. A_t is finite, because the solution of a linear equation with bounded coefficients is bounded on [0, t]; nothing
-is assumed about stability. So m < 1 yields A_t ≤ (F + n·D_t)/(1 − m) for every t: all outputs stay below g_ya·A +
-g_yd·D for ever, for every measurable course of s, w, β in their ranges and of φ, also within a period. ∎
+so its F is a bound of |φ − w·r′ − r″| and its c are half the ranges; p* drifts by d = b·dp*/dt, the ``drift``.
 
 **Class rate.** For |φ| ≤ H and |φ′| ≤ Ḣ with φ(0) = 0, and friction of the slip alone, shift p* by φ/(β·b), with the β
 of the plant: φ leaves a, v becomes b(p − p*) + φ/β, and d gains (φ/β)′. N̂ being constant, |β′| ≤ μ′·N̂|x2|/b with the
-largest slope μ′, so |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b, because β ≥ 1: a second, small loop from e2 to d,
+largest slope μ′, so |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b, because β ≥ 1. Where friction depends on the slip rate
+as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0.
 
-    D_t ≤ D + Ḣ + κ·r′ + κ(g_2a·A_t + g_2d·D_t),
-
-and both inequalities together hold where the spectral radius of their 2 × 2 matrix is below 1. Where friction depends
-on the slip rate as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0.
+**Implicit root.** A law that uses the end w of an implicit step is linear but for the sampled input ``root``, w_k +
+γe1/T_s at the samples, γ the middle of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤ R
+(`sector`). E and R are the claims themselves. Let the claims follow from these bounds of the inputs. If e was within
+them at the samples before kT_s, then the inputs up to kT_s, which these samples alone decide, obey the bounds, so e is
+within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do. ∎
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -32,15 +37,36 @@ from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee.flow_norms import flow_norms
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.certificates.guarantee.task import Task
-from quakedesign.loop import PeriodicLoop
+from quakedesign.loop import ImplicitRoot, PeriodicLoop
 
-_ZERO, _ONE = Fraction(0), Fraction(1)
+_ZERO = Fraction(0)
 OUTPUTS = ("slip_error", "slip_rate_error", "push")
 _WORDS = {
-    "slip_error": "range of friction's slope in slip",
-    "slip_rate_error": "range of the slope in slip rate",
-    "push": "input gain's range",
+    ("acceleration", "slip_error"): "range of friction's slope in slip",
+    ("acceleration", "slip_rate_error"): "range of the slope in slip rate",
+    ("acceleration", "push"): "input gain's range",
+    ("drift", "slip_rate_error"): "drift that the input gain makes of the disturbance",
+    ("root", "slip_error"): "range of the implicit step's slope",
 }
+_HALVINGS = 96
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """An input of the nominal loop and what bounds it: F + Σ c_y·|y|.
+
+    Attributes
+    ----------
+    name : str
+    own : Fraction
+        F, in the unit of the input.
+    shares : mapping of str to Fraction
+        c_y by the output.
+    """
+
+    name: str
+    own: Fraction
+    shares: Mapping[str, Fraction]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,16 +82,13 @@ class Bounds:
     push : Fraction
         b·|p − p*| [m/s²].
     small_gain : Fraction
-        Gain of the loop through the uncertain quantities [-], below 1.
-    shares : mapping of str to Fraction
-        What each range contributes to it.
+        Spectral radius of M [-] from above, below 1.
     """
 
     slip_error: Fraction
     slip_rate_error: Fraction
     push: Fraction
     small_gain: Fraction
-    shares: Mapping[str, Fraction]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +100,7 @@ class NoGuarantee:
     reason : str
         With the quantity that fails.
     small_gain : UpperBound or None
-        At least 1; None where the nominal loop itself is not stable.
+        At least 1; None where something else fails, such as the stability of the nominal loop.
     """
 
     reason: str
@@ -92,17 +115,7 @@ class NoGuarantee:
         return f"none: {self.reason}"
 
 
-@dataclass(frozen=True, slots=True)
-class _Inputs:
-    """F [m/s²], D [m/s³], κ [1/s²], and what the push is more than the shifted one [m/s²]."""
-
-    force: Fraction
-    drift: Fraction
-    coupling: Fraction
-    unshifted: Fraction
-
-
-def certified_bounds(task: Task, loop: PeriodicLoop) -> Bounds | NoGuarantee:
+def certified_bounds(task: Task, loop: PeriodicLoop, root: ImplicitRoot | None = None) -> Bounds | NoGuarantee:
     """Bounds of the theorem for the loop of `held_loop` or `continuous_loop` with the task's model.
 
     Raises
@@ -110,56 +123,119 @@ def certified_bounds(task: Task, loop: PeriodicLoop) -> Bounds | NoGuarantee:
     ParameterError
         When the nominal loop is not found to be stable.
     """
-    return bounds_from(task, norms(loop) if loop.segments else flow_norms(loop))
+    gains = norms(loop) if loop.segments else flow_norms(loop)
+    return bounds_from(task, gains, root, loop.period)
 
 
-def bounds_from(task: Task, gains: Mapping[tuple[str, str], tuple[Any, ...]]) -> Bounds | NoGuarantee:
+def bounds_from(
+    task: Task, gains: Mapping[tuple[str, str], tuple[Any, ...]], root: ImplicitRoot | None, step: Fraction
+) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains of the nominal loop; of floats, floats."""
-    half, given = task.half_ranges, _inputs(task)
-    parts = range(len(gains["push", "drift"]))
-
-    def through(name: str, j: int) -> Fraction:
-        return sum((half[y] * gains[y, name][j] for y in OUTPUTS), _ZERO)
-
-    worst = max(parts, key=lambda j: through("acceleration", j))
-    shares = {y: half[y] * gains[y, "acceleration"][worst] for y in OUTPUTS}
-    m, n = (max(through(name, j) for j in parts) for name in ("acceleration", "drift"))
-    rate = {name: max(gains["slip_rate_error", name]) for name in ("acceleration", "drift")}
-    own = given.coupling * rate["drift"]
-    if m >= 1 or own >= 1 or m + n * given.coupling * rate["acceleration"] / (1 - own) >= 1:
-        return _none(m, n, own, given.coupling * rate["acceleration"], shares)
-    small_gain = m + n * given.coupling * rate["acceleration"] / (1 - own)
-    acceleration = (given.force + n * given.drift / (1 - own)) / (1 - small_gain)
-    drift = (given.drift + given.coupling * rate["acceleration"] * acceleration) / (1 - own)
+    channels = channels_of(task, root, step)
+    loops = [
+        [
+            max(sum((c * gains[y, k.name][j] for y, c in i.shares.items()), _ZERO) for j in _parts(gains))
+            for k in channels
+        ]
+        for i in channels
+    ]
+    small_gain = spectral_radius(loops)
+    if small_gain >= 1:
+        return _none(small_gain, channels, gains)
+    inputs = _solved(loops, [channel.own for channel in channels])
     found = {
-        y: max(gains[y, "acceleration"][j] * acceleration + gains[y, "drift"][j] * drift for j in parts)
+        y: max(
+            sum((gains[y, k.name][j] * v for k, v in zip(channels, inputs, strict=True)), _ZERO) for j in _parts(gains)
+        )
         for y in OUTPUTS
     }
     return Bounds(
         slip_error=found["slip_error"],
         slip_rate_error=found["slip_rate_error"],
-        push=found["push"] + given.unshifted,
+        push=found["push"] + _unshifted(task),
         small_gain=small_gain,
-        shares=shares,
     )
 
 
-def _inputs(task: Task) -> _Inputs:
+def channels_of(task: Task, root: ImplicitRoot | None, step: Fraction) -> tuple[Channel, ...]:
+    """Inputs of the loop of a task, of a law with an implicit root or without."""
+    force, drift, coupling = _task_inputs(task)
+    implicit = (
+        []
+        if root is None
+        else [Channel(name="root", own=root.remainder, shares={"slip_error": root.half_range / step})]
+    )
+    return (
+        Channel(name="acceleration", own=force, shares=task.half_ranges),
+        Channel(name="drift", own=drift, shares={"slip_rate_error": coupling}),
+        *implicit,
+    )
+
+
+def spectral_radius(matrix: Sequence[Sequence[Any]]) -> Any:
+    """Upper bound of the spectral radius of a non-negative matrix by halving, within a millionth if it is not zero.
+
+    It is below v if, and only if, elimination of v − M has positive pivots (Hawkins and Simon 1949).
+    """
+    low, high = _ZERO, max(sum(row, _ZERO) for row in matrix)
+    for _ in range(_HALVINGS):
+        if high - low <= high / 2**20:
+            break
+        middle = (low + high) / 2
+        low, high = (low, middle) if _dominates(middle, matrix) else (middle, high)
+    return high
+
+
+def _dominates(value: Any, matrix: Sequence[Sequence[Any]]) -> bool:
+    rows = [[(i == j) * value - v for j, v in enumerate(row)] for i, row in enumerate(matrix)]
+    while rows:
+        first, *rest = rows
+        if first[0] <= 0:
+            return False
+        rows = [[v - row[0] / first[0] * p for v, p in zip(row[1:], first[1:], strict=True)] for row in rest]
+    return True
+
+
+def _parts(gains: Mapping[tuple[str, str], tuple[Any, ...]]) -> range:
+    return range(len(gains["push", "drift"]))
+
+
+def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
+    """(1 − M)⁻¹F; the pivots are positive, since the spectral radius of M ≥ 0 is below 1."""
+    size = len(own)
+    rows = [[(i == j) - v for j, v in enumerate(row)] + [own[i]] for i, row in enumerate(matrix)]
+    for i in range(size):
+        rows[i] = [v / rows[i][i] for v in rows[i]]
+        for k in range(size):
+            if k != i:
+                rows[k] = [v - rows[k][i] * p for v, p in zip(rows[k], rows[i], strict=True)]
+    return [row[size] for row in rows]
+
+
+def _task_inputs(task: Task) -> tuple[Fraction, Fraction, Fraction]:
+    """F of a [m/s²] and of d [m/s³], and κ [1/s²]."""
     if task.change is None:
-        return _Inputs(task.reference_force + task.amplitude, task.drift, _ZERO, _ZERO)
+        return task.reference_force + task.amplitude, task.drift, _ZERO
     law = task.friction
     if law.rate_slope:
         middle, half = (task.beta[0] + task.beta[1]) / 2, task.half_ranges["push"]
-        left, shifted = half / middle * task.amplitude, task.amplitude / middle
-        return _Inputs(task.reference_force + left, task.drift + task.change / middle, _ZERO, shifted)
-    slope = max(law.weakening, law.strengthening) * task.area_per_mass[1] / task.authority
-    coupling = task.amplitude * slope
-    drift = task.drift + task.change + coupling * task.reference_rates[0]
-    return _Inputs(task.reference_force, drift, coupling, task.amplitude)
+        return task.reference_force + half / middle * task.amplitude, task.drift + task.change / middle, _ZERO
+    coupling = task.amplitude * max(law.weakening, law.strengthening) * task.area_per_mass[1] / task.authority
+    return task.reference_force, task.drift + task.change + coupling * task.reference_rates[0], coupling
 
 
-def _none(m: Fraction, n: Fraction, own: Fraction, coupled: Fraction, shares: Mapping[str, Fraction]) -> NoGuarantee:
-    whole = UpperBound(m if m >= 1 or own >= 1 else m + n * coupled / (1 - own))
-    name, share = max(shares.items(), key=lambda item: item[1])
-    alone = UpperBound(share)
-    return NoGuarantee(reason=f"small gain {whole:.3g}: the {_WORDS[name]} alone needs {alone:.2g}", small_gain=whole)
+def _unshifted(task: Task) -> Fraction:
+    """What b·(p − p*) is more than the push of the loop, p* being shifted in the class ``rate`` [m/s²]."""
+    if task.change is None:
+        return _ZERO
+    return task.amplitude / ((task.beta[0] + task.beta[1]) / 2 if task.friction.rate_slope else 1)
+
+
+def _none(
+    small_gain: Any, channels: Sequence[Channel], gains: Mapping[tuple[str, str], tuple[Any, ...]]
+) -> NoGuarantee:
+    alone = {(i.name, y): c * max(gains[y, i.name]) for i in channels for y, c in i.shares.items()}
+    (name, share), whole = max(alone.items(), key=lambda item: item[1]), UpperBound(small_gain)
+    return NoGuarantee(
+        reason=f"small gain {whole:.3g}: the {_WORDS[name]} alone needs {UpperBound(share):.2g}", small_gain=whole
+    )

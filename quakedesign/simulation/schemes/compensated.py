@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import sympy as sp
 
 from quakedesign.errors import ParameterError
+from quakedesign.loop.compensation import answered, followed
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.schemes import lawful
 from quakedesign.simulation.schemes.backward import backward_euler, inclusion
@@ -21,9 +22,10 @@ class Compensated(Sampled):
     """Implicit step for e2' = B0(p + d) with d estimated from the last sample, in place of the integral states.
 
     The estimate is d ← (1 − a)d + a[(e2 − e2⁻)/(T_sB0) − p⁻], where p⁻ is the pressure that was held, less the
-    feed-forward, and the step is that of `Implicit` with ξ = 0; the pressure is its solution minus d. What certificates
-    say about the law does not carry over to this scheme; `compensation` says for which β/β0 the loop is stable near the
-    origin, and why the weight 1 chatters.
+    feed-forward, and the step is that of `Implicit` with ξ = 0; the pressure is its solution minus d: `answered` and
+    `followed` of `quakedesign.loop`, which guarantees use as well. What certificates of continuous time say about the
+    law does not carry over to this scheme; `compensation` says for which β/β0 the loop is stable near the origin, and
+    why the weight 1 chatters.
 
     Attributes
     ----------
@@ -77,11 +79,11 @@ class Compensated(Sampled):
         begun, before, ahead_before, estimate, weight = own
         pull, feed_forward, slope = found
         gain, rate_error = known[lawful.step] * known[lawful.authority], known[lawful.rate_error]
-        seen = (rate_error - before) / gain - (known[lawful.held] - ahead_before)
+        pushed = known[lawful.held] - ahead_before
         follows = begun > 0 if pull != 0 else False
-        estimate = ca.if_else(follows, estimate + weight * (seen - estimate), 0)
+        estimate = ca.if_else(follows, followed(rate_error, before, pushed, estimate, weight, gain), 0)
         solved = inclusion(pull).solve(known)
         ahead, share = lawful.values((feed_forward, slope), solved)
-        pressure = (solved[end_rate] - rate_error) / gain - estimate + ahead
+        pressure = answered(rate_error, solved[end_rate], estimate, gain) + ahead
         after = [ca.SX(0) if slope == 0 else -estimate / share for _ in law.integrals]
         return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight])

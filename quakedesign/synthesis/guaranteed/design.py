@@ -63,7 +63,7 @@ def design_held(
     worst = replace(task, change=None)  # gains are chosen for the larger class: they answer slow disturbances as well
 
     def seen(x: np.ndarray) -> Estimate | None:
-        return estimated(worst, replace(template, law=law(x)).loop(worst)) if 0 < x[2] < 1 else None
+        return estimated(worst, replace(template, law=law(x))) if 0 < x[2] < 1 else None
 
     best = min((_search(lambda x: _peak_cost(seen(x), step), start) for start in _STARTS), key=lambda f: f[0])
     found = seen(best[1])

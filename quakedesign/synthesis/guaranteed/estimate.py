@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from quakedesign.certificates.guarantee import Bounds, NoGuarantee, Task
+from quakedesign.certificates.guarantee import Bounds, Held, NoGuarantee, Task
 from quakedesign.certificates.guarantee.theorem import bounds_from
 from quakedesign.loop import PeriodicLoop
 
@@ -22,12 +22,12 @@ class Estimate:
     drift_gain: float
 
 
-def estimated(task: Task, loop: PeriodicLoop) -> Estimate | None:
+def estimated(task: Task, held: Held) -> Estimate | None:
     """Bounds of the theorem with sums in place of upper sums; None where the nominal loop is unstable or very slow."""
-    gains = _gains(loop)
+    gains = _gains(held.loop(task))
     if gains is None:
         return None
-    return Estimate(bounds_from(task, gains), max(gains["slip_error", "drift"]))
+    return Estimate(bounds_from(task, gains, held.law.root, held.step), max(gains["slip_error", "drift"]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,30 +56,53 @@ def _gains(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | Non
     rows = np.array(list(loop.outputs.values()), dtype=float)
     return {
         (output, name): tuple(map(float, found))
-        for name, entry in loop.inputs.items()
-        for output, found in zip(loop.outputs, _of_input(np.array(entry, float), flows, doublings, rows), strict=True)
+        for name, entry in (loop.inputs | loop.sampled).items()
+        for output, found in zip(
+            loop.outputs, _of_input(np.array(entry, float), flows, doublings, rows, name in loop.sampled), strict=True
+        )
     }
 
 
-def _of_input(entry: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray) -> np.ndarray:
-    responses = [_response(entry, flow) for flow in flows]
-    weights = np.array([0.5, *[1.0] * (_PIECES - 1), 0.5])
+def _of_input(entry: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray, sudden: bool) -> np.ndarray:
+    responses = [_response(entry * (not sudden or not i), flow) for i, flow in enumerate(flows)]
+    sums = [_Sums(response, flow.piece, sudden) for response, flow in zip(responses, flows, strict=True)]
     own, later = [], np.eye(len(entry))
-    for flow, response in zip(flows[::-1], responses[::-1], strict=True):
-        own.append(later @ response * weights * flow.piece)
+    for flow, part in zip(flows[::-1], sums[::-1], strict=True):
+        own.append(later @ part.columns)
         later = later @ flow.whole
     before = np.hstack(own)
     for _ in range(doublings):
         before, later = np.hstack([before, later @ before]), later @ later
     found = []
-    for flow, response in zip(flows, responses, strict=True):
-        size, row = np.abs(rows @ response), rows
-        since = np.cumsum((size[:, 1:] + size[:, :-1]) * flow.piece / 2, axis=1)
+    for flow, part in zip(flows, sums, strict=True):
+        since, row = part.since(rows), rows
         for i in range(_PIECES + 1):
-            found.append(np.abs(row @ flow.jump @ before).sum(axis=1) + (since[:, i - 1] if i else 0))
+            found.append(np.abs(row @ flow.jump @ before).sum(axis=1) + since[:, i])
             row = row @ flow.step
-        before = np.hstack([flow.whole @ before, response * weights * flow.piece])
+        before = np.hstack([flow.whole @ before, part.columns])
     return np.array(found).T
+
+
+@dataclass(frozen=True, slots=True)
+class _Sums:
+    """Response over one segment to an input that flows, or that enters with the jump."""
+
+    response: np.ndarray
+    piece: float
+    sudden: bool
+
+    @property
+    def columns(self) -> np.ndarray:
+        """For the sums of everything later."""
+        weights = np.array([0.5, *[1.0] * (_PIECES - 1), 0.5])
+        return self.response[:, -1:] if self.sudden else self.response * weights * self.piece
+
+    def since(self, rows: np.ndarray) -> np.ndarray:
+        """From the jump to every end of a piece."""
+        size = np.abs(rows @ self.response)
+        if self.sudden:
+            return size
+        return np.insert(np.cumsum((size[:, 1:] + size[:, :-1]) * self.piece / 2, axis=1), 0, 0, axis=1)
 
 
 def _response(entry: np.ndarray, flow: _Flow) -> np.ndarray:

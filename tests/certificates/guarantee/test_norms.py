@@ -1,5 +1,6 @@
 """L1 norms against closed forms; every bound must lie above, and close."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 from math import exp
 
@@ -68,3 +69,33 @@ def test_an_unstable_loop_has_no_gain():
 
 def test_a_loop_that_is_barely_stable_has_its_large_gain():
     assert just_above(gain([["-1/100"]], [[[1]]], [1], [1], [1]), 100)
+
+
+def sampled_gain(flow, jumps, durations, entry, row):
+    given = loop(flow, jumps, durations, [0] * len(entry), row)
+    return norms(replace(given, sampled={"v": tuple(map(F, entry))}))["y", "v"]
+
+
+def test_a_sampled_input_is_a_sum_over_the_samples():
+    """x → x/2 + v at every sample and x′ = −x: 1 + q + q² …, q = e^{−T}/2, worst just after a sample."""
+    found = sampled_gain([[-1]], [[["1/2"]]], ["1/2"], [1], [1])
+    assert just_above(float(max(found)), 1 / (1 - exp(-0.5) / 2))
+    assert just_above(float(found[-1]), exp(-0.5 * 7 / 8) / (1 - exp(-0.5) / 2))
+
+
+def test_a_sampled_input_of_an_integrator_chain_grows_between_samples():
+    """A reset at every sample leaves |c·e^{Aθ}j| of the last one: y = θ, at most T."""
+    found = sampled_gain([[0, 1], [0, 0]], [[[0, 0], [0, 0]]], [3], [0, 1], [1, 0])
+    assert [round(float(v), 6) for v in found] == [3 * (i + 1) / 8 for i in range(8)]
+
+
+def test_a_sampled_input_enters_once_a_period_of_two_jumps():
+    """x → x/2 + v after the first, x → x/3 after the second: 1/(1 − 1/6) after the first jump, a third after that."""
+    found = [round(float(v), 6) for v in sampled_gain([[0]], [[["1/2"]], [["1/3"]]], [1, 2], [1], [1])]
+    assert found == [round(6 / 5, 6)] * 8 + [round(2 / 5, 6)] * 8
+
+
+def test_a_sampled_input_that_bends_between_the_ends_of_pieces_is_bounded_there():
+    """y″ = −y, reset at every sample: |sin θ| reaches 1 between the ends of pieces of 1 s, and never more."""
+    found = sampled_gain([[0, 1], [-1, 0]], [[[0, 0], [0, 0]]], [8], [0, 1], [1, 0])
+    assert 1 <= max(found) <= F(13, 10)

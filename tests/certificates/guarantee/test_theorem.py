@@ -1,0 +1,83 @@
+"""The small gain of several channels against eigenvalues and closed forms."""
+
+from fractions import Fraction as F
+
+import numpy as np
+import pytest
+
+from quakedesign.certificates.guarantee import Bounds, NoGuarantee, task_of
+from quakedesign.certificates.guarantee.theorem import bounds_from, channels_of, spectral_radius
+from quakedesign.fault import load_fault
+from quakedesign.loop import ImplicitRoot, Power
+
+STEP = F("0.184")
+PULL = (Power(factor=(F(1), F(1)), exponent=F(0), argument="slip"),)
+TASK, LIMITED = (task_of(load_fault("real-fault"), rate_limited=limited) for limited in (False, True))
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 5])
+def test_the_spectral_radius_is_an_eigenvalue_from_above(size):
+    random = np.random.default_rng(size)
+    for _ in range(20):
+        matrix = random.random((size, size)) * 10.0 ** random.uniform(-3, 3, (size, size))
+        found = spectral_radius([[F(v) for v in row] for row in matrix])
+        assert F(max(abs(np.linalg.eigvals(matrix)))) * (1 - F(1, 10**9)) <= found
+        assert float(found) == pytest.approx(max(abs(np.linalg.eigvals(matrix))), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("rows", "exact"),
+    [
+        ([["1/2"]], "1/2"),
+        ([[0, 0], [0, 0]], 0),
+        ([["1/2", 1000], [0, 0]], "1/2"),
+        ([["1/2", 0], ["1/3", "1/4"]], "1/2"),
+        ([[0, 4], ["1/16", 0]], "1/2"),
+        ([["1/4", 10**12], [F(1, 16 * 10**12), "1/4"]], "1/2"),
+    ],
+)
+def test_spectral_radii_known_by_hand_are_bounded_closely(rows, exact):
+    found = spectral_radius([[F(v) for v in row] for row in rows])
+    assert F(exact) <= found <= F(exact) * F(1001, 1000)
+
+
+def gains(acceleration=("1/20", "2/5", 2), drift=("1/50", "1/12", "1/2"), root=("3/10", 2, 13)):
+    """One part of the period."""
+    outputs = ("slip_error", "slip_rate_error", "push")
+    columns = {"acceleration": acceleration, "drift": drift, "root": root}
+    return {(y, name): (F(v),) for name, column in columns.items() for y, v in zip(outputs, column, strict=True)}
+
+
+def test_one_channel_is_the_scalar_small_gain():
+    """|a| ≤ F + m|a| + n·D, with m the ranges' halves times the gains."""
+    found, half = bounds_from(TASK, gains(), None, STEP), TASK.half_ranges
+    m, n = (half["slip_error"] * a + half["slip_rate_error"] * b + half["push"] * c
+            for a, b, c in ((F(1, 20), F(2, 5), F(2)), (F(1, 50), F(1, 12), F(1, 2))))  # fmt: skip
+    a = (TASK.reference_force + TASK.amplitude + n * TASK.drift) / (1 - m)
+    assert isinstance(found, Bounds)
+    assert m <= found.small_gain <= m * F(10001, 10000)
+    assert found.slip_rate_error == F(2, 5) * a + F(1, 12) * TASK.drift
+
+
+@pytest.mark.parametrize("task", [TASK, LIMITED], ids=["amplitude", "rate"])
+@pytest.mark.parametrize("root", [None, ImplicitRoot(pull=PULL, slopes=(F("0.9"), F(1)), remainder=F(1, 10**6))])
+def test_the_inputs_are_the_fixed_point_of_what_the_outputs_make_of_them(task, root):
+    """W ← F + MW from 0, a thousand times in floats."""
+    channels, given = channels_of(task, root, STEP), gains()
+    sizes = dict.fromkeys((c.name for c in channels), 0.0)
+    for _ in range(1000):
+        peaks = {y: sum(float(given[y, k][0]) * v for k, v in sizes.items()) for y in task.half_ranges}
+        sizes = {c.name: float(c.own) + sum(float(s) * peaks[y] for y, s in c.shares.items()) for c in channels}
+    found = bounds_from(task, given, root, STEP)
+    assert isinstance(found, Bounds)
+    assert float(found.slip_error) == pytest.approx(peaks["slip_error"], rel=1e-9)
+    assert float(found.slip_rate_error) == pytest.approx(peaks["slip_rate_error"], rel=1e-9)
+
+
+def test_a_loop_through_the_implicit_step_can_fail_by_itself():
+    root = ImplicitRoot(pull=PULL, slopes=(F(0), F(1)))
+    found = bounds_from(TASK, gains(root=(F("0.4"), 2, 13)), root, STEP)
+    assert isinstance(found, NoGuarantee)
+    assert found.small_gain >= 1
+    assert found.reason.startswith("small gain")
+    assert found.reason.endswith("the range of the implicit step's slope alone needs 1.1")
