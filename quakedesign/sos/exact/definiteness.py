@@ -99,9 +99,10 @@ def _eliminates(block: list[list[Fraction]]) -> bool:
         pivot = block[k][k]
         if pivot < 0 or (pivot == 0 and any(block[k][j] for j in range(k + 1, size))):
             return False
-        if pivot:
-            spend(6 * (size - k) ** 2, max(length(v) for row in block[k:] for v in row[k:]))
-        for i in range(k + 1, size) if pivot else ():
+        if not pivot:
+            continue
+        spend(6 * (size - k) ** 2, max(length(v) for row in block[k:] for v in row[k:]))
+        for i in range(k + 1, size):
             factor = block[i][k] / pivot
             for j in range(k + 1, size) if factor else ():
                 block[i][j] -= factor * block[k][j]

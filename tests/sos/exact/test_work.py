@@ -23,7 +23,7 @@ from quakedesign.sos.exact.reduction import _contributions, reach
 from quakedesign.sos.exact.squares import IntegerGram, Square, form, integer_gram
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.exact.statement import statement as usual
-from quakedesign.sos.exact.work import STEPS, TERMS, expanded, limited, longest, spend
+from quakedesign.sos.exact.work import STEPS, TERMS, expanded, length, limited, longest, spend
 
 RANDOM = random.Random(5)
 
@@ -122,6 +122,17 @@ def test_long_numbers_cost_the_square_of_their_length():
 
 def test_the_common_denominator_counts():
     assert longest([F(1, 2), F(1, 3), F(5, 7)]) == 3 + (2 * 3 * 7).bit_length()
+    assert [longest([F(0)]), longest([F(1)]), longest([F(1, 2)])] == [0 + 1, 1 + 1, 1 + 2]
+    assert [length(F(1, 8)), length(F(8, 3)), length(F(0))] == [4, 4, 1]
+    with limited(2), pytest.raises(WorkError):
+        longest([F(1), F(2), F(3)])
+
+
+def test_as_many_terms_as_allowed_are_expanded():
+    with limited():
+        expanded(TERMS)
+        with pytest.raises(WorkError, match=f"more than {TERMS} terms"):
+            expanded(TERMS + 1)
 
 
 @pytest.mark.parametrize(
