@@ -153,8 +153,8 @@ def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
 
 def static_friction(fault: Fault) -> Fraction:
     """μ* [-], friction at rest where the fault starts, exact or rounded."""
-    start = fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0))
-    return fraction_of(sp.nsimplify(start, rational=True))
+    start = sp.nsimplify(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)), rational=True)
+    return fraction_of(start) if start.is_Rational else rational(str(sp.N(start, 50)))
 
 
 @lru_cache(maxsize=256)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction as F
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -103,6 +104,30 @@ def test_the_chords_of_a_hardening_law_are_inside_the_sectors():
 
 def test_the_slope_of_a_hardening_law_has_either_sign():
     assert known_ranges(hardening())[plant.slip_slope] == (-6, 6)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Started(Hardening):
+    """Friction that grows from a number of its own."""
+
+    name = "started"
+    start: ClassVar[sp.Expr] = sp.sqrt(2) / 4
+
+    def coefficient(self, slip, rate, *state):
+        """Friction coefficient [-]."""
+        return self.start - self.residual + super().coefficient(slip, rate)
+
+    @property
+    def bounds(self):
+        """Static and largest friction coefficient [-]."""
+        return self.start, self.start + self.gain
+
+
+def test_friction_at_rest_is_exact_for_a_decimal_and_rounded_for_a_root(monkeypatch):
+    law = Started(residual=0.2, gain=0.3, critical_slip=0.05)
+    assert abs(8 * static_friction(with_friction(law)) ** 2 - 1) < F(1, 10**48)
+    monkeypatch.setattr(Started, "start", sp.Float(0.2353))
+    assert static_friction(with_friction(law)) == F("0.2353")
 
 
 def test_a_design_for_a_hardening_law_is_proved_over_both_signs():

@@ -306,3 +306,20 @@ def test_forms_share_one_positive_degree():
             degree(bad, "V")
     with pytest.raises(CertificateError, match="vanishes on a cell"):
         degree([{(1,): F(1)}, {}], "V")
+
+
+def test_a_decay_is_named_as_the_decrease_that_it_is_about():
+    # V = |x|^(3/2) = u^3 and x' = -decrease [x]^(1/2): -V' = 3/2 decrease u^2 on both cells
+    rate = sp.Symbol("decrease", real=True)
+    own = LoopField(
+        states={x: 2}, field={x: -rate * SignedPower(x, HALF)}, gains=(), constants=(), uncertain=(rate,),
+        domain="cells",
+    )  # fmt: skip
+    loop = loop_of("custom", own, gains={}, uncertain={"decrease": (F(1), F(2))})
+    claims = {"positive": F(1), "decrease": F(1), "decay": F(1, 2)}
+    found = list(claimed(loop, (Term(F(1), (), (("x", F(3, 2), "a"),)),), claims))[2:]
+    assert [one.name for one in found] == [
+        f"{claim} {sign} decrease={value}" for claim in ("decrease", "decay") for sign in "+-" for value in (1, 2)
+    ]
+    # on the last cell, with v^3 = u^3: 3/2*2 u^2 - 1/2 v^2
+    assert found[-1].polynomial == {(2, 0): 3, (0, 2): F(-1, 2)}
