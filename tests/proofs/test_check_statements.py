@@ -513,5 +513,6 @@ def test_a_file_of_a_kind_is_a_guarantee():
 def test_a_guarantee_needs_the_module_beside_the_checker(tmp_path, monkeypatch, capsys):
     (tmp_path / "guarantee.json").write_text('{"format": 1, "kind": "guarantee"}')
     monkeypatch.setattr(checker, "__file__", str(tmp_path / "check.py"))
+    checker.guarantee_module.cache_clear()
     assert checker.main([str(tmp_path / "guarantee.json")]) == 2
     assert "guarantee.py must stand beside check.py" in capsys.readouterr().err
