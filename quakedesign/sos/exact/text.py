@@ -29,7 +29,7 @@ _TOKEN = re.compile(
 )
 _BLANK = re.compile(r"[ \t\r\n]*")
 _SAME = {"**": "^", "−": "-", "=": "=="}
-_STRENGTH = {"(": 0, "+": 1, "-": 1, "*": 2, "/": 2, "negative": 3}
+_STRENGTH = {"+": 1, "-": 1, "*": 2, "/": 2, "negative": 3}
 _RELATIONS = {">=": "inequality", "<=": "inequality", "==": "equality"}
 
 Kind = Literal["inequality", "equality"]
@@ -197,7 +197,7 @@ def _evaluate(text: str, tokens: Sequence[Token], expansion: Expansion) -> Terms
         else:
             operand = _continue(text, tokens[place], values, pending, expansion)
         place += 1
-    return values[-1]
+    return values.pop()
 
 
 def _begin(text: str, token: Token, values: list[Terms], pending: list[Token], expansion: Expansion) -> bool:
@@ -231,9 +231,9 @@ def _continue(text: str, token: Token, values: list[Terms], pending: list[Token]
         refuse(text, token, "no ) without its (", "Balance the parentheses.")
     if sign == ")":
         pending.pop()
-    elif token.kind != "end":
+    else:
         pending.append(token)
-    return sign != ")" and token.kind != "end"
+    return sign != ")"
 
 
 def _strength(token: Token) -> int:

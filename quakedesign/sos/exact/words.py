@@ -20,7 +20,7 @@ def polynomial_words(polynomial: Polynomial, variables: Sequence[str]) -> str:
         number = str(abs(c)) if abs(c) != 1 or not powers else ""
         parts.append((" - " if c < 0 else " + ") + "*".join(filter(None, [number, *powers])))
     text = "".join(parts) or "0"
-    return text[3:] if text.startswith(" + ") else text.replace(" - ", "-", 1) if text.startswith(" - ") else text
+    return text[3:] if text.startswith(" + ") else text.replace(" - ", "-", 1)
 
 
 def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:

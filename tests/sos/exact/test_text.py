@@ -7,6 +7,7 @@ import sys
 import time
 from fractions import Fraction as F
 
+import flint
 import pytest
 import sympy as sp
 from hypothesis import given, settings
@@ -27,7 +28,9 @@ from quakedesign.sos.exact.text import DEPTH, LENGTH, VARIABLES, names, parse, p
         ("2*-x - -x", "x", {(1,): -1}),
         ("+x − 1", "x", {(1,): 1, (0,): -1}),
         ("x - 1 - 1", "x", {(1,): 1, (0,): -2}),
+        ("x - 1 + 2", "x", {(1,): 1, (0,): 1}),
         ("12/6/2*x", "x", {(1,): 1}),
+        ("12/-2*3*x", "x", {(1,): -18}),
         ("x/(1/2 + 1/6)", "x", {(1,): F(3, 2)}),
         ("(x^2)^3 + x^0", "x", {(6,): 1, (0,): 1}),
         ("1e-8*x + .5 + 2.", "x", {(1,): F(1, 10**8), (0,): F(5, 2)}),
@@ -49,7 +52,20 @@ def test_given_variables_fix_the_order_and_exclude_other_names():
         parse("x + z", ["x", "y"])
 
 
-@pytest.mark.parametrize("variables", [["x", "x"], ["1x"], ["x y"], [""], ["é"], [1], [f"v{i}" for i in range(17)]])
+SIXTEEN = [f"v{i}" for i in range(16)]
+
+
+def test_as_many_and_as_long_names_as_allowed_are_read():
+    assert names(*SIXTEEN) == names("+".join(SIXTEEN)) == parse("1", SIXTEEN)[0] == tuple(SIXTEEN)
+    assert parse("+".join(SIXTEEN))[0] == tuple(SIXTEEN)
+    assert parse("x" * 32)[0] == parse("1", "x" * 32)[0] == ("x" * 32,)
+    with pytest.raises(PolynomialError, match="a name of at most 32"):
+        parse("x" * 33)
+
+
+@pytest.mark.parametrize(
+    "variables", [["x", "x"], ["x", "1y"], ["1y", "x"], ["x y"], [""], ["é"], [1], [f"v{i}" for i in range(17)]]
+)
 def test_variables_that_are_no_names_are_refused(variables):
     with pytest.raises(PolynomialError, match="different names"):
         parse("1", variables)
@@ -354,6 +370,7 @@ LIMITS = [  # allowed, and refused
     ("(x^30)^2", "(x^31)^2"),
     ("(a + b + c + d)^30*e + a*f", "(a + b + c + d)^30*e + (a + b + c + d)^30*f"),
     ("2^60", "((2^60)^60)"),
+    ("(" * DEPTH + "x" + ")" * DEPTH, "(" * (DEPTH + 1) + "x" + ")" * (DEPTH + 1)),
 ]
 
 
@@ -368,3 +385,12 @@ def test_a_refusal_writes_what_cannot_be_printed_and_nothing_else_differently():
     with pytest.raises(PolynomialError) as caught:
         expansion.refuse("é\\'\n\x1b\u2028", expansion.Token("other", "é", 0), "another", "Write it.")
     assert str(caught.value) == "another expected at character 1. Received ⟦é⟧\\'\\n\\x1b\\u2028 there. Write it."
+
+
+def test_a_sum_costs_the_shorter_of_its_two_operands_twice():
+    """Once for what is added, once for looking at its lengths."""
+    sums, token = expansion.Expansion("", ("x",)), expansion.Token("operator", "+", 0)
+    long, short = ({i + (i << 7): flint.fmpq(1) for i in range(first, first + n)} for first, n in ((0, 9), (20, 2)))
+    left = sums._work
+    assert len(sums.add(short, long, token)) == 11
+    assert left - sums._work == 2 + 2
