@@ -26,7 +26,7 @@ from typing import Any, NoReturn
 MAX_BYTES, MAX_NESTING = 4 * 2**20, 12
 MAX_STATES, MAX_WEIGHT, MAX_UNCERTAIN, MAX_NUMBERS = 6, 12, 8, 64
 MAX_TERMS, MAX_EXPONENT, MAX_OBLIGATIONS, MAX_BASIS = 200, 24, 4096, 200
-MAX_ROOTS, MAX_LIFTS, MAX_INPUTS, MAX_SETS, MAX_OUTPUTS = 4, 4, 8, 12, 8
+MAX_ROOTS, MAX_LIFTS = 4, 4
 MAX_VARIABLES, MAX_CONSTRAINTS, MAX_PRODUCTS = 16, 32, 1024
 MAX_MONOMIALS, MAX_REDUCED, MAX_POLYNOMIAL = 2000, 400, 20_000
 # The following bound what a hostile file can cost; an honest one is far below.
@@ -49,6 +49,10 @@ Polynomial = dict[Exponents, Number]  # integers where this saves time
 
 class Refused(Exception):
     """The file is no valid certificate, for the reason given."""
+
+
+class Outdated(Exception):
+    """The file is of a kind that is no longer read."""
 
 
 @dataclass(frozen=True)
@@ -307,7 +311,6 @@ def check_identity(first: Polynomial, second: Polynomial, total: Polynomial, whe
 
 LOOP_KEYS = ("format", "law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field")
 PROOF_KEYS = (*LOOP_KEYS, "V", "claims", "witnesses")
-BOUND_KEYS = (*LOOP_KEYS, "inputs", "outputs", "witnesses")
 
 Powers = tuple[Number, ...]
 SignedSum = dict[tuple[tuple[str, ...], Powers, tuple[bool, ...]], Fraction]
@@ -402,8 +405,7 @@ def read_loop(document: dict[str, Any]) -> Loop:
     need(len(gains) + len(constants) <= MAX_NUMBERS, "gains and constants", "at most 64", "more")
     weights = read_names(document["states"], "states", 1, MAX_STATES)
     lifts = read_names(document["lifts"], "lifts", 0, MAX_LIFTS if domain == "cells" else 0)
-    inputs = read_names(document.get("inputs", {}), "inputs", int("inputs" in document), MAX_INPUTS)
-    names = [*gains, *constants, *uncertain, *roots, *lifts, *weights, *inputs]
+    names = [*gains, *constants, *uncertain, *roots, *lifts, *weights]
     need(len(set(names)) == len(names), "names", "different from each other", names)
     most = MAX_WEIGHT if domain == "cells" else 1
     for name, weight in weights.items():
@@ -416,8 +418,7 @@ def read_loop(document: dict[str, Any]) -> Loop:
     terms = read_object(document["field"], "field", weights)
     loop = Loop(law, numbers, weights, domain, ranges, {name: square for name, (square, _) in squares.items()}, {}, {})
     loop = replace(loop, lifts=read_lifts(lifts, loop))
-    known = replace(loop, uncertain=ranges | dict.fromkeys(inputs, (Fraction(0), Fraction(0))))
-    return replace(loop, field={state: read_terms(terms[state], f"d{state}/dt", known) for state in weights})
+    return replace(loop, field={state: read_terms(terms[state], f"d{state}/dt", loop) for state in weights})
 
 
 def read_factor(value: Any, where: str, loop: Loop) -> tuple[str, tuple[Number, bool]]:
@@ -877,166 +878,6 @@ def limit_of(
     return multiply(factors, map(abs, point), tuple(map(int, term.exponents)), budget)
 
 
-# ---------------------------------------------------------------- closed loops: bounds
-
-
-@dataclass(frozen=True)
-class InvariantSet:
-    """V <= 1, with what its decay is spent on: the input, its rate of change and the other sets."""
-
-    function: list[Term]
-    decay: Fraction
-    shares: list[Fraction]
-    borrowed: list[Fraction]
-
-
-@dataclass(frozen=True)
-class Input:
-    """A function of time within limits, and what it can do to the outputs: a bound and weights of sets for each."""
-
-    name: str
-    limits: list[Fraction]
-    sets: list[InvariantSet]
-    bounds: dict[str, tuple[Fraction, list[Fraction]]]
-
-
-def read_parts(value: Any, where: str, count: int, whole: Fraction) -> list[Fraction]:
-    """Read non-negative numbers of limited sum."""
-    parts = [read_rational(entry, where) for entry in read_list(value, where, count, count)]
-    need(all(part >= 0 for part in parts) and sum(parts) <= whole, where, f"non-negative, sum <= {whole}", value)
-    return parts
-
-
-def read_set(value: Any, where: str, index: int, count: int, limits: list[Fraction], loop: Loop) -> InvariantSet:
-    """Read a set; the loop's states include the input if this has a limited rate of change."""
-    entry = read_object(value, where, ("V", "decay", "shares", "borrowed"))
-    decay = read_rational(entry["decay"], f"{where} decay", positive=True)
-    shares = read_parts(entry["shares"], f"{where} shares", len(limits), decay)
-    borrowed = read_parts(entry["borrowed"], f"{where} borrowed", count, decay - sum(shares))
-    need(borrowed[index] == 0, f"{where} borrowed", "zero for the set itself", entry["borrowed"])
-    return InvariantSet(read_terms(entry["V"], f"{where} V", loop), decay, shares, borrowed)
-
-
-def read_input(name: str, value: Any, outputs: Iterable[str], loop: Loop) -> Input:
-    """Read an input."""
-    entry = read_object(value, f"input {name}", ("limits", "sets", "bounds"))
-    where, bounds = f"limits of {name}", read_object(entry["bounds"], f"bounds of {name}", outputs)
-    need(list(bounds) == list(outputs), f"bounds of {name}", "in the order of the outputs", list(bounds))
-    limits = [read_rational(limit, where, positive=True) for limit in read_list(entry["limits"], where, 1, 2)]
-    entries = read_list(entry["sets"], f"sets of {name}", 1, MAX_SETS)
-    own = replace(loop, weights=loop.weights | ({name: 1} if len(limits) == 2 else {}), uncertain={})
-    sets = [read_set(e, f"set {i} of {name}", i, len(entries), limits, own) for i, e in enumerate(entries)]
-    pairs = dict[str, tuple[Fraction, list[Fraction]]]()
-    for output, pair in bounds.items():
-        where = f"bound of {output} for {name}"
-        number = read_rational(read_object(pair, where, ("bound", "weights"))["bound"], where, positive=True)
-        pairs[output] = number, read_parts(pair["weights"], f"{where} weights", len(sets), Fraction(1))
-    return Input(name, limits, sets, pairs)
-
-
-def check_linear(loop: Loop, inputs: Collection[str]) -> None:
-    """Check that every term of the field is linear, in a state or in an input, and that every input occurs."""
-    for term in chain(*loop.field.values()):
-        count = sum(name in inputs for name in term.uncertain)
-        need(sum(term.exponents) + count == 1, "field", "linear in states and inputs", term.uncertain)
-    for name in inputs:
-        need(any(name in term.uncertain for term in chain(*loop.field.values())), f"input {name}", "used", "none")
-
-
-def read_form(terms: list[Term], size: int, degree: int, where: str, budget: Budget) -> Polynomial:
-    """Write terms as a form of given degree in as many variables."""
-    form = restrict(collect(pad_terms(terms, size), budget), whole_space(size), {}, budget)
-    need(degree_of(form, where) == degree, where, f"of degree {degree}", degree_of(form, where))
-    return form
-
-
-def alone(loop: Loop, one: Input, inputs: Collection[str]) -> Loop:
-    """Return the loop with one input alone, this and, where it is limited, its rate of change being states."""
-    extra = [one.name, f"d{one.name}/dt"][: len(one.limits)]
-    states, size = len(loop.weights), len(loop.weights) + len(extra)
-    field = dict[str, list[Term]]()
-    for state, terms in loop.field.items():
-        field[state] = pad_terms([term for term in terms if not set(term.uncertain) & set(inputs)], size)
-        for term in terms:
-            if one.name in term.uncertain:
-                others = tuple(name for name in term.uncertain if name != one.name)
-                field[state].append(linear_term(term.number, others, states, size))
-    field |= {name: [] for name in extra}
-    if len(extra) == 2:
-        field[one.name] = [linear_term(Fraction(1), (), states + 1, size)]
-    return replace(loop, weights=loop.weights | dict.fromkeys(extra, 1), field=field)
-
-
-def linear_term(number: Fraction, uncertain: tuple[str, ...], index: int, size: int) -> Term:
-    """Return a number times parameters times one variable."""
-    return Term(number, uncertain, tuple(int(i == index) for i in range(size)), tuple(i == index for i in range(size)))
-
-
-def bound_obligations(
-    loop: Loop, one: Input, inputs: Collection[str], outputs: dict[str, list[Term]], budget: Budget
-) -> Iterator[Obligation]:
-    """Yield that the sets are invariant together and that the outputs are bounded on them."""
-    driven, states = alone(loop, one, inputs), len(loop.weights)
-    size = len(driven.weights)
-    cell, squares = whole_space(size), [power_sum([i], size, 2) for i in range(states, size)]
-    forms = [read_form(entry.function, size, 2, f"V {i} of {one.name}", budget) for i, entry in enumerate(one.sets)]
-    for (i, entry), form in zip(enumerate(one.sets), forms, strict=True):
-        own = form.get(tuple(2 * (j == states) for j in range(size)), 0)
-        need(own * one.limits[0] ** 2 <= 1, f"V {i} of {one.name}", "at most 1 for the input alone", "more")
-        rate = time_derivative(pad_terms(entry.function, size), driven, budget)
-        supply = add_scaled({}, -entry.decay, form, budget)
-        for share, limit, square in zip(entry.shares, one.limits, squares, strict=True):
-            supply = add_scaled(supply, share / limit**2, square, budget)
-        for share, other in zip(entry.borrowed, forms, strict=True):
-            supply = add_scaled(supply, share, other, budget)
-        for vertex in vertices_of(loop):
-            left = add_scaled(supply, Fraction(-1), restrict(rate, cell, vertex, budget), budget)
-            yield Obligation(named_vertex(f"invariant {one.name} {i}", vertex), left, size)
-    size = states + len(one.limits) - 1
-    for output, (bound, weights) in one.bounds.items():
-        form = read_form(outputs[output], size, 1, f"output {output}", budget)
-        left = add_scaled({}, Fraction(-1), add_product({}, form, form, budget), budget)
-        for weight, entry in zip(weights, one.sets, strict=True):
-            left = add_scaled(left, weight * bound**2, read_form(entry.function, size, 2, "V", budget), budget)
-        yield Obligation(f"output {one.name} {output}", left, size)
-
-
-def describe_bounds(loop: Loop, inputs: list[Input], outputs: dict[str, list[Term]]) -> list[str]:
-    """Describe what is bounded, and why: rows, since what the file calls them says nothing."""
-    rows = {output: sum_text(terms, loop) for output, terms in outputs.items()}
-    lines = [f"row of the output {output}, a name that is not verified: {row}" for output, row in rows.items()]
-    for one in inputs:
-        limits = zip((one.name, f"d{one.name}/dt"), one.limits, strict=False)
-        lines.append(f"input, measurable in time: {', '.join(f'|{name}| <= {limit}' for name, limit in limits)}")
-        own = replace(loop, weights=loop.weights | ({one.name: 1} if len(one.limits) == 2 else {}))
-        for i, entry in enumerate(one.sets):
-            text = f"V{i} = {sum_text(entry.function, own)}, decay {entry.decay}"
-            lines.append(f"invariant under {one.name} alone: {text}")
-        lines += [f"under {one.name} alone: |{rows[output]}| <= {bound}" for output, (bound, _) in one.bounds.items()]
-    totals = {output: sum(one.bounds[output][0] for one in inputs) for output in outputs}
-    need(max(map(length, totals.values())) <= MAX_BITS, "a sum of bounds", "of at most 599 digits", "a longer one")
-    bounds = ", ".join(f"|{rows[output]}| <= {total}" for output, total in totals.items())
-    return [*lines, f"conclusion: from rest, under all inputs within their limits, {bounds} at all times"]
-
-
-def bound(document: dict[str, Any], loop: Loop, budget: Budget) -> Result:
-    """Verify bounds of linear outputs of a linear loop under inputs within limits."""
-    names = document["inputs"]
-    plain = loop.domain == "reals" and not loop.roots
-    need(plain, "the domain of a bound", "reals, without roots", loop.domain)
-    check_affine(loop)
-    check_linear(loop, names)
-    texts = read_names(document["outputs"], "outputs", 1, MAX_OUTPUTS)
-    own = replace(loop, uncertain={})
-    outputs = {output: read_terms(terms, f"output {output}", own) for output, terms in texts.items()}
-    inputs = [read_input(name, value, outputs, loop) for name, value in names.items()]
-    count = sum(len(one.sets) * len(vertices_of(loop)) + len(outputs) for one in inputs)
-    need(count <= MAX_OBLIGATIONS, "obligations", f"at most {MAX_OBLIGATIONS}", count)
-    pairs = chain.from_iterable(bound_obligations(loop, one, names, outputs, budget) for one in inputs)
-    check_witnesses(document["witnesses"], pairs, False, budget)
-    return Result("proved", (*describe(loop), *describe_bounds(loop, inputs, outputs)))
-
-
 # ---------------------------------------------------------------- polynomials: reading and writing
 
 STATEMENT_KEYS = ("format", "variables", "polynomial", "inequalities", "equalities", "products", "degree", "multiplier")
@@ -1342,14 +1183,11 @@ def check(text: str) -> Result:
         return check_polynomial(document, budget)
     if "kind" in document:
         return check_guarantee(document)
-    kinds = {
-        "refutation": ((*LOOP_KEYS, "refutation"), refute),
-        "inputs": (BOUND_KEYS, bound),
-        "V": (PROOF_KEYS, prove),
-    }
-    keys, verify = kinds[next((key for key in kinds if key in document), "V")]
-    read_object(document, "the file", keys)
-    return verify(document, read_loop(document), budget)
+    if "inputs" in document:
+        raise Outdated
+    refutes = "refutation" in document
+    read_object(document, "the file", (*LOOP_KEYS, "refutation") if refutes else PROOF_KEYS)
+    return (refute if refutes else prove)(document, read_loop(document), budget)
 
 
 def check_guarantee(document: dict[str, Any]) -> Result:
@@ -1394,6 +1232,11 @@ def report(name: str) -> int:
     except (Refused, MemoryError) as error:
         print(f"{ascii(name)[1:-1]}: invalid: {str(error) or 'it needs too much memory'}")
         return 1
+    except Outdated:
+        expected = "FILE must be a proof, a refutation or of the kind guarantee"
+        remedy = "Make the new file with quakedesign certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE"
+        print(f"{expected}. Received {name!a}, a bound under inputs: no longer read. {remedy}.", file=sys.stderr)
+        return 2
     except (OSError, ValueError) as error:
         reason = ascii(getattr(error, "strerror", None) or str(error))
         print(f"FILE must be readable. Received {name!a}: {reason}. Check the path.", file=sys.stderr)

@@ -5,11 +5,7 @@ from fractions import Fraction
 from itertools import product
 
 from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, loop_of, require
-from quakedesign.certificates.error_coordinates import in_error_coordinates, without_inputs
-from quakedesign.certificates.meaning import require_true_names
 from quakedesign.certificates.obligations import Obligation, claimed, different
-from quakedesign.certificates.response import Response
-from quakedesign.certificates.response_obligations import demanded, require_sound
 from quakedesign.certificates.witnesses import proves
 from quakedesign.controllers import LoopField, Subject, laws, model_of
 from quakedesign.symbolic.terms import Term, value
@@ -22,10 +18,7 @@ def check(certificate: Certificate, law: Subject | None = None) -> Verdict:
     if certificate.refutation is not None:
         _check_equilibrium(certificate.loop, certificate.refutation)
         return Verdict.REFUTED
-    if certificate.response is not None:
-        _check_response(certificate, certificate.response)
-    else:
-        _check_proof(certificate)
+    _check_proof(certificate)
     return Verdict.PROVED
 
 
@@ -38,9 +31,6 @@ def _same_field(loop: Loop, law: Subject | None) -> None:
     )
     name, model = model_of(loop.law if law is None else law)
     require(isinstance(law, LoopField) or name == loop.law, f"the certificate is about {loop.law!r}, not {name!r}.")
-    if loop.inputs:
-        loop = without_inputs(loop)
-        model = model if {s.name for s in model.states} == set(loop.states) else in_error_coordinates(model)
     names = (model.gains, model.constants, model.uncertain)
     given = (loop.gains, loop.constants, loop.uncertain)
     require(
@@ -71,7 +61,6 @@ def _sorted(loop: Loop, sums: Mapping[str, tuple[Term, ...]]) -> dict[str, list[
 
 def _check_proof(certificate: Certificate) -> None:
     loop, claims = certificate.loop, certificate.claims
-    require(not loop.inputs, "a proof of stability is about a loop without inputs.")
     second = "decrease" if loop.domain == "cells" else "rate"
     required, allowed = {"positive", second}, {f"bound_{state}" for state in loop.states}
     allowed |= {"decay"} if second == "decrease" else set()
@@ -83,12 +72,6 @@ def _check_proof(certificate: Certificate) -> None:
     uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.ranges)
     require(not uncertain, "V must not depend on an uncertain parameter.")
     _check_witnesses(certificate, claimed(loop, certificate.lyapunov, claims))
-
-
-def _check_response(certificate: Certificate, response: Response) -> None:
-    require_sound(certificate.loop, response)
-    require_true_names(certificate.loop, response)
-    _check_witnesses(certificate, demanded(certificate.loop, response))
 
 
 def _check_witnesses(certificate: Certificate, obligations: Iterable[Obligation]) -> None:
@@ -114,7 +97,7 @@ def _check_roots(loop: Loop) -> None:
 
 
 def _check_equilibrium(loop: Loop, equilibrium: Equilibrium) -> None:
-    plain = loop.domain == "cells" and not (loop.lifts or loop.roots or loop.inputs)
+    plain = loop.domain == "cells" and not (loop.lifts or loop.roots)
     require(plain, "an equilibrium needs cells without lifts.")
     point, parameters = equilibrium.point, equilibrium.parameters
     require(set(point) == set(loop.states) and any(point.values()), "the point must be away from the origin.")

@@ -9,7 +9,6 @@ from math import isqrt
 
 import sympy as sp
 
-from quakedesign.certificates.response import Response
 from quakedesign.controllers import LoopField, Subject
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import fraction_of
@@ -50,8 +49,6 @@ class Loop:
         The gain or constant whose positive square root a name stands for, and an interval that holds it.
     lifts : mapping of str to tuple of Term
         Argument of every nested power.
-    inputs : mapping of str to tuple of Fraction
-        Bound of every measurable input in the field and, if its rate is limited too, that of its rate.
     """
 
     law: str
@@ -63,7 +60,6 @@ class Loop:
     field: Mapping[str, tuple[Term, ...]]
     roots: Mapping[str, tuple[str, Range]] = dataclasses.field(default_factory=dict)
     lifts: Mapping[str, tuple[Term, ...]] = dataclasses.field(default_factory=dict)
-    inputs: Mapping[str, tuple[Fraction, ...]] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, (low, high) in self.uncertain.items():
@@ -73,9 +69,7 @@ class Loop:
     @property
     def symbols(self) -> dict[str, sp.Symbol]:
         """SymPy symbol of every name."""
-        names = (
-            *self.states, *self.gains, *self.constants, *self.uncertain, *self.roots, *self.lifts, *self.inputs
-        )  # fmt: skip
+        names = (*self.states, *self.gains, *self.constants, *self.uncertain, *self.roots, *self.lifts)
         return {n: sp.Symbol(n, real=True) for n in names}
 
     @property
@@ -143,8 +137,6 @@ class Certificate:
     witnesses : mapping of str to Witness
         One for every different obligation, by name.
     refutation : Equilibrium, optional
-    response : Response, optional
-        Bounds on outputs under the inputs of the loop, instead of a V and claims.
     """
 
     loop: Loop
@@ -152,7 +144,6 @@ class Certificate:
     claims: Mapping[str, Fraction] = field(default_factory=dict)
     witnesses: Mapping[str, Witness] = field(default_factory=dict)
     refutation: Equilibrium | None = None
-    response: Response | None = None
 
     def check(self, law: Subject | None = None) -> Verdict:
         """Re-decide the statement from nothing but its claim, in exact arithmetic; field against law as well.

@@ -12,7 +12,7 @@ from quakedesign.certificates.files import certificate_of, read_json
 from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.guarantee.files import is_guarantee, read_guarantee
 from quakedesign.certificates.linear_premises import sectors
-from quakedesign.certificates.meaning import meaning, require_degree_of_slip
+from quakedesign.certificates.meaning import require_degree_of_slip
 from quakedesign.certificates.premises import (
     Errors,
     certified_lipschitz,
@@ -20,8 +20,6 @@ from quakedesign.certificates.premises import (
     largest_matched_rate,
     least_authority,
 )
-from quakedesign.certificates.response import Response
-from quakedesign.certificates.tracking import peaks_covered
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.fault import Fault, load_fault
 from quakedesign.sos import Answer, Positivity
@@ -119,36 +117,19 @@ def _covers(certificate: Certificate, fault: Fault) -> list[str]:
     for name, (low, high) in ranges.items():
         if not loop.uncertain[name][0] <= low <= high <= loop.uncertain[name][1]:
             raise CertificateError(f"the certified range of {name} does not cover {fault.name}")
-    return [*said, *(peaks_covered(certificate, fault) if certificate.response is not None else [])]
+    return said
 
 
 def statement(certificate: Certificate) -> list[str]:
     """What a certificate says, in lines."""
     loop, symbols = certificate.loop, certificate.loop.symbols
-    which = "field but for its inputs" if loop.inputs else "field"
-    lines = [f"law {loop.law}, {which} re-derived from the law and equal to the file's"]
+    lines = [f"law {loop.law}, field re-derived from the law and equal to the file's"]
     lines.append(", ".join(f"{name} = {v}" for name, v in loop.parameters.items()))
     lines.append(", ".join(f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()))
     lines += [f"{state}' = {from_terms(terms, symbols)}" for state, terms in loop.field.items()]
     if certificate.refutation is not None:
         point = ", ".join(f"{name}: {v}" for name, v in certificate.refutation.point.items())
         return [*lines, f"Filippov equilibrium away from the origin, in cell coordinates {point}"]
-    if certificate.response is not None:
-        return [*lines, *_response(certificate, certificate.response)]
     lines.append("V = " + " + ".join(f"({from_terms([term], symbols)})" for term in certificate.lyapunov))
     lines.append(", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
-    return lines
-
-
-def _response(certificate: Certificate, response: Response) -> list[str]:
-    """Limits of the inputs and the bounds of the outputs, by their rows; it is said where a name says nothing."""
-    loop, lines = certificate.loop, ["start: all states zero"]
-    for name, limits in loop.inputs.items():
-        words = (f"|{name}| <= {limits[0]}", *(f"|{name}'| <= {rate}" for rate in limits[1:]))
-        lines.append(f"measurable, acting as above: {' and '.join(words)}")
-    for output, row in response.outputs.items():
-        parts = ", ".join(f"{name} {part.bounds[output].bound}" for name, part in response.parts.items())
-        name = output if meaning(loop, row) == output else f"{output} for the file, a name that is not verified"
-        line = f"|{from_terms(row, loop.symbols)}| <= {response.total(output)} for ever: {name}"
-        lines.append(f"{line} (of this: {parts})")
     return lines

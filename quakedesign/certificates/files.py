@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Witness
-from quakedesign.certificates.response_files import limits_of, plain_response, read_response
 from quakedesign.certificates.term_files import LIMITS, plain_terms, read_terms, texts
-from quakedesign.errors import CertificateError
+from quakedesign.errors import CertificateError, UnsupportedError
 from quakedesign.input import read_text
 from quakedesign.output import write_whole
 from quakedesign.sos.exact.proofs import Square
@@ -70,17 +69,26 @@ def parse_certificate(text: str) -> Certificate:
 
 
 def certificate_of(raw: Any) -> Certificate:
-    """Certificate from a parsed file. Raises CertificateError as `load_certificate`."""
-    kinds = {"refutation": _REFUTATION, "inputs": _BOUND}
-    keys = next((keys for word, keys in kinds.items() if isinstance(raw, dict) and word in raw), _PROOF)
-    return _certificate(with_keys(raw, keys))
+    """Certificate from a parsed file. Raises CertificateError as `load_certificate`.
+
+    Raises
+    ------
+    UnsupportedError
+        For a bound of outputs under inputs, which files of the kind ``guarantee`` have replaced.
+    """
+    if isinstance(raw, dict) and "inputs" in raw:
+        raise UnsupportedError(
+            "a file must be a proof, a refutation or of the kind guarantee. Received a bound under inputs, which is no "
+            "longer read. Make the new file with certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE."
+        )
+    refutes = isinstance(raw, dict) and "refutation" in raw
+    return _certificate(with_keys(raw, _REFUTATION if refutes else _PROOF))
 
 
 _COMMON = {"format", "law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field"}
 _WITNESS = {"obligation", "multiplier", "squares", "equalities", "inequalities"}
 _PROOF = _COMMON | {"V", "claims", "witnesses"}
 _REFUTATION = _COMMON | {"refutation"}
-_BOUND = _COMMON | {"inputs", "outputs", "witnesses"}
 
 
 def _certificate(raw: dict[str, Any]) -> Certificate:
@@ -93,8 +101,6 @@ def _certificate(raw: dict[str, Any]) -> Certificate:
         name = with_keys(entry, _WITNESS)["obligation"]
         need(isinstance(name, str) and name not in witnesses, "an obligation must be named once, by a text")
         witnesses[name] = _witness(entry, loop)
-    if "inputs" in raw:
-        return Certificate(loop=loop, response=read_response(raw, loop), witnesses=witnesses)
     return Certificate(
         loop=loop,
         lyapunov=read_terms(raw["V"], loop, tuple(loop.states)),
@@ -112,8 +118,7 @@ def _loop(raw: dict[str, Any]) -> Loop:
     uncertain = objected(raw["uncertain"], "uncertain", LIMITS["uncertain"])
     lifts = objected(raw["lifts"], "lifts", LIMITS["lifts"])
     roots = objected(raw["roots"], "roots", LIMITS["roots"])
-    inputs = objected(raw.get("inputs", {}), "inputs", LIMITS["inputs"])
-    names = [*gains, *constants, *states, *uncertain, *roots, *lifts, *inputs]
+    names = [*gains, *constants, *states, *uncertain, *roots, *lifts]
     need(len(set(names)) == len(names) and len(gains) + len(constants) <= LIMITS["parameters"], "names must differ")
     need(all(NAME.fullmatch(n) for n in names) and states != {}, "states and uncertain need names")
     top = 12 if raw["domain"] == "cells" else 1
@@ -138,8 +143,7 @@ def _loop(raw: dict[str, Any]) -> Loop:
     arguments = {lift: read_terms(lifts[lift], bare, powers[: len(states) + i]) for i, lift in enumerate(lifts)}
     need(bare.domain == "cells" or not lifts, "lifts belong on cells")
     rates = with_keys(raw["field"], set(states))
-    moved = replace(bare, inputs={name: limits_of(entry) for name, entry in inputs.items()})
-    return replace(moved, lifts=arguments, field={state: read_terms(rates[state], moved, powers) for state in states})
+    return replace(bare, lifts=arguments, field={state: read_terms(rates[state], bare, powers) for state in states})
 
 
 def _root(raw: Any, known: dict[str, Fraction]) -> tuple[str, tuple[Fraction, Fraction]]:
@@ -152,8 +156,7 @@ def _witness(raw: dict[str, Any], loop: Loop) -> Witness:
     multiplier = read_polynomial(raw["multiplier"], "multiplier", None, LIMITS["basis"])
     need(multiplier != {}, "a multiplier must not be empty")
     variables = len(next(iter(multiplier)))
-    more = 2 if loop.inputs else len(loop.lifts) + 1
-    need(len(loop.states) <= variables <= len(loop.states) + more, "a multiplier has a wrong key")
+    need(len(loop.states) <= variables <= len(loop.states) + len(loop.lifts) + 1, "a multiplier has a wrong key")
     squares = _squares(raw["squares"], variables, loop, ())
     conditions = listed(raw["inequalities"], "inequalities", LIMITS["lifts"])
     for k, entries in enumerate(conditions):
@@ -221,8 +224,6 @@ def _plain(certificate: Certificate) -> dict[str, Any]:
         parts = {"parameters": found.parameters, "point": found.point, "weights": found.weights}
         return plain | {"refutation": {key: texts(values) for key, values in parts.items()}}
     witnesses = [_plain_witness(name, witness) for name, witness in certificate.witnesses.items()]
-    if certificate.response is not None:
-        return plain | plain_response(certificate.response, loop) | {"witnesses": witnesses}
     return plain | {
         "V": plain_terms(certificate.lyapunov),
         "claims": texts(certificate.claims),

@@ -17,9 +17,6 @@ LIMITS = {
     "terms": 200,
     "basis": 200,
     "witnesses": 4096,
-    "inputs": 8,
-    "outputs": 8,
-    "sets": 12,
 }
 """Largest number of each in a file."""
 
@@ -33,7 +30,7 @@ def _term(raw: Any, loop: Loop, powers: Sequence[str]) -> Term:
     number, names, entries = listed(raw, "a term", length=3)
     coefficient = read_rational(number)
     need(coefficient != 0, "a term must not be zero")
-    known = {*loop.gains, *loop.constants, *loop.ranges, *loop.inputs}
+    known = {*loop.gains, *loop.constants, *loop.ranges}
     parameters = tuple(listed(names, "parameters", 32))
     need(all(isinstance(n, str) and n in known for n in parameters), "a term has an unknown parameter")
     factors = tuple(_factor(entry, powers) for entry in listed(entries, "factors", len(powers)))

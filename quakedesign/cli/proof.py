@@ -55,7 +55,8 @@ def certify(
     step
         For the e-LQR: sampling period for which p is held, such as '140 ms' or 7/50 (s); the fault's unless given.
     peaks
-        For the e-LQR: certify how fast the fault can slip at most, for every disturbance of a class: amplitude or rate.
+        For the e-LQR: certify how fast the fault can slip at most, for every disturbance of a class, amplitude or rate,
+        if the pressure acts at once (see the command guarantee for the loop that runs).
     out
         File for the certificate. Other proofs of an e-LQR go beside it, with their names added.
     force
@@ -132,7 +133,7 @@ def _certify_on_fault(
         print_json(found)
     else:
         print_lines(verdict_lines(judged))
-    return 0 if found["verdict"] == "proved" and (peaks is None or judged.peaks is not None) else 1
+    return 0 if found["verdict"] == "proved" and (peaks is None or found["peaks"] is not None) else 1
 
 
 @app.command

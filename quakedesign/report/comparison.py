@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Verdict
-from quakedesign.certificates.guarantee import Guarantee, NoGuarantee
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee
 from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import Variant, certified_lipschitz
 from quakedesign.controllers import SlidingMode, published
@@ -17,7 +17,7 @@ from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis import Design, assess
 from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.analysis.sampling_time import largest_sampling_time, on_trajectory
-from quakedesign.synthesis.linear.certified_peaks import CLASSES, CertifiedPeaks
+from quakedesign.synthesis.guaranteed import CLASSES
 from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
 from quakedesign.synthesis.linear.sampled.held import HeldLoop
 
@@ -45,8 +45,8 @@ class Entry:
         For a designed sliding mode: what is certified of the same gains with every named feed-forward.
     held : HeldLoop or None
         For a linear law: what is decided when p is held over T_s, see `Design.held_loop`.
-    peaks : mapping of str to CertifiedPeaks
-        For a designed linear law that is proved: certified peaks by class of disturbances; no class without any.
+    peaks : mapping of str to ContinuousPeaks
+        For a designed linear law that is proved: peaks in continuous time by class; no class without any.
     guarantee : Guarantee or NoGuarantee or None
         For a designed law: what is proved of it with p held over T_s, see `Design.guarantee`.
     """
@@ -59,7 +59,7 @@ class Entry:
     growth_per_step: float | None = None
     variants: tuple[Variant, ...] = ()
     held: HeldLoop | None = None
-    peaks: Mapping[str, CertifiedPeaks] = field(default_factory=dict)
+    peaks: Mapping[str, ContinuousPeaks] = field(default_factory=dict)
     guarantee: Guarantee | NoGuarantee | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -215,7 +215,8 @@ def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Callab
         growth = amplification(poles, run.provenance["step"], run.provenance["method"]) if continuous else None
         tell(f"{label}: held pressure and peaks", 0.0)
         wanted = CLASSES if origin == "designed" and design.verdict is Verdict.PROVED else ()
-        peaks = {kind: design.certified_peaks(kind) for kind in wanted}
+        classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
+        peaks = {kind: design.certified_peaks(kind) for kind in classes}
         return Entry(
             label=label,
             origin=origin,
@@ -223,7 +224,7 @@ def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Callab
             run=run,
             growth_per_step=growth,
             held=design.held_loop(),
-            peaks={kind: found for kind, found in peaks.items() if found is not None},
+            peaks={kind: found for kind, found in peaks.items() if isinstance(found, ContinuousPeaks)},
         )
     bound = float(_lipschitz(design))
     premise = on_trajectory(design.controller, bound, run)

@@ -7,13 +7,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.certificates import Certificate, certificate_text
+from quakedesign.certificates import certificate_text
+from quakedesign.certificates.guarantee.files import guarantee_text
 from quakedesign.errors import OutputError
 from quakedesign.output import require_room, whole_folder
-from quakedesign.report.comparison import Comparison, Entry
+from quakedesign.report.comparison import Comparison
 from quakedesign.report.facts import fault_dict, fault_sentences
 from quakedesign.report.numbers import csv_text, printed, table
-from quakedesign.synthesis.linear.peak_certificate import peak_certificate
 
 if TYPE_CHECKING:
     from quakedesign.report.paper_study import PaperStudy
@@ -137,26 +137,12 @@ def _fill(
         if entry.design.certificate is not None:
             path = folder / "certificates" / _file(entry.origin, entry.design.name)
             path.write_text(certificate_text(entry.design.certificate), encoding="utf-8")
-        for kind, certificate in peak_certificates(entry).items():
+        for kind, peaks in entry.peaks.items():
             path = folder / "certificates" / f"{entry.design.name}-peaks-{kind}.json"
-            path.write_text(certificate_text(certificate), encoding="utf-8")
+            path.write_text(guarantee_text(peaks), encoding="utf-8")
     for i, (name, drawing) in enumerate(drawn.items()):
         tell(f"figure {name}", i / len(drawn))
         drawing.savefig(folder / "figures" / f"{name}.png", metadata={"Software": None})
     page = page_html(comparison, fault_sentences(comparison.fault), drawn)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "results.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def peak_certificates(entry: Entry) -> dict[str, Certificate]:
-    """Certificates of an entry's peaks by class of disturbances, checked.
-
-    Raises
-    ------
-    CertificateError
-    """
-    law = entry.design.controller
-    found = {kind: peak_certificate(peaks, law) for kind, peaks in entry.peaks.items() if law is not None}
-    for certificate in found.values():
-        certificate.check()
-    return found

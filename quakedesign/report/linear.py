@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from quakedesign.certificates import Verdict
+from quakedesign.certificates.guarantee import ContinuousPeaks, NoGuarantee
 from quakedesign.synthesis.linear.analysis.robust_stability import Analysis
 from quakedesign.synthesis.linear.analysis.verdict import LinearVerdict
-from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks
 from quakedesign.synthesis.linear.sampled.held import ConstantLoop, HeldLoop
 
 
@@ -37,16 +37,17 @@ def constant_sentence(loops: Mapping[str, ConstantLoop]) -> str:
     return f"idealised, constant parameters (verdict, longest T_s proved): {'; '.join(said)}"
 
 
-def peaks_sentence(peaks: Mapping[str, CertifiedPeaks | None]) -> str:
-    """How fast the fault can slip at most, for every class of disturbances that was asked for."""
+def peaks_sentence(peaks: Mapping[str, ContinuousPeaks | NoGuarantee]) -> str:
+    """How fast the fault can slip at most in continuous time, for every class of disturbances that was asked for."""
     said = [
-        f"{found.peak_slip_rate:.3g} m/s (slip error {found.total('slip_error'):.3g} m) for "
+        f"{found.claims.peak_slip_rate:.3g} m/s (slip error {found.claims.slip_error:.3g} m) for "
         + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
         for name, found in peaks.items()
-        if found is not None
+        if isinstance(found, ContinuousPeaks)
     ]
     if not said:
-        return "no bound on the slip rate is certified"
+        reasons = {found.reason for found in peaks.values() if isinstance(found, NoGuarantee)}
+        return "; ".join(["no bound on the slip rate is certified", *sorted(reasons)])
     return "certified from rest, p acting at once: slip rate below " + ", ".join(said)
 
 
@@ -62,7 +63,9 @@ def verdict_lines(judged: LinearVerdict) -> list[str]:
         f"  {held_sentence(judged.held)}",
         f"  {constant_sentence(judged.held.constant)}",
     ]
-    return lines if judged.asked is None else [*lines, f"  {peaks_sentence({judged.asked: judged.peaks})}"]
+    if judged.asked is None or judged.peaks is None:
+        return lines
+    return [*lines, f"  {peaks_sentence({judged.asked: judged.peaks})}"]
 
 
 def margin_lines(found: Analysis) -> list[str]:

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Verdict
-from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Held, NoGuarantee, guarantee, task_of
 from quakedesign.certificates.premises import Domain, Premise, Variant, feedforward_variants
 from quakedesign.controllers import Controller, SlidingMode, control_law
 from quakedesign.controllers.elqr import ExtendedLQR
@@ -14,7 +14,7 @@ from quakedesign.controllers.feed_forward import NONE
 from quakedesign.fault import Fault
 from quakedesign.loop import summed_integrals
 from quakedesign.rationals import rational
-from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks, certified_peaks
+from quakedesign.synthesis.guaranteed.continuous import certified_peaks
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
 
@@ -77,21 +77,23 @@ class Design:
             return ()
         return feedforward_variants(self.fault, self.controller, self.certificate)
 
-    def certified_peaks(self, disturbance_class: str = "amplitude") -> CertifiedPeaks | None:
-        """How far an e-LQR lets slip, slip rate and pressure go at most; see `quakedesign.synthesis.linear`.
+    def certified_peaks(self, disturbance_class: str = "amplitude") -> ContinuousPeaks | NoGuarantee:
+        """How far an e-LQR lets slip, slip rate and pressure go at most if the pressure acts at once.
+
+        What holds for the law as it runs is `guarantee`.
 
         Parameters
         ----------
         disturbance_class : str
             ``"amplitude"``: any disturbance as large as the fault's; ``"rate"``: and no faster.
 
-        Returns
-        -------
-        CertifiedPeaks or None
-            None when nothing is certified, or for another law.
+        Raises
+        ------
+        ParameterError
+            For the class ``rate`` and a disturbance that does not start at 0.
         """
-        if self.controller is None or isinstance(self.controller, SlidingMode):
-            return None
+        if not isinstance(self.controller, ExtendedLQR):
+            return NoGuarantee(reason=f"no bound of peaks of {self.title} is known here", small_gain=None)
         return certified_peaks(self.fault, self.controller, disturbance_class=disturbance_class)
 
     @property

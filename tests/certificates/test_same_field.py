@@ -10,7 +10,6 @@ import sympy as sp
 from quakedesign.certificates import load_certificate
 from quakedesign.certificates.checking import _same_field, limit, touching_cells
 from quakedesign.certificates.claim import Loop, error_units, loop_of, root_enclosure, unit_ranges
-from quakedesign.certificates.error_coordinates import in_error_coordinates
 from quakedesign.controllers import LoopField, laws
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.symbolic.terms import Term
@@ -104,26 +103,6 @@ def test_the_root_of_another_gain_is_refused():
     with pytest.raises(CertificateError, match="the field is not that"):
         _same_field(replace(DIA, roots={name: (other, ends)}), None)
     _same_field(replace(DIA, roots={name: (of, (F(0), F(9)))}), None)  # whether it holds the root is asked elsewhere
-
-
-def test_the_inputs_of_a_response_are_not_of_the_law():
-    """A loop with inputs is compared without them, in its own or in error coordinates."""
-    moved = {s: (*terms, *([Term(F(1), ("push",), ())] if s == "x2" else [])) for s, terms in ELQR.field.items()}
-    _same_field(replace(ELQR, field=moved, inputs={"push": (F(1),)}), None)
-    with pytest.raises(CertificateError):
-        _same_field(replace(ELQR, field=moved), None)
-
-
-def test_a_response_may_be_about_error_coordinates():
-    model = in_error_coordinates(laws()["elqr"].loop_field())
-    moved = loop_of("elqr", model, gains=ELQR.gains, uncertain=ELQR.uncertain, constants=ELQR.constants)
-    push = {"e2": (*moved.field["e2"], Term(F(1), ("push",), ()))}
-    _same_field(replace(moved, field=moved.field | push, inputs={"push": (F(1),)}), None)
-    with pytest.raises(CertificateError, match="the field is not that"):
-        _same_field(moved, None)
-    wrong = {"e2": (*push["e2"], Term(F(1), (), (("e1", F(1), "s"),)))}
-    with pytest.raises(CertificateError, match="the field is not that"):
-        _same_field(replace(moved, field=moved.field | wrong, inputs={"push": (F(1),)}), None)
 
 
 # ---------------------------------------------------------------- what a loop is made of

@@ -306,47 +306,6 @@ def nested_sign():
     return document
 
 
-def driven():
-    """x' = -3bx + u + v with b in [1, 2], |u|, |v| <= 1/2, |v'| <= 1, by two sets.
-
-    30x^2 and u: 12u^2 - 60x(u - 3bx) - 90x^2 = (180b - 90)x^2 - 60xu + 12u^2; 30/25 x^2 - x^2 = x^2/5.
-    10x^2 + v^2: 10v^2 + v'^2/2 - 20x(v - 3bx) - 2vv' - 30x^2 - 3v^2 = (60b - 30)x^2 - 20xv + 7v^2 - 2vv' + v'^2/2,
-    of leading minors 30, 110 and 25 for b = 1; (10x^2 + v^2)/4 - x^2 = 3/2 x^2 + v^2/4.
-    """
-    document = decay()
-    del document["V"], document["claims"]
-    document["uncertain"] = {"b": ["1", "2"]}
-    document["field"]["x"] = [["-1", ["b", "k"], [["x", "1", "s"]]], ["1", ["u"], []], ["1", ["v"], []]]
-    x2, v2, three = ["30", [], [["x", "2", "a"]]], ["1", [], [["v", "2", "a"]]], [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    ten = ["10", [], [["x", "2", "a"]]]
-    document["inputs"] = {
-        "u": {
-            "limits": ["1/2"],
-            "sets": [{"V": [x2], "decay": "3", "shares": ["3"], "borrowed": ["0"]}],
-            "bounds": {"y": {"bound": "1/5", "weights": ["1"]}},
-        },
-        "v": {
-            "limits": ["1/2", "1"],
-            "sets": [{"V": [ten, v2], "decay": "3", "shares": ["5/2", "1/2"], "borrowed": ["0"]}],
-            "bounds": {"y": {"bound": "1/2", "weights": ["1"]}},
-        },
-    }
-    document["outputs"] = {"y": [["1", [], [["x", "1", "s"]]]]}
-    document["witnesses"] = [
-        witness("invariant u 0 b=1", square([0, 0], three[:2], "90", "-30", "12")),
-        witness("invariant u 0 b=2", square([0, 0], three[:2], "270", "-30", "12")),
-        witness("output u y", square([0], [[1]], "1/5")),
-        witness("invariant v 0 b=1", square([0, 0, 0], three, "30", "-10", "0", "7", "-1", "1/2")),
-        witness("invariant v 0 b=2", square([0, 0, 0], three, "90", "-10", "0", "7", "-1", "1/2")),
-        witness("output v y", square([0, 0], [[1, 0], [0, 1]], "3/2", "0", "1/4")),
-    ]
-    for entry in document["witnesses"]:
-        entry["squares"][0]["basis"] = [
-            row[: len(entry["squares"][0]["times"])] for row in entry["squares"][0]["basis"]
-        ]
-    return document
-
-
 def refuted(document, **refutation):
     for key in ("V", "claims", "witnesses"):
         del document[key]
@@ -377,7 +336,7 @@ def inhomogeneous_rest():
 
 PROOFS = [relay, disturbed_relay, decay, oscillator, oscillator_on_cells, weighted_pair]
 PROOFS += [bounded_oscillator, bounded_pair]
-PROOFS += [rooted_relay, settling_relay, nested_root, nested_size, nested_sum, nested_sign, cubic_relay, driven]
+PROOFS += [rooted_relay, settling_relay, nested_root, nested_size, nested_sum, nested_sign, cubic_relay]
 REFUTATIONS = [overpowered_relay, sliding_rest, inhomogeneous_rest]
 
 
@@ -445,16 +404,6 @@ def test_roots_lifts_and_settling_times_are_stated():
     lines = verify(nested_sign()).statement
     assert 'argument of a nested power: n = 1*x + 1*y + 0 for ["7", ["c", "s"], [["x", "3", "a"]]]' in lines
     assert "dx/dt = -1*sign(n)*|n|^(1/3)" in verify(nested_root()).statement
-
-
-def test_bounds_under_inputs_add_up():
-    """And 7/10 is above the true supremum 2 * (1/2) / 3."""
-    statement = verify(driven()).statement
-    assert "input, measurable in time: |v| <= 1/2, |dv/dt| <= 1" in statement
-    assert "row of the output y, a name that is not verified: 1*x" in statement
-    assert "under u alone: |1*x| <= 1/5" in statement
-    ending = "from rest, under all inputs within their limits, |1*x| <= 7/10 at all times"
-    assert statement[-1] == f"conclusion: {ending}"
 
 
 def test_cells_without_interior_need_no_witness_and_admit_none():
@@ -738,7 +687,6 @@ UNUSUAL = ["4/2", "2/1", "-0", "0/1", "0/2", "2/0", "2/-1", "2/01", "02", "+2", 
 UNUSUAL += ["2.0", "2e0", "", "-", "/2", "--2", "2//1", "²", "٢", "1_0", "0x2", "NaN", "inf"]
 UNUSUAL += [LONG, f"1/{LONG}"]
 
-BOUNDS = {name: entry["bounds"]["y"] for name, entry in driven()["inputs"].items()}
 BROKEN = {
     # header
     "format 2": (relay, [("format", 2)], "format"),
@@ -972,54 +920,6 @@ BROKEN = {
     "decay of zero": (settling_relay, [("claims", "decay", "0")], "positive"),
     "decay on reals": (decay, [("claims", "decay", "1")], "unknown keys"),
     "decay without witness": (relay, [("claims", "decay", "1")], "an object"),
-    # bounds
-    "bound with V": (driven, [("V", X2)], "unknown keys"),
-    "bound on cells": (driven, [("domain", "cells")], "reals"),
-    "bound with a root": (driven, [("roots", "s", ["k", "1", "2"])], "reals, without roots"),
-    "no inputs": (driven, [("inputs", {})], "inputs"),
-    "no outputs": (driven, [("outputs", {})], "outputs"),
-    "input unused": (driven, [("field", "x", 2, 1, ["u"])], "used"),
-    "input twice": (driven, [("field", "x", 2, 1, ["v", "v"])], "affine"),
-    "product of inputs": (driven, [("field", "x", 2, 1, ["u", "v"])], "linear"),
-    "input times state": (driven, [("field", "x", 2, 2, [["x", "1", "s"]])], "linear"),
-    "constant push": (driven, [("field", "x", 2, 1, ["k"])], "linear"),
-    "cubic field": (driven, [("field", "x", 0, 2, [["x", "3", "s"]])], "linear"),
-    "multiplier of a bound": (
-        driven,  # x (x^2/5) = x x^2/5
-        [("witnesses", 2, "multiplier", {"1": "1"}), ("witnesses", 2, "squares", 0, "times", [1])],
-        "1 on reals",
-    ),
-    "outputs in another order": (
-        driven,
-        [
-            ("outputs", {"y": X1, "z": X1}),
-            *[("inputs", name, "bounds", {"z": bound, "y": bound}) for name, bound in BOUNDS.items()],
-        ],
-        "order of the outputs",
-    ),
-    "set without decay": (driven, [("inputs", "u", "sets", 0, "decay", "0")], "positive"),
-    "limit of zero": (driven, [("inputs", "u", "limits", ["0"])], "positive"),
-    "three limits": (driven, [("inputs", "v", "limits", ["1", "1", "1"])], "1 to 2"),
-    "share negative": (driven, [("inputs", "v", "sets", 0, "shares", ["7/2", "-1/2"])], "non-negative"),
-    "shares above the decay": (driven, [("inputs", "u", "sets", 0, "shares", ["4"])], "sum <= 3"),
-    "borrowed from itself": (
-        driven,
-        [("inputs", "u", "sets", 0, "shares", ["2"]), ("inputs", "u", "sets", 0, "borrowed", ["1"])],
-        "zero for the set itself",
-    ),
-    "borrowed too much": (driven, [("inputs", "u", "sets", 0, "borrowed", ["1"])], "sum <= 0"),
-    "weights above one": (driven, [("inputs", "u", "bounds", "y", "weights", ["2"])], "sum <= 1"),
-    "weight negative": (driven, [("inputs", "u", "bounds", "y", "weights", ["-1"])], "non-negative"),
-    "bound of an input zero": (driven, [("inputs", "u", "bounds", "y", "bound", "0")], "positive"),
-    "bound too small": (driven, [("inputs", "u", "bounds", "y", "bound", "1/10")], "identity"),
-    "limit too large": (driven, [("inputs", "u", "limits", ["1"])], "identity"),
-    "set not around the input": (driven, [("inputs", "v", "limits", ["2", "1"])], "input alone"),
-    "input in V without a rate": (driven, [("inputs", "u", "sets", 0, "V", 0, 2, [["u", "2", "a"]])], "of a state"),
-    "uncertain in a set": (driven, [("inputs", "u", "sets", 0, "V", 0, 1, ["b"])], "product of gains"),
-    "uncertain in an output": (driven, [("outputs", "y", 0, 1, ["b"])], "product of gains"),
-    "quartic set": (driven, [("inputs", "u", "sets", 0, "V", 0, 2, [["x", "4", "a"]])], "of degree 2"),
-    "cubic output": (driven, [("outputs", "y", 0, 2, [["x", "3", "s"]])], "of degree 1"),
-    "output of zero": (driven, [("outputs", "y", [])], "form of one degree"),
     # refutations
     "refutation with roots": (overpowered_relay, [("roots", {"s": ["k", "1", "2"]})], "empty"),
     "refutation with lifts": (
@@ -1080,20 +980,6 @@ def test_an_exact_root_is_one_point():
     small = edited(exact, ("gains", "k", "1/4"), ("roots", "s", ["k", "1/2", "1/2"]), ("claims", "decrease", "1/2"))
     small["witnesses"][1:] = [witness("decrease + s=1/2", square([1], [[0]], "1/2"))]
     assert verify(small).verdict == "proved"
-
-
-@pytest.mark.parametrize(
-    ("number", "limit", "inside"), [("4", "1/2", True), ("4001/1000", "1/2", False), ("1/9", "3", True)]
-)
-def test_the_input_alone_stays_in_every_set(number, limit, inside):
-    """At most 1 for v^2 times its number where |v| is the limit; what else is wrong comes later."""
-    changed = edited(driven(), ("inputs", "v", "sets", 0, "V", 1, 0, number), ("inputs", "v", "limits", [limit, "1"]))
-    assert ("for the input alone" in refusal(changed)) is not inside
-
-
-def test_a_set_without_the_input_holds_any_limit():
-    """|u| <= 10 in driven: what is wrong with that comes later."""
-    assert "for the input alone" not in refusal(edited(driven(), ("inputs", "u", "limits", ["10"])))
 
 
 @pytest.mark.parametrize("ends", [["-3", "2"], ["2", "3"]])
@@ -1377,7 +1263,6 @@ def test_sampling_tells_true_statements_from_false_ones():
     assert not looks_true(edited(settling_relay(), ("claims", "decay", "5")))
     assert not looks_true(edited(nested_root(), ("claims", "decrease", "3/2")))
     assert not looks_true(edited(nested_sign(), ("field", "x", 1, 0, "3")))
-    assert not looks_true(edited(driven(), ("inputs", "u", "limits", ["3"])))
     assert not looks_true(edited(overpowered_relay(), ("refutation", "parameters", "d", "1")))
 
 
@@ -1419,8 +1304,6 @@ def looks_true(document, samples=60):
     """Sample the two inequalities; for a refutation, add up the field beside the point."""
     if "refutation" in document:
         return balances(document)
-    if "inputs" in document:
-        return contains_the_worst_case(document)
     generator, numbers, weights = random.Random(2), known_numbers(document), document["states"]
     claims = {key: float(Fraction(text)) for key, text in document["claims"].items()}
     decay = claims["rate" if document["domain"] == "reals" else "decrease"]
@@ -1446,25 +1329,6 @@ def looks_true(document, samples=60):
 
 def power_sum(point, weights, degree):
     return sum(abs(point[state]) ** (degree / weight) for state, weight in weights.items())
-
-
-def contains_the_worst_case(document):
-    """For x' = -ax + sum b_i u_i and y = cx the supremum of |y|, with constant inputs, is |c| sum |b_i u_i| / min a."""
-    numbers, ((state, terms),) = known_numbers(document), document["field"].items()
-    ranges = {name: [float(Fraction(end)) for end in ends] for name, ends in document["uncertain"].items()}
-    inputs = {name: float(Fraction(entry["limits"][0])) for name, entry in document["inputs"].items()}
-    slopes, pushes = [], []
-    for values in itertools.product(*ranges.values()):
-        numbers |= dict(zip(ranges, values, strict=True)) | dict.fromkeys(inputs, 0.0)
-        slopes.append(-evaluate(terms, {state: 1.0}, numbers))
-        sizes = [abs(evaluate(terms, {state: 0.0}, {**numbers, name: limit})) for name, limit in inputs.items()]
-        pushes.append(sum(sizes))
-    for output, factors in document["outputs"].items():
-        claimed = sum(Fraction(entry["bounds"][output]["bound"]) for entry in document["inputs"].values())
-        worst = abs(evaluate(factors, {state: 1.0}, numbers)) * max(pushes) / min(slopes)
-        if min(slopes) <= 0 or claimed < worst - 1e-9:
-            return False
-    return True
 
 
 def balances(document):

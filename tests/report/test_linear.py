@@ -1,5 +1,6 @@
 """Sentences about an e-LQR say what was decided, and round every bound to its outer side."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 from types import SimpleNamespace
 
@@ -7,6 +8,9 @@ import pytest
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Verdict
+from quakedesign.certificates.guarantee import Bounds, Claims, ContinuousPeaks, NoGuarantee, task_of
+from quakedesign.fault import load_fault
+from quakedesign.loop import exact_integrals
 from quakedesign.report.linear import constant_sentence, held_sentence, margin_lines, peaks_sentence
 from quakedesign.synthesis.linear.sampled.held import ConstantLoop, HeldLoop
 from quakedesign.synthesis.linear.sampled.varying_parameters import LargestVaryingStep, VaryingVerdict
@@ -41,12 +45,16 @@ def test_idealised_loops_are_named_as_such():
 
 
 def test_peaks_of_one_or_no_class():
-    peaks = SimpleNamespace(
-        peak_slip_rate=UpperBound("8.33542235e-5"), total=lambda output: {"slip_error": UpperBound("0.50001")}[output]
+    bounds = Bounds(slip_error=F("0.5"), slip_rate_error=F(1, 10**5), push=F(1), small_gain=F(1, 2))
+    task, law = task_of(load_fault("real-fault")), exact_integrals((F(1),) * 4)
+    claims = replace(
+        Claims.of(task, bounds), peak_slip_rate=UpperBound("8.33542235e-5"), slip_error=UpperBound("0.50001")
     )
-    said = peaks_sentence({"rate": peaks, "amplitude": None})
+    peaks = ContinuousPeaks(task=task, law=law, claims=claims)
+    none = NoGuarantee(reason="small gain 2: too much", small_gain=UpperBound(2))
+    said = peaks_sentence({"rate": peaks, "amplitude": none})
     assert said.endswith("slip rate below 8.34e-05 m/s (slip error 0.501 m) for one of its amplitude and rate")
-    assert peaks_sentence({"rate": None}) == "no bound on the slip rate is certified"
+    assert peaks_sentence({"rate": none}) == "no bound on the slip rate is certified; small gain 2: too much"
 
 
 def test_margins_are_rounded_towards_what_is_proved_and_limits_away_from_it():

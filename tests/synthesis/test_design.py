@@ -143,14 +143,14 @@ def test_a_period_that_nothing_holds_is_undecided_with_a_reason(real):
     assert slow.verdict is Verdict.UNDECIDED
     assert slow.controller is None
     assert "Sample faster" in slow.details["reason"]
-    assert slow.certified_peaks() is None
+    assert slow.certified_peaks().check() is Verdict.UNDECIDED
     assert slow.held_loop() is None
 
 
 def test_a_sliding_mode_has_no_held_design_and_no_peaks(real):
     with pytest.raises(ParameterError, match="held is for the e-LQR"):
         qd.design(real, "cta", held=True)
-    assert assess(real, published("real-fault")["cta"]).certified_peaks() is None
+    assert "no bound of peaks of 2-CTA" in assess(real, published("real-fault")["cta"]).certified_peaks().reason
 
 
 def test_a_simulation_that_holds_the_pressure_agrees_with_both_verdicts(real):

@@ -1,6 +1,8 @@
 """Peaks of the idealised loop whose pressure acts at once: the theorem of the loop that runs, in continuous time."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee.statement import Claims, sentence_of
@@ -10,6 +12,13 @@ from quakedesign.errors import ParameterError
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop
 
 WHEN = "for a pressure that acts at once (continuous time)"
+PREMISES = (
+    "start at rest: x = 0, integrals 0; for the class rate a disturbance that starts at 0",
+    "friction: any function of slip and slip rate within the bounds and chord slopes of the box",
+    "k, eta, N anywhere in the box but constant",
+    "pressure acts at once; limits of the law, if any, lie outside the certified range of p",
+    "friction opposes forward motion: the printed plant is continued to negative slip rates (ERRATA 14)",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +50,17 @@ class ContinuousPeaks:
         found = self.bounds()
         proved = isinstance(found, Bounds) and self.claims.covers(Claims.of(self.task, found))
         return Verdict.PROVED if proved else Verdict.UNDECIDED
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact claims as texts, SI, and what they rest on."""
+        kind = "amplitude" if self.task.change is None else "rate"
+        return {"disturbance_class": kind, **self.claims.to_dict(), "premises": list(PREMISES)}
+
+    def save(self, path: str | Path) -> None:
+        """Write the file of FORMAT.md, whole or not at all."""
+        from quakedesign.certificates.guarantee.files import save_guarantee
+
+        save_guarantee(self, path)
 
     def sentence(self) -> str:
         """What is proved, for people."""

@@ -108,8 +108,7 @@ def read_guarantee(raw: Any) -> Guarantee | ContinuousPeaks:
             claim: Guarantee | ContinuousPeaks = ContinuousPeaks(task=task, law=_continuous(loop), claims=claims)
         else:
             claim = Guarantee(task=task, held=_held(loop), claims=claims)
-        nominal = claim.loop if isinstance(claim, ContinuousPeaks) else claim.held.loop(task)
-        need(len(nominal.states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
+        need(len(claim.loop.states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
     except ParameterError as error:
         raise CertificateError(str(error)) from None
     return claim

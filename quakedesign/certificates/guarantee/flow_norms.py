@@ -38,6 +38,7 @@ _BITS = 256
 _HALVINGS = 6  # 2^6 pieces in a stretch
 _SMALL = Fraction(1, 1 << 12)  # q
 _MOST_STRETCHES = 128
+_HUGE = 1 << _BITS  # that only an unstable loop grows to
 
 
 def flow_norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
@@ -82,6 +83,8 @@ def _sums(flow: Any, rows: Any, state: Any) -> tuple[Any, Any]:
         far = units * absolute(_columns(state, 0, size))
         if all(a <= b * ball(_SMALL) for a, b in zip(far.entries(), units.entries(), strict=True)):
             return sums, state
+        if not all(v < _HUGE for v in absolute(state).entries()):
+            break
         within = _larger(within, absolute(step) * within)
         step, piece = step * step, 2 * piece
     raise ParameterError("the nominal loop must be stable. Received one that is not seen to be. Change the gains.")

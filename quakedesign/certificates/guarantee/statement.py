@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, log10
+from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
@@ -87,6 +88,15 @@ class Claims:
             largest_pressure=UpperBound(high + push),
         )
 
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts, SI."""
+        return {
+            "slip_error": self.slip_error.exact,
+            "slip_rate_error": self.slip_rate_error.exact,
+            "peak_slip_rate": self.peak_slip_rate.exact,
+            "pressure": [self.least_pressure.exact, self.largest_pressure.exact],
+        }
+
     def rounded(self) -> "Claims":
         """The same, a little weaker and with few digits."""
         low, high = self.least_pressure, self.largest_pressure
@@ -125,9 +135,14 @@ class Guarantee:
     held: Held
     claims: Claims
 
+    @property
+    def loop(self) -> PeriodicLoop:
+        """Nominal error loop."""
+        return self.held.loop(self.task)
+
     def bounds(self) -> Bounds | NoGuarantee:
         """What the theorem gives, computed anew."""
-        return _bounds(self.task, self.held, self.held.loop(self.task))
+        return _bounds(self.task, self.held, self.loop)
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""

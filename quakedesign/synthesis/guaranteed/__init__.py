@@ -2,6 +2,16 @@
 
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.answer import Answer, answer
+from quakedesign.synthesis.guaranteed.continuous import CLASSES, certified_peaks
 from quakedesign.synthesis.guaranteed.design import OBJECTIVES, design_held
 
-__all__ = ["OBJECTIVES", "Answer", "WorstFound", "answer", "design_held", "worst_found"]
+__all__ = [
+    "CLASSES",
+    "OBJECTIVES",
+    "Answer",
+    "WorstFound",
+    "answer",
+    "certified_peaks",
+    "design_held",
+    "worst_found",
+]

@@ -1,14 +1,15 @@
 """The worst that a search finds on the loop of a guarantee: what is seen, beside what is proved."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import product
 from typing import Any
 
 import numpy as np
 from scipy.linalg import expm
 
-from quakedesign.certificates.guarantee import Guarantee, Task
-from quakedesign.loop import PeriodicLoop
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Task
+from quakedesign.loop import PeriodicLoop, Segment
 
 _PERIODS = 64
 _PIECES = 6
@@ -34,14 +35,15 @@ class WorstFound:
     slip_rate_error: float
 
 
-def worst_found(claim: Guarantee, *, sticks: bool = False) -> WorstFound:
+def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> WorstFound:
     """Adversarial courses of disturbance, friction slope, damping and input gain, all at their ends.
 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64
-    periods long. With `sticks` the fault does not slide backward: friction holds it wherever the loop would, along the
-    reference at its largest rate and at a twentieth of that.
+    periods long; in continuous time a period is that of the fastest pole, 1/|λ|. With `sticks` the fault does not
+    slide backward: friction holds it wherever the loop would, along the reference at its largest rate and at a
+    twentieth of that.
     """
-    search = _Search(claim.task, claim.held.loop(claim.task), sticks)
+    search = _Search(claim.task, claim.loop, sticks)
     return WorstFound(slip_error=search.largest[0], slip_rate_error=search.largest[1])
 
 
@@ -63,9 +65,13 @@ class _Search:
         flow, inputs = _with_disturbance(task, loop)
         self.size = len(flow)
         beta = [float(b) for b in task.beta]
-        vertices = [_at(task, flow, *map(float, v)) for v in product(task.beta, task.slip_chord, task.rate_chord)]
+        push = np.zeros(self.size)
+        push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
+        ends = product(task.beta, task.slip_chord, task.rate_chord)
+        vertices = [_at(task, flow, push, *map(float, v)) for v in ends]
+        segments = loop.segments or (_flowing(flow),)
         self.parts = [
-            _pieces(vertices, inputs, _widened(s.jump, self.size), float(s.duration) / _PIECES) for s in loop.segments
+            _pieces(vertices, inputs, _widened(s.jump, self.size), float(s.duration) / _PIECES) for s in segments
         ]
         courses = 2 * _COURSES
         paces = np.where(np.arange(courses) // 2 % 2, 1, _SLOW)
@@ -145,12 +151,18 @@ def _with_disturbance(task: Task, loop: PeriodicLoop) -> tuple[np.ndarray, np.nd
     return wide, columns
 
 
-def _at(task: Task, flow: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
-    """Flow at a vertex: friction acts on the rate error, the push through the last state of the loop."""
-    found = flow.copy()
-    last = len(flow) - (1 if task.change is None else 2)
-    found[1, 0], found[1, 1], found[1, last] = slip, -rate, beta
+def _at(task: Task, flow: np.ndarray, push: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
+    """Flow at a vertex, from the nominal one: slopes act on the errors, the input gain on the push."""
+    found, model = flow.copy(), task.model
+    found[1] += (beta - float(model.gain / task.authority)) * push
+    found[1, :2] += slip - float(model.slip), float(model.rate) - rate
     return found
+
+
+def _flowing(flow: np.ndarray) -> Segment:
+    """A period of a loop without jumps."""
+    still = tuple(tuple(Fraction(i == j) for j in range(len(flow))) for i in range(len(flow)))
+    return Segment(jump=still, duration=Fraction(1 / max(abs(np.linalg.eigvals(flow)))))
 
 
 def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, jump: np.ndarray, length: float) -> _Pieces:

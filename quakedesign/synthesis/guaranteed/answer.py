@@ -12,9 +12,9 @@ from quakedesign.fault import Fault
 from quakedesign.loop import LinearLaw, summed_integrals
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
+from quakedesign.synthesis.guaranteed.continuous import CLASSES
 from quakedesign.synthesis.guaranteed.design import design_held
 
-CLASSES = ("amplitude", "rate")
 _SHORTER = Fraction(4, 5)
 _TRIALS = 24
 
@@ -83,7 +83,8 @@ class Answer:
         """Plain values, SI; exact numbers as texts."""
         if not isinstance(self.found, Guarantee):
             gain = self.found.small_gain
-            shorter = None if self.shorter is None else {"step": str(self.shorter.held.step), **_claims(self.shorter)}
+            other = self.shorter
+            shorter = None if other is None else {"step": str(other.held.step), **other.claims.to_dict()}
             return {
                 "verdict": "undecided",
                 "reason": self.found.reason,
@@ -95,7 +96,7 @@ class Answer:
         return {
             "verdict": "proved",
             "guarantee": self.found.sentence(),
-            **_claims(self.found),
+            **self.found.claims.to_dict(),
             "small_gain": small,
             "worst_found": _seen(self.worst),
             "worst_found_with_stick": _seen(self.worst_with_stick),
@@ -182,16 +183,6 @@ def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
     if len(gains) != 4:
         raise ParameterError(f"gains must be four numbers, k1 to k4. Received {len(gains)}. Leave them out to design.")
     return tuple(rational(v, f"k{i}") for i, v in enumerate(gains, 1))
-
-
-def _claims(found: Guarantee) -> dict[str, Any]:
-    claims = found.claims
-    return {
-        "slip_error": claims.slip_error.exact,
-        "slip_rate_error": claims.slip_rate_error.exact,
-        "peak_slip_rate": claims.peak_slip_rate.exact,
-        "pressure": [claims.least_pressure.exact, claims.largest_pressure.exact],
-    }
 
 
 def _seen(worst: WorstFound | None) -> dict[str, float] | None:

@@ -7,10 +7,10 @@ import numpy as np
 
 import quakedesign as qd
 from quakedesign.certificates import Verdict
+from quakedesign.certificates.linear_premises import sectors
 from quakedesign.controllers import published
 from quakedesign.synthesis.linear.analysis.robust_stability import analysis, unstable_vertex, why_undecided
-from quakedesign.synthesis.linear.certified_peaks import loop_for
-from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop
 
 LAB = qd.load_fault("lab-fault")
 GOOD = published("lab-fault")["elqr"]
@@ -29,9 +29,10 @@ def test_a_destabilising_gain_is_refuted_at_a_vertex_with_an_unstable_pole():
     found = analysis(LAB, bad)
     assert found.verdict is Verdict.REFUTED
     assert found.certificates == {}
-    matrix = np.array([[float(v) for v in row] for row in loop_for(LAB, bad).matrix(*found.unstable_at)])
+    loop = error_loop(tuple(bad.gains.values()), sectors(LAB))
+    matrix = np.array([[float(v) for v in row] for row in loop.matrix(*found.unstable_at)])
     assert np.linalg.eigvals(matrix).real.max() > 0
-    assert "not stable near beta" in why_undecided(loop_for(LAB, bad))
+    assert "not stable near beta" in why_undecided(loop)
 
 
 def test_stable_vertices_without_a_v_are_said_to_be_so():

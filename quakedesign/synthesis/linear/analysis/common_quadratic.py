@@ -5,15 +5,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from quakedesign.certificates import Certificate, Loop, Verdict, certificate_text, loop_of, parse_certificate
+from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
 from quakedesign.certificates.linear_premises import Sectors
-from quakedesign.certificates.obligations import claimed, different
+from quakedesign.certificates.obligations import Obligation, claimed, different
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational
+from quakedesign.sos.exact.polynomial import constant
+from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.solve.conic import solve
 from quakedesign.symbolic.terms import Term
-from quakedesign.synthesis.linear.peak_certificate import quadratic_witness
 from quakedesign.synthesis.linear.plant.polytope import Polytope, modal_scaling, polytope_of
 from quakedesign.synthesis.lyapunov.balancing import below
 from quakedesign.synthesis.lyapunov.certify_exactly import finish
@@ -157,6 +158,19 @@ def finished_exactly(loop: Loop, theta: Sequence[Sequence[Fraction]]) -> Certifi
         except CertificateError:
             continue
     return None
+
+
+def quadratic_witness(one: Obligation) -> Witness:
+    """The only Gram matrix of a quadratic form, on all its variables."""
+    size = len(next(iter(one.polynomial)))
+    basis = tuple(tuple(int(i == j) for j in range(size)) for i in range(size))
+
+    def entry(i: int, j: int) -> Fraction:
+        value = one.polynomial.get(tuple(a + b for a, b in zip(basis[i], basis[j], strict=True)), Fraction(0))
+        return value if i == j else value / 2
+
+    gram = tuple(entry(i, j) for i in range(size) for j in range(i, size))
+    return Witness(multiplier=constant(size), squares=(Square(basis=basis, gram=gram),))
 
 
 def quadratic_terms(states: Sequence[str], form: Any) -> tuple[Term, ...]:

@@ -6,17 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.certificates import Certificate
+from quakedesign.certificates.guarantee import ContinuousPeaks, NoGuarantee
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import OutputError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.sos import Answer
+from quakedesign.synthesis.guaranteed.continuous import certified_peaks
 from quakedesign.synthesis.linear.analysis.definite_files import held_files, inverse_optimality_files
 from quakedesign.synthesis.linear.analysis.facts import linear_facts
 from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
 from quakedesign.synthesis.linear.analysis.robust_stability import Analysis, analysis
-from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks, certified_peaks
-from quakedesign.synthesis.linear.peak_certificate import peak_certificate
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
 
@@ -34,8 +34,8 @@ class LinearVerdict:
         See `linear_facts`.
     held : HeldLoop
         What is decided when p is held over the sampling period asked for.
-    peaks : CertifiedPeaks or None
-        None when they were not asked for or not found.
+    peaks : ContinuousPeaks, NoGuarantee or None
+        In continuous time; None when they were not asked for.
     asked : str or None
         Class of the disturbance for which peaks were asked for.
     """
@@ -45,7 +45,7 @@ class LinearVerdict:
     analysis: Analysis
     facts: Mapping[str, Any]
     held: HeldLoop
-    peaks: CertifiedPeaks | None
+    peaks: ContinuousPeaks | NoGuarantee | None
     asked: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -53,14 +53,14 @@ class LinearVerdict:
         return {
             **self.analysis.to_dict(),
             **self.facts,
-            "peaks": self.peaks.to_dict() if self.peaks else None,
+            "peaks": self.peaks.to_dict() if isinstance(self.peaks, ContinuousPeaks) else None,
         }
 
-    def proofs(self) -> dict[str, Certificate | Answer]:
+    def proofs(self) -> dict[str, Certificate | Answer | ContinuousPeaks]:
         """Every proof that has a file format, by name."""
-        found: dict[str, Certificate | Answer] = dict(self.analysis.certificates)
-        if self.peaks is not None:
-            found["peaks"] = peak_certificate(self.peaks, self.controller)
+        found: dict[str, Certificate | Answer | ContinuousPeaks] = dict(self.analysis.certificates)
+        if isinstance(self.peaks, ContinuousPeaks):
+            found["peaks"] = self.peaks
         problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
         several = {"inverse-optimal": inverse_optimality_files(inverse_optimality(problem, gains))}
         several["held"] = held_files(problem, gains, self.held.runs)

@@ -120,16 +120,6 @@ class ErrorLoop:
         named = {f"beta={b} s={s} w={w}": self.matrix(b, s, w) for b, s, w in self.corners()}
         return Polytope(states=ERROR_STATES, vertices=named)
 
-    def outputs(self) -> dict[str, Row]:
-        """Row of every bounded output: e1 [m], e2 [m/s], and p − p*(r) [Pa]."""
-        k1, k2, *_ = self.gains
-        zero, one = Fraction(0), Fraction(1)
-        return {
-            "slip_error": (one, zero, zero, zero),
-            "slip_rate_error": (zero, one, zero, zero),
-            "pressure_offset": (-k1, -k2, -one, zero),
-        }
-
 
 def error_loop(gains: Sequence[Fraction], sectors: Sectors) -> ErrorLoop:
     """Error loop of four gains in SI over the sectors of a fault."""
