@@ -154,6 +154,7 @@ def test_the_bounds_are_those_of_the_worst_corner(name):
 
 def test_errors_are_zero_unless_told():
     assert Errors() == Errors(slip=F(0), rate=F(0), acceleration=F(0))
+    assert set(Errors().ranges().values()) == {(0, 0)}
 
 
 def test_friction_falls_or_turns_where_its_law_does():
