@@ -123,11 +123,12 @@ class Started(Hardening):
         return self.start, self.start + self.gain
 
 
-def test_friction_at_rest_is_exact_for_a_decimal_and_rounded_for_a_root(monkeypatch):
+def test_friction_at_rest_is_exact_for_a_decimal_or_a_fraction_and_rounded_for_a_root(monkeypatch):
     law = Started(residual=0.2, gain=0.3, critical_slip=0.05)
     assert abs(8 * static_friction(with_friction(law)) ** 2 - 1) < F(1, 10**48)
-    monkeypatch.setattr(Started, "start", sp.Float(0.2353))
-    assert static_friction(with_friction(law)) == F("0.2353")
+    for start, exact in ((sp.Float(0.2353), F("0.2353")), (sp.Rational(1, 3), F(1, 3))):
+        monkeypatch.setattr(Started, "start", start)
+        assert static_friction(with_friction(law)) == exact
 
 
 def test_a_design_for_a_hardening_law_is_proved_over_both_signs():
