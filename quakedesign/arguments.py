@@ -42,14 +42,33 @@ def check_arguments(room: str) -> None:
 
 
 def checked(value: Any) -> Any:
-    """Public name that checks its arguments from now on; a function also where it is defined, so that it is pickled."""
+    """Public name that checks its arguments from now on; a function also where it is defined, so that it is pickled.
+
+    Of a class its construction and its public methods do, but those of SymPy's own calls.
+    """
     if isfunction(value):
         replaced = _checked(value)
         setattr(sys.modules[value.__module__], value.__name__, replaced)
         return replaced
-    if isclass(value) and "__init__" in vars(value) and not issubclass(value, Enum | BaseException):
-        type.__setattr__(value, "__init__", _checked(vars(value)["__init__"]))
+    if isclass(value) and not issubclass(value, Enum | BaseException) and not hasattr(value, "free_symbols"):
+        for base in value.__mro__:
+            if base.__module__.partition(".")[0] == __name__.partition(".")[0]:
+                _check_methods(base)
     return value
+
+
+def _check_methods(owner: type) -> None:
+    for name, member in list(vars(owner).items()):
+        function = member.__func__ if isinstance(member, classmethod | staticmethod) else member
+        if (name == "__init__" or name[0] != "_") and isfunction(function) and _takes_any(function, member):
+            replaced = _checked(function)
+            type.__setattr__(owner, name, replaced if function is member else type(member)(replaced))
+
+
+def _takes_any(function: Callable[..., Any], member: Any) -> bool:
+    """Whether a method takes arguments besides its instance or class, and is not there to be overridden."""
+    abstract = getattr(function, "__isabstractmethod__", False)
+    return not abstract and len(_signature(function).parameters) > (not isinstance(member, staticmethod))
 
 
 def _checked(function: Callable[..., Any]) -> Callable[..., Any]:

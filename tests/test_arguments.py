@@ -2,12 +2,13 @@
 
 import dataclasses
 import importlib
+import inspect
 import pickle
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from fractions import Fraction
-from inspect import isclass, isfunction
+from inspect import isclass, isfunction, signature
 from pathlib import Path
 
 import numpy as np
@@ -17,20 +18,29 @@ import sympy as sp
 import quakedesign as qd
 from quakedesign.arguments import check_arguments, matches
 from quakedesign.certificates import Verdict
+from quakedesign.certificates.guarantee import Claims, guarantee
 from quakedesign.controllers import Law
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.fault import Disturbance, Reference, UncertaintyBox
 from quakedesign.loop import summed_integrals
+from quakedesign.report import headline
+from quakedesign.simulation import Diffusion
+from quakedesign.simulation.campaign import run_campaign
+from quakedesign.synthesis.guaranteed import answer
 
 LAB = qd.load_fault("lab-fault")
+CERTIFICATE = qd.load_certificate(Path(__file__).parents[1] / "proofs" / "certificates" / "super-twisting_1.5_1.1.json")
+DESIGN = qd.Design(
+    fault=LAB, name="cta", verdict=Verdict.UNDECIDED, controller=None, certificate=None, premises=(), details={}
+)
 
 
 def rooms():
     """Packages with public names, but for the command line."""
     found = [qd.__name__, *(i.name for i in pkgutil.walk_packages(qd.__path__, "quakedesign.") if i.ispkg)]
     modules = [importlib.import_module(name) for name in found if not name.startswith("quakedesign.cli")]
-    return [module for module in modules if hasattr(module, "__all__") and hasattr(module, "check_arguments")]
+    return [module for module in modules if hasattr(module, "__all__")]
 
 
 PUBLIC = {
@@ -49,6 +59,19 @@ def test_every_public_function_and_class_checks_its_arguments(name):
         assert pickle.loads(pickle.dumps(value)) is value
     elif dataclasses.is_dataclass(value) and "__init__" in vars(value) and not issubclass(value, Enum):
         assert hasattr(value.__init__, "checks_arguments")
+    if isclass(value) and not issubclass(value, Enum | BaseException | sp.Basic) and "quakedesign" in value.__module__:
+        assert all(hasattr(method, "checks_arguments") for method in methods(value))
+
+
+def methods(kind):
+    """Public methods of a class that take arguments and are not for others to write; those of its bases too."""
+    for name in (name for name in dir(kind) if not name.startswith("_")):
+        member = inspect.getattr_static(kind, name)
+        function = getattr(member, "__func__", member)
+        if isfunction(function) and "quakedesign" in function.__module__:
+            given = len(signature(getattr(kind, name)).parameters) - isfunction(member)
+            if given > 0 and not getattr(function, "__isabstractmethod__", False):
+                yield function
 
 
 WRONG = {
@@ -64,6 +87,26 @@ WRONG = {
     "missing": (lambda: Reference(target_slip=1.0), "Reference cannot be called like this: missing .*operation_time"),
     "unknown": (lambda: qd.derive(LAB, colour=1), "derive cannot be called like this: .*colour"),
     "too few gains": (lambda: summed_integrals((), Fraction(1)), "gains of summed_integrals must be four"),
+    "no path": (lambda: qd.load_certificate(3), "path of load_certificate must be a text or a Path. Received 3"),
+    "no entry": (lambda: headline(None), "entry of headline must be an Entry. Received None"),
+    "no task": (lambda: guarantee(3, 3), "task of guarantee must be a Task. Received 3"),
+    "no campaign": (lambda: run_campaign(None, 3, "x"), "problem of run_campaign must be a Problem. Received None"),
+    "no law to guarantee": (lambda: answer(LAB, controller=3), "controller of answer must be a text. Received 3"),
+    "a number as a box": (lambda: LAB.with_box(3), "name of Fault.with_box must be a text. Received 3"),
+    "a text as slip": (lambda: LAB.moment_of("x"), "slip of Fault.moment_of must be a number. Received 'x'"),
+    "no premise": (lambda: DESIGN.with_premise(3), "premise of Design.with_premise must be a Premise. Received 3"),
+    "a number as a class": (
+        lambda: DESIGN.certified_peaks(3),
+        "disturbance_class of Design.certified_peaks must be a text. Received 3",
+    ),
+    "no law to check": (lambda: CERTIFICATE.check(3), "law of Certificate.check must be .* Received 3"),
+    "nowhere to save": (lambda: CERTIFICATE.save(None), "path of Certificate.save must be a text or a Path"),
+    "no values": (lambda: ExtendedLQR.from_values(3), "values of Law.from_values must be a tuple.* Received 3"),
+    "no time": (lambda: Diffusion.of_time("1 s"), "time of Diffusion.of_time must be a number. Received '1 s'"),
+    "a fraction as a claim": (
+        lambda: Claims(**dict.fromkeys(Claims.__dataclass_fields__, Fraction(1))),
+        "slip_error of Claims must be an UpperBound. Received Fraction",
+    ),
     "not to be called": (lambda: qd.simulate(LAB, progress=3), "progress of simulate must be a Callable or None"),
 }
 
@@ -126,6 +169,12 @@ def test_what_fits(value, hint):
 @pytest.mark.parametrize(("value", "hint"), DIFFERS)
 def test_what_differs(value, hint):
     assert not matches(value, hint)
+
+
+def test_of_a_wrong_run_nothing_else_is_said(tmp_path):
+    run = qd.simulate(LAB, qd.published("lab-fault")["elqr"], scheme="explicit", duration=0.01)
+    with pytest.raises(ParameterError, match=r"path of Recording.save must be a text or a Path. Received 3"):
+        run.save(3)
 
 
 def test_checking_twice_is_checking_once():

@@ -1,5 +1,6 @@
 """Claims about closed loops, their files, and the exact decision."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, Witness, loop_of
 from quakedesign.certificates.files import certificate_text, load_certificate, parse_certificate, save_certificate
 
@@ -15,3 +16,5 @@ __all__ = [
     "parse_certificate",
     "save_certificate",
 ]
+
+check_arguments(__name__)

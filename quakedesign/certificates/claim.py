@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 from math import isqrt
+from pathlib import Path
 
 import sympy as sp
 
@@ -162,7 +163,7 @@ class Certificate:
 
         return check(self, law)
 
-    def save(self, path) -> None:
+    def save(self, path: str | Path) -> None:
         """Write the file of FORMAT.md, whole or not at all."""
         from quakedesign.certificates.files import save_certificate
 

@@ -60,9 +60,9 @@ class SlidingMode(Controller):
     def lipschitz_limit(self) -> Fraction:
         """Bound on |h'| that no Lyapunov function can exceed with these gains (ERRATA, end)."""
 
-    def scaled(self, scale: Fraction) -> Self:
+    def scaled(self, scale: str | float | Fraction) -> Self:
         """Return the same base gains with another λ."""
-        return replace(self, gains=dict(self.gains), scale=scale)
+        return replace(self, gains=dict(self.gains), scale=rational(scale, "scale"))
 
     def with_feedforward(self, feedforward: FeedForward) -> Self:
         """Return the same law with another feed-forward."""

@@ -1,5 +1,6 @@
 """Peaks of the loop that runs, proved: `task` reads the fault, `norms` the loop, `theorem` joins them."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks, continuous_peaks
 from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held, guarantee
 from quakedesign.certificates.guarantee.task import Task, task_of
@@ -18,3 +19,5 @@ __all__ = [
     "guarantee",
     "task_of",
 ]
+
+check_arguments(__name__)

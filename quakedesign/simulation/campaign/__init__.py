@@ -1,5 +1,6 @@
 """Campaigns: many samples of one closed loop, in batches that survive whatever stops them."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.simulation.campaign.crews import SerialExecutor
 from quakedesign.simulation.campaign.problem import Problem, SampleResult
 from quakedesign.simulation.campaign.result import Campaign, Failure
@@ -19,3 +20,5 @@ __all__ = [
     "campaign_problem",
     "run_campaign",
 ]
+
+check_arguments(__name__)

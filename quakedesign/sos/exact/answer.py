@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from pathlib import Path
 
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares, holds
 from quakedesign.sos.exact.statement import Statement
@@ -58,7 +59,7 @@ class Answer:
         """
         return self.proof is None or holds(self.statement, self.proof)
 
-    def save(self, path) -> None:
+    def save(self, path: str | Path) -> None:
         """Write the file of FORMAT.md, whole or not at all.
 
         Raises

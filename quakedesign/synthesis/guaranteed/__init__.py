@@ -1,5 +1,6 @@
 """Laws chosen by what can be guaranteed of them as they run."""
 
+from quakedesign.arguments import check_arguments
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.answer import Answer, answer
 from quakedesign.synthesis.guaranteed.continuous import CLASSES, certified_peaks
@@ -15,3 +16,5 @@ __all__ = [
     "design_held",
     "worst_found",
 ]
+
+check_arguments(__name__)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import Held, continuous_peaks, guarantee, task_of
@@ -326,6 +327,6 @@ def test_the_command_checks_files_and_compares_with_a_fault(tmp_path):
 def test_what_is_claimed_too_low_is_undecided_by_itself():
     found = claim()
     assert (
-        replace(found, claims=replace(found.claims, slip_error=found.claims.slip_error / 2)).check()
+        replace(found, claims=replace(found.claims, slip_error=UpperBound(found.claims.slip_error / 2))).check()
         is Verdict.UNDECIDED
     )
