@@ -49,6 +49,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
         When the file cannot be written; nothing is left behind then.
     """
     data = content.encode() if isinstance(content, str) else content
+    _require_name(path)
     try:
         with temporary_folder(path.parent) as work:
             new = work / "new"
@@ -68,6 +69,7 @@ def whole_folder(target: Path) -> Iterator[Path]:
     OutputError
         When it cannot be written; nothing is left behind then, and an earlier folder stays.
     """
+    _require_name(target)
     try:
         with temporary_folder(target.absolute().parent) as work:
             new = work / "new"
@@ -82,6 +84,14 @@ def whole_folder(target: Path) -> Iterator[Path]:
         raise
     except OSError as error:
         raise OutputError(f"{target} cannot be written: {error.strerror}. Choose another folder.") from None
+
+
+def _require_name(path: Path) -> None:
+    """Refuse what no system can name."""
+    try:
+        os.access(path, os.F_OK)
+    except ValueError as error:
+        raise OutputError(f"{str(path)!r} cannot be written: {error}. Choose another name.") from None
 
 
 def _place(new: Path, target: Path) -> None:

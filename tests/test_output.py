@@ -23,6 +23,18 @@ def test_a_missing_folder_is_one_clear_message(tmp_path):
         write_whole(tmp_path / "nowhere" / "result", "x")
 
 
+@pytest.mark.parametrize("name", ["\0", "\ud800"])
+def test_what_no_system_can_name_is_refused(tmp_path, name):
+    with pytest.raises(OutputError, match=r"cannot be written: .*\. Choose another name"):
+        write_whole(tmp_path / name, "x")
+    with (
+        pytest.raises(OutputError, match=r"cannot be written: .*\. Choose another name"),
+        whole_folder(tmp_path / name),
+    ):
+        raise AssertionError("the block must not begin")
+    assert os.listdir(tmp_path) == []
+
+
 def test_nothing_is_left_behind_when_the_target_is_a_folder(tmp_path):
     (tmp_path / "result").mkdir()
     with pytest.raises(OutputError, match="cannot be written"):

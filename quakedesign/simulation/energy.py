@@ -47,10 +47,28 @@ class EnergyBudget:
     residual: float
 
     @classmethod
-    def of(cls, *, injection: float, **parts: float) -> "EnergyBudget":
+    def of(
+        cls,
+        *,
+        kinetic: float,
+        elastic: float,
+        frictional: float,
+        injection: float,
+        viscous: float,
+        far_field: float,
+        disturbance: float,
+    ) -> "EnergyBudget":
         """Budget with the residual that its parts leave."""
-        stored = parts["kinetic"] + parts["elastic"] + parts["frictional"] + parts["viscous"]
-        return cls(injection=injection, residual=stored - parts["far_field"] - parts["disturbance"], **parts)
+        return cls(
+            kinetic=kinetic,
+            elastic=elastic,
+            frictional=frictional,
+            injection=injection,
+            viscous=viscous,
+            far_field=far_field,
+            disturbance=disturbance,
+            residual=kinetic + elastic + frictional + viscous - far_field - disturbance,
+        )
 
     @property
     def relative_residual(self) -> float:
