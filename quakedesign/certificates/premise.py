@@ -51,6 +51,14 @@ class Premise:
         """Whether the ratio is at most 1 and a certificate exists."""
         return self.proved and self.ratio is not None and self.ratio <= 1
 
+    @property
+    def sides(self) -> tuple[str, str]:
+        """Texts of what is required, rounded up, and certified, rounded down, with the unit; of one number, said so."""
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        if self.required == self.certified:
+            return f"at most {self.required:.4g}{unit}", "the same number"
+        return f"{self.required:.4g}{unit}", f"{self.certified:.4g}{unit}"
+
     def to_dict(self) -> dict:
         """Keys of DESIGN.md and the unit."""
         return {

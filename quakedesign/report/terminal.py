@@ -80,13 +80,12 @@ def _print_feedforward(entry: "Entry", console: Any) -> None:
 
 
 def _line(premise: "Premise") -> str:
-    unit = "" if premise.unit == "-" else f" {premise.unit}"
+    required, certified = premise.sides
     if not premise.proved and premise.certified == 0:
-        return f"premise {premise.name}: nothing is certified, required {premise.required:.4g}{unit} ({premise.note})"
+        return f"premise {premise.name}: nothing is certified, required {required} ({premise.note})"
     ratio = "nothing is certified" if premise.ratio is None else f"ratio {premise.ratio:.3g}"
     sign = "holds" if premise.holds else "FAILS"
-    values = f"required {premise.required:.4g}{unit}, certified {premise.certified:.4g}{unit}"
-    return f"premise {premise.name} {sign}: {values}, {ratio}"
+    return f"premise {premise.name} {sign}: required {required}, certified {certified}, {ratio}"
 
 
 def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", console: Any) -> None:

@@ -128,7 +128,7 @@ class Design:
 
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in self.gains.items())
         rows = "".join(
-            f"<tr><td>{escape(p.name)}</td><td>{p.required:.4g} {p.unit}</td><td>{p.certified:.4g} {p.unit}</td>"
+            f"<tr><td>{escape(p.name)}</td><td>{p.sides[0]}</td><td>{p.sides[1]}</td>"
             f"<td>{'yes' if p.holds else 'no'}</td></tr>"
             for p in self.premises
         )

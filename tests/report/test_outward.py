@@ -10,6 +10,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Verdict
+from quakedesign.certificates.premise import Premise
 from quakedesign.report.comparison import Entry
 from quakedesign.report.headlines import domain_sentence, headline
 from quakedesign.report.linear import held_sentence, peaks_sentence, verdict_lines
@@ -78,15 +79,29 @@ def test_every_premise_of_a_sliding_mode(sliding):
     for premise in sliding.premises:
         assert isinstance(premise.required, UpperBound)
         assert isinstance(premise.certified, LowerBound)
-        required, certified, ratio = numbers("required #.*, certified #.*, ratio #", _line(premise))
+        if premise.required == premise.certified:
+            required, ratio = numbers("required at most #.*, certified the same number, ratio #", _line(premise))
+        else:
+            required, certified, ratio = numbers("required #.*, certified #.*, ratio #", _line(premise))
+            assert F(certified) <= premise.certified
         assert F(required) >= premise.required
-        assert F(certified) <= premise.certified
         assert F(ratio) >= F(premise.required) / F(premise.certified)
         written = json.loads(json.dumps(premise.to_dict()))
         assert F(written["required"]) >= premise.required
         assert F(written["certified"]) <= premise.certified
         assert F(written["ratio"]) >= F(premise.required) / F(premise.certified)
         assert premise.holds == (F(premise.required) <= F(premise.certified))
+
+
+def test_equal_sides_of_a_premise_are_not_said_to_differ():
+    third, more = F(1, 3), F(1, 3) + F(1, 10**9)
+    alike = Premise(name="x", required=third, certified=third, unit="m")
+    assert _line(alike) == "premise x holds: required at most 0.3334 m, certified the same number, ratio 1"
+    fails = Premise(name="x", required=more, certified=third, unit="-")
+    assert _line(fails) == "premise x FAILS: required 0.3334, certified 0.3333, ratio 1.01"
+    nothing = {"verdict": Verdict.UNDECIDED, "controller": None, "certificate": None}
+    held = qd.Design(fault=LAB, name="cta", premises=(alike,), **nothing)
+    assert "<td>at most 0.3334 m</td><td>the same number</td>" in held._repr_html_()
 
 
 def test_headline_and_domain_of_a_sliding_mode(sliding):
