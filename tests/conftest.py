@@ -1,5 +1,6 @@
 """Random tests draw the same examples every time, and are in no hurry; every worker computes on one thread."""
 
+import contextlib
 import gc
 import os
 import signal
@@ -56,10 +57,8 @@ def start(tmp_path):
 
     yield begin
     for process in started:
-        try:
+        with contextlib.suppress(ProcessLookupError):  # all of its session are gone, and so is its number
             os.killpg(process.pid, signal.SIGKILL)
-        except (ProcessLookupError, PermissionError):  # nobody is there, or only what has ended
-            pass
         process.wait()
         process.stdout.close()
         process.stderr.close()

@@ -113,7 +113,7 @@ with ending():
 def test_the_exit_code_is_that_of_the_signal_even_within_generated_code(start, tmp_path):
     (tmp_path / "program.py").write_text(GENERATED)
     process = start("-m", "program")
-    _, err = process.communicate(timeout=10)
+    _, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (143, "quakedesign: terminated; nothing was written.\n")
 
 
@@ -128,7 +128,7 @@ with ending(process=True):
 
 def test_a_signal_after_the_end_changes_nothing(start):
     process = start("-c", LATE)
-    assert process.communicate(timeout=10) == ("", "")
+    assert process.communicate(timeout=60) == ("", "")
     assert process.returncode == 1
 
 
@@ -153,7 +153,7 @@ def test_an_interruption_that_is_swallowed_ends_the_process_all_the_same(start, 
     assert process.stdout.readline() == "there\n"
     assert os.listdir(tmp_path / "tmp")
     process.send_signal(signal.SIGTERM)
-    _, err = process.communicate(timeout=10)
+    _, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (143, "quakedesign: terminated; nothing was written.\n")
     assert not os.listdir(tmp_path / "tmp")
 

@@ -92,6 +92,13 @@ def end(process, tmp_path, number):
     return True
 
 
+def at_work(process, workers):
+    """Wait until a command has started so many workers, beside the process that tracks their resources."""
+    while len(psutil.Process(process.pid).children()) <= workers:
+        assert process.poll() is None
+        time.sleep(0.05)
+
+
 def tidy(run, tmp_path, command):
     """The next start removes what SIGKILL left."""
     left, end = temporary(tmp_path), time.monotonic() + 60
@@ -110,8 +117,7 @@ def tidy(run, tmp_path, command):
 )
 def test_a_kill_leaves_nobody_and_nothing(run, tmp_path, command, number):
     process = run(command)
-    while len(psutil.Process(process.pid).children()) < 3:  # two workers, and who tracks their resources
-        time.sleep(0.05)
+    at_work(process, 2)
     assert end(process, tmp_path, number)
     if number == signal.SIGKILL:
         tidy(run, tmp_path, command)
@@ -141,7 +147,7 @@ def _length(run, tmp_path, command):
 
 def test_an_interruption_ends_with_one_line(start):
     process = start("-m", "quakedesign", "synthesise", "cta", "--objective", "decay", "--workers", "1")
-    time.sleep(4)
+    at_work(process, 1)
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -151,8 +157,8 @@ def test_an_interruption_ends_with_one_line(start):
 def test_a_job_in_the_background_is_not_interrupted(start):
     """A shell lets such jobs ignore SIGINT, and nohup SIGHUP; SIGTERM ends them."""
     process = start("-m", "quakedesign", "synthesise", "cta", ignored=("SIGINT", "SIGHUP"))
+    at_work(process, 1)
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGINT):
-        time.sleep(1)
         process.send_signal(number)
     with pytest.raises(subprocess.TimeoutExpired):
         process.communicate(timeout=2)

@@ -155,11 +155,11 @@ UNTIMELY = {
 @pytest.mark.parametrize("arguments", UNTIMELY.values(), ids=UNTIMELY)
 def test_what_cannot_be_is_refused_before_the_work(arguments, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    began = time.perf_counter()
+    began = time.process_time()
     code, out, err = run(capsys, *arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert len(err) < 600
-    assert time.perf_counter() - began < 10
+    assert time.process_time() - began < 10
     assert list(tmp_path.iterdir()) == []
 
 

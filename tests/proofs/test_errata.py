@@ -1,6 +1,7 @@
 """Every point of the errata is computed, and a wrong correction is found out."""
 
 import ast
+import time
 from fractions import Fraction
 
 import numpy as np
@@ -32,11 +33,13 @@ def test_a_row_says_what_is_printed_what_is_correct_and_how_it_is_checked(number
 
 @pytest.mark.parametrize("number", range(1, 30))
 def test_the_corrected_form_holds_with_numbers_within_seconds(number):
+    began = time.process_time()
     (result,) = run_rows([number])
+    assert time.process_time() - began < 10
     assert result["holds"] is True, result["evidence"]
     assert any(character.isdigit() for character in result["evidence"])
     assert "\n" not in result["evidence"]
-    assert result["seconds"] < 10
+    assert result["seconds"] > 0
 
 
 def without_control_in_the_rate(values):

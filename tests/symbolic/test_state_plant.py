@@ -279,12 +279,12 @@ def test_no_derivation_takes_more_than_two_seconds(name):
     law = law_of(name).symbolic()
     for cached in (state_plant.jacobian, state_plant.characteristic, state_plant.stability_conditions):
         cached.cache_clear()
-    begin = time.perf_counter()
+    begin = time.process_time()
     state_plant.instability(law)
     state_plant.nucleation_length(law)
     state_plant.third_order_rates(law)
     state_plant.quasi_dynamic_rates(law)
-    assert time.perf_counter() - begin < 2
+    assert time.process_time() - begin < 2
 
 
 def test_a_closed_critical_stiffness_needs_at_most_one_state():
