@@ -1,5 +1,6 @@
-"""Linter and type checker are green."""
+"""Linter and type checker are green, and every test asserts something itself."""
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -21,3 +22,22 @@ def test_tool_is_green(tool):
     call = [sys.executable, "-m", *tool]
     done = subprocess.run(call, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def asserts(function):
+    """Whether a test says what is true: by an assertion, NumPy's among them, or an error that it expects."""
+    called = {node.attr for node in ast.walk(function) if isinstance(node, ast.Attribute)}
+    plain = any(isinstance(node, ast.Assert) for node in ast.walk(function))
+    return plain or bool(called & {"raises", "warns", "assert_allclose"})
+
+
+def test_every_test_asserts_something():
+    trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "tests").rglob("test_*.py")}
+    functions = [
+        (path.name, node)
+        for path, tree in trees.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
+    ]
+    assert len(functions) > 1000
+    assert [(file, node.name) for file, node in functions if not asserts(node)] == []

@@ -52,6 +52,7 @@ def test_the_field_is_that_of_the_law_in_any_order(loop):
         )
         for state, terms in loop.field.items()
     }  # fmt: skip
+    assert turned != loop.field
     _same_field(replace(loop, field=turned), None)
 
 

@@ -40,7 +40,8 @@ def test_ones_change_nothing(plant):
 
 
 def test_less_damping():
-    same_motion(dataclasses.replace(REAL, damping=0.8 * REAL.damping), damping=0.8)
+    varied = same_motion(dataclasses.replace(REAL, damping=0.8 * REAL.damping), damping=0.8)
+    assert varied.provenance["variation_damping"] == 0.8
 
 
 def test_less_weakening():

@@ -89,11 +89,11 @@ TRANSFORMATIONS = {
 }
 
 
-def check_invariance(name, transformation):
+def invariant(name, transformation):
+    """Whether a transformed question is answered as it may be, with a proof."""
     asked = transformed(BY_NAME[name], **TRANSFORMATIONS[transformation])
     found = sos.prove(asked["polynomial"], on=asked["on"], multiplier=asked["multiplier"])
-    assert str(found.verdict) in accepted(name)
-    assert found.check()
+    return str(found.verdict) in accepted(name) and found.check()
 
 
 CASES = [(name, t) for k, t in enumerate(TRANSFORMATIONS) for name in NAMES[k::STRIDE]]
@@ -101,13 +101,13 @@ CASES = [(name, t) for k, t in enumerate(TRANSFORMATIONS) for name in NAMES[k::S
 
 @pytest.mark.parametrize(("name", "transformation"), CASES)
 def test_the_verdict_does_not_depend_on_names_order_and_scale(name, transformation):
-    check_invariance(name, transformation)
+    assert invariant(name, transformation)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "transformation"), [(n, t) for n in NAMES for t in TRANSFORMATIONS])
 def test_no_verdict_depends_on_names_order_and_scale(name, transformation):
-    check_invariance(name, transformation)
+    assert invariant(name, transformation)
 
 
 def test_a_transformed_question_is_the_same_polynomial():
