@@ -1,15 +1,16 @@
 """Signals that end a command: one line, the exit code of the shell, no process and no temporary folder left."""
 
+import atexit
 import os
 import select
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import Thread, current_thread, main_thread
 from time import monotonic
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 from quakedesign.output import number_placed
 from quakedesign.temporary import discard_all, sweep_system
@@ -32,7 +33,8 @@ class Interruption(KeyboardInterrupt):
 class _Ending:
     """What is known of the end of a command."""
 
-    def __init__(self) -> None:
+    def __init__(self, last: bool) -> None:
+        self._last = last
         self._number: int | None = None
         self._said = False
         self._before = number_placed()
@@ -71,7 +73,10 @@ class _Ending:
         except BaseException as error:
             if self._number is None and not isinstance(error, KeyboardInterrupt):
                 raise
-            raise SystemExit(self._conclude()) from None
+            code = self._conclude()
+            if self._last:
+                _leave(code)
+            raise SystemExit(code) from None
 
     def _conclude(self) -> int:
         """Leave no process and no temporary folder behind, say so once, and return the exit code."""
@@ -106,14 +111,15 @@ def ending(*, process: bool = False) -> Iterator[None]:
     Parameters
     ----------
     process : bool
-        The process ends with the block: what comes later is too late to interrupt it, and is ignored.
+        The process ends with the block: what comes later is too late to interrupt it, and is ignored. After a signal
+        it ends at once, without taking apart all that it has loaded, which takes seconds on a busy machine.
     """
     global _ending
     if _ending is not None:
         with _ending.concluded():
             yield
         return
-    _ending = new = _Ending()
+    _ending = new = _Ending(process)
     sweep_system()
     try:
         with new.concluded(), _received(new, process), new.concluded():
@@ -145,6 +151,15 @@ def _received(by: _Ending, last: bool) -> Iterator[None]:
         sys.unraisablehook = by.reported
         signal.set_wakeup_fd(woken)
         os.close(writer)
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process once what is registered for its end is done."""
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # nobody reads it any more
+            stream.flush()
+    os._exit(code)
 
 
 def _say(line: str) -> None:

@@ -132,6 +132,27 @@ def test_a_signal_after_the_end_changes_nothing(start):
     assert process.returncode == 1
 
 
+LOADED = """
+import atexit, signal
+from quakedesign.interruption import ending
+
+class Loaded:
+    def __del__(self):
+        print("taken apart", flush=True)
+
+kept = Loaded()
+atexit.register(print, "in order")
+with ending(process=True):
+    signal.raise_signal(signal.SIGTERM)
+"""
+
+
+def test_after_a_signal_the_process_ends_without_being_taken_apart(start):
+    process = start("-c", LOADED)
+    assert process.communicate(timeout=60) == ("in order\n", "quakedesign: terminated; nothing was written.\n")
+    assert process.returncode == 143
+
+
 SWALLOWS = """
 import time
 from quakedesign.interruption import ending

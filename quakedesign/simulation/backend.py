@@ -3,6 +3,7 @@
 import os
 import shlex
 import shutil
+import signal
 import subprocess
 from dataclasses import dataclass
 from functools import lru_cache
@@ -130,9 +131,35 @@ def shared_library(text: str, folder: Path, command: tuple[str, ...]) -> Path:
     """
     written, library = folder / "steps.c", folder / "steps.so"
     written.write_text(text, encoding="utf-8")
-    call = [*command, *FLAGS, str(written), "-o", str(library), "-lm"]
-    subprocess.run(call, check=True, capture_output=True, timeout=_LONGEST_COMPILATION)
+    _run([*command, *FLAGS, str(written), "-o", str(library), "-lm"], folder)
     return library
+
+
+def _run(call: list[str], folder: Path) -> None:
+    """Run a compiler to its end; whatever else ends it ends those that it has started, and its files lie in a folder.
+
+    Raises
+    ------
+    OSError, SubprocessError
+    """
+    where, pipe = os.environ | {"TMPDIR": str(folder)}, subprocess.PIPE
+    with subprocess.Popen(
+        call, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, env=where, start_new_session=True
+    ) as process:
+        try:
+            said = process.communicate(timeout=_LONGEST_COMPILATION)
+        except BaseException:
+            _kill_all(process)
+            raise
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, call, *said)
+
+
+def _kill_all(process: "subprocess.Popen[bytes]") -> None:
+    if hasattr(os, "killpg"):
+        os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()
 
 
 def _reason(error: Exception) -> str:

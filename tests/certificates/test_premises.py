@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
+from quakedesign.certificates.claim import Equilibrium
 from quakedesign.certificates.linear_premises import effective_stress, linear_premises, sectors
 from quakedesign.certificates.premises import (
     Errors,
@@ -263,7 +264,7 @@ def test_a_certificate_without_every_bound_has_neither(real, proof, stubs, monke
 
 
 def test_a_refutation_and_no_certificate_prove_no_premise(real, proof, stubs):
-    for nothing in (None, replace(proof, refutation=object())):
+    for nothing in (None, replace(proof, refutation=Equilibrium(parameters={}, point={}, weights={}))):
         premises, domain = sliding_mode_premises(real, law_of(real), nothing)
         assert [(p.name, p.proved, p.holds) for p in premises] == [("along_reference", False, False)]
         assert domain is None

@@ -1,5 +1,6 @@
 """What a run is said to have come to, how far a proof reaches, and when a comparison is a positive answer."""
 
+from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,6 +16,8 @@ from quakedesign.report.grade import grade
 from quakedesign.report.outcomes import outcome_cells, outcome_sentence, pressure_sentence
 from quakedesign.simulation import simulate
 from quakedesign.synthesis import Design
+from quakedesign.synthesis.linear.certified_peaks import CertifiedPeaks
+from quakedesign.synthesis.linear.sampled.held import HeldLoop
 
 FAULT = load_fault(Path(__file__).parent.parent / "data" / "undersampled_fault.toml")
 LAW = control_law("cta").from_values(("7", "5", "2.3", "1.1"), divisor="27/260000000").scaled("0.000136822")
@@ -77,11 +80,16 @@ def test_the_sign_of_the_pressure_is_said(ends, said):
     assert pressure_sentence(*ends) == said
 
 
+PEAKS = CertifiedPeaks(
+    disturbance_class="amplitude", reference_rate=Fraction(0), rest_pressure=(Fraction(0), Fraction(0)), bounds={}
+)
+
+
 def test_verdicts_are_graded_by_what_the_proof_leaves_out(slow):
     assert grade(entry(slow, FINE)) == "proved for this loop and task"
     assert grade(entry(slow, FINE, CHATTER)) == "proved, but on_trajectory fails 1.01-fold"
     assert grade(entry(slow, MOVING)) == "proved, but constant_reference fails (nothing is certified)"
-    assert grade(entry(slow, MOVING, peaks={"amplitude": "a bound"})) == "proved for this loop and task"
+    assert grade(entry(slow, MOVING, peaks={"amplitude": PEAKS})) == "proved for this loop and task"
     assert grade(entry(slow, FINE, growth_per_step=1.2)) == "proved, but UNSTABLE at the step used"
     assert grade(entry(slow, FINE, verdict=Verdict.UNDECIDED)) == "undecided"
     assert grade(entry(slow, FINE, verdict=Verdict.REFUTED)) == "refuted"
@@ -90,5 +98,6 @@ def test_verdicts_are_graded_by_what_the_proof_leaves_out(slow):
 def test_a_held_pressure_is_not_what_is_proved(slow):
     held = simulate(FAULT, LAW, duration=1.0, scheme="implicit")
     assert grade(entry(held, FINE)) == "proved, but p is held (implicit), which is not covered"
-    unstable = SimpleNamespace(runs=SimpleNamespace(verdict=Verdict.REFUTED))
+    runs = SimpleNamespace(verdict=Verdict.REFUTED)
+    unstable = HeldLoop(runs=runs, longest=None, radius=1.1, constant={})
     assert grade(entry(slow, FINE, held=unstable)) == "proved for this loop and task; UNSTABLE if p is held over T_s"
