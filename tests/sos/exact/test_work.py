@@ -99,10 +99,10 @@ def test_a_value_of_more_digits_than_python_prints_is_shown_rounded(tmp_path):
 
 
 def test_nothing_is_counted_outside():
-    for work in (lambda: spend(10 * STEPS), lambda: expanded(10 * TERMS)):
-        work()
+    for needed in (lambda: spend(10 * STEPS), lambda: expanded(10 * TERMS)):
+        needed()
         with limited(), pytest.raises(WorkError):
-            work()
+            needed()
 
 
 def test_a_budget_ends_where_it_is_used_up_and_the_outer_one_goes_on():
