@@ -1,34 +1,45 @@
 """Design controllers that let a fault slip slowly instead of in an earthquake, and prove that they do.
 
-The public names load on first use, so that ``import quakedesign`` costs nothing.
+The public names load on first use, so that ``import quakedesign`` costs nothing; ``__init__.pyi`` names them for tools.
 """
 
 from importlib import import_module
 from importlib.metadata import version as _version
 
 _HOME = {
-    "Fault": "fault",
-    "load_fault": "fault",
-    "derive": "symbolic",
     "Certificate": "certificates",
-    "Verdict": "certificates",
-    "load_certificate": "certificates",
-    "published": "controllers",
-    "simulate": "simulation",
+    "Controller": "controllers",
+    "Design": "synthesis",
+    "Disturbance": "fault",
+    "Fault": "fault",
+    "FrictionLaw": "fault",
+    "Reference": "fault",
+    "Scales": "fault.scaling",
     "Trajectory": "simulation",
+    "UncertaintyBox": "fault",
+    "Verdict": "certificates",
+    "campaign_problem": "simulation.campaign",
+    "certify": "synthesis",
+    "compare": "report",
+    "derive": "symbolic",
+    "design": "synthesis",
+    "export_controller": "simulation",
+    "limits": "studies",
+    "load_certificate": "certificates",
+    "load_fault": "fault",
+    "published": "controllers",
+    "run_campaign": "simulation.campaign",
+    "scaled_fault": "fault.scaling",
+    "simulate": "simulation",
+    "synthesise": "synthesis.gains.synthesise",
     "to_casadi": "simulation",
     "to_iosystem": "simulation",
-    "design": "synthesis",
-    "certify": "synthesis",
-    "Design": "synthesis",
-    "limits": "studies",
-    "compare": "report",
 }
 
 __all__ = list(_HOME)
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> object:
     if name == "__version__":
         return _version("quakedesign")
     if name not in _HOME:

@@ -256,3 +256,16 @@ def test_proofs_use_confirmed_bounds_of_friction_only(path):
 def test_declared_friction_is_found():
     text = "law, x = fault.friction.exact(), 1\na = law.slip_slope\nb = self.fault.friction.bounds\nc = box.bounds"
     assert sorted(declared_friction(ast.parse(text))) == ["law.slip_slope", "self.fault.friction.bounds"]
+
+
+def test_what_tools_read_of_the_face_is_what_it_loads():
+    stub = ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8"))
+    stated = {
+        alias.asname: (node.module, alias.name)
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert sorted(stated) == sorted(quakedesign.__all__)
+    for name, (module, there) in stated.items():
+        assert getattr(importlib.import_module(module), there) is getattr(quakedesign, name)

@@ -180,7 +180,13 @@ class Law(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Controller(Law):
-    """A law that acts on the slip of a fault through the fluid pressure."""
+    """A law that acts on the slip of a fault through the fluid pressure.
+
+    Attributes
+    ----------
+    gains : mapping of str to Fraction
+        By name, exact; their units are the law's `gain_units`.
+    """
 
     integral_units: ClassVar[tuple[str, ...]]
 

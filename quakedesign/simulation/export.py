@@ -109,10 +109,12 @@ def export_controller(
 
     Parameters
     ----------
-    fault, controller, step, scheme
+    fault, controller
         As in `controller_step`.
     folder : str or Path
         New folder in an existing one.
+    step, scheme
+        As in `controller_step`; step [s].
     force : bool
         Replace a folder that holds an earlier export and nothing else.
 

@@ -54,11 +54,26 @@ def campaign_problem(
     initial_slip_rate: float = 0.0,
     seed: int = 0,
 ) -> Problem:
-    """Closed loop and the space of its samples; the arguments are those of `simulate` and of `Space.of`.
+    """Closed loop and the space of its samples.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : Controller, optional
+        None: the pressure stays zero.
+    scheme, step, method, duration, settled_from, plant, load
+        As in `simulate`; step [s], duration [s], settled_from [s].
+    initial_slip : float
+        Largest initial slip of a sample [m].
+    initial_slip_rate : float
+        Largest initial slip rate of a sample [m/s].
+    seed : int
+        Of the Sobol sequence and of everything else that is random.
 
     Raises
     ------
     ParameterError
+        When a value is out of range, or a scheme or integrator is unknown.
     """
     require_seed(seed)
     return Problem(

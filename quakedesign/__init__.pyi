@@ -1,0 +1,29 @@
+from quakedesign.certificates import Certificate as Certificate
+from quakedesign.certificates import Verdict as Verdict
+from quakedesign.certificates import load_certificate as load_certificate
+from quakedesign.controllers import Controller as Controller
+from quakedesign.controllers import published as published
+from quakedesign.fault import Disturbance as Disturbance
+from quakedesign.fault import Fault as Fault
+from quakedesign.fault import FrictionLaw as FrictionLaw
+from quakedesign.fault import Reference as Reference
+from quakedesign.fault import UncertaintyBox as UncertaintyBox
+from quakedesign.fault import load_fault as load_fault
+from quakedesign.fault.scaling import Scales as Scales
+from quakedesign.fault.scaling import scaled_fault as scaled_fault
+from quakedesign.report import compare as compare
+from quakedesign.simulation import Trajectory as Trajectory
+from quakedesign.simulation import export_controller as export_controller
+from quakedesign.simulation import simulate as simulate
+from quakedesign.simulation import to_casadi as to_casadi
+from quakedesign.simulation import to_iosystem as to_iosystem
+from quakedesign.simulation.campaign import campaign_problem as campaign_problem
+from quakedesign.simulation.campaign import run_campaign as run_campaign
+from quakedesign.studies import limits as limits
+from quakedesign.symbolic import derive as derive
+from quakedesign.synthesis import Design as Design
+from quakedesign.synthesis import certify as certify
+from quakedesign.synthesis import design as design
+from quakedesign.synthesis.gains.synthesise import synthesise as synthesise
+
+__version__: str
