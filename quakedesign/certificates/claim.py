@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from enum import Enum
 from fractions import Fraction
 from math import isqrt
@@ -29,6 +30,11 @@ class Verdict(Enum):
 
     def __str__(self) -> str:
         return self.name.lower()
+
+
+def _short(value: Fraction) -> str:
+    """Six digits, to nearest; Decimal has no largest number as floats have."""
+    return f"{Decimal(value.numerator) / Decimal(value.denominator):.6g}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +72,11 @@ class Loop:
         for name, (low, high) in self.uncertain.items():
             if low > high:
                 raise ParameterError(f"range of {name} must be ordered. Received [{low}, {high}].")
+
+    def __repr__(self) -> str:
+        gains = ", ".join(f"{name} ≈ {_short(value)}" for name, value in self.gains.items())
+        ranges = ", ".join(f"{name} in [{_short(a)}, {_short(b)}]" for name, (a, b) in self.uncertain.items())
+        return f"Loop({'; '.join(part for part in (self.law, gains, ranges) if part)})"
 
     @property
     def symbols(self) -> dict[str, sp.Symbol]:
@@ -145,6 +156,10 @@ class Certificate:
     claims: Mapping[str, Fraction] = field(default_factory=dict)
     witnesses: Mapping[str, Witness] = field(default_factory=dict)
     refutation: Equilibrium | None = None
+
+    def __repr__(self) -> str:
+        claimed = f"claims {', '.join(self.claims)} with {len(self.witnesses)} witnesses"
+        return f"Certificate({self.loop}; {claimed if self.refutation is None else 'refuted by an equilibrium'})"
 
     def check(self, law: Subject | None = None) -> Verdict:
         """Re-decide the statement from nothing but its claim, in exact arithmetic; field against law as well.

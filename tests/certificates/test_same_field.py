@@ -9,7 +9,7 @@ import sympy as sp
 
 from quakedesign.certificates import load_certificate
 from quakedesign.certificates.checking import _same_field, limit, touching_cells
-from quakedesign.certificates.claim import Loop, error_units, loop_of, root_enclosure, unit_ranges
+from quakedesign.certificates.claim import Equilibrium, Loop, error_units, loop_of, root_enclosure, unit_ranges
 from quakedesign.controllers import LoopField, laws
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.symbolic.terms import Term
@@ -221,3 +221,14 @@ def test_units_are_those_of_the_model_or_of_the_law_by_its_name():
     assert error_units(replace(DIA, law="own"), laws()["dia"].loop_field()) == own
     assert error_units(CTA) == dict.fromkeys(CTA.states, (F(1), F(1)))
     assert error_units(DIA, replace(laws()["dia"].loop_field(), units={})) == dict.fromkeys(DIA.states, (F(1), F(1)))
+
+
+def test_a_loop_is_shown_in_one_short_line_whatever_its_numbers():
+    huge = replace(CTA, gains=dict(CTA.gains) | {"k1": F(10) ** 400}, uncertain={"beta": (F(1, 3), F(1))})
+    assert repr(huge).startswith("Loop(cta; k1 ≈ 1.00000e+400, k2 ≈ 5, k3 ≈ 2.3, k4 ≈ 1.1; beta in [0.333333, 1]")
+    proved = load_certificate(FILES / "cta_7_5_2.3_1.1.json")
+    assert "claims positive, decrease" in repr(proved) and len(repr(proved)) < 250
+    nothing = replace(
+        proved, lyapunov=(), claims={}, witnesses={}, refutation=Equilibrium(parameters={}, point={}, weights={})
+    )
+    assert repr(nothing).endswith("; refuted by an equilibrium)")
