@@ -18,7 +18,8 @@ so its F is a bound of |φ − w·r′ − r″| and its c are half the ranges; 
 **Class rate.** For |φ| ≤ H and |φ′| ≤ Ḣ with φ(0) = 0, and friction of the slip alone, shift p* by φ/(β·b), with the β
 of the plant: φ leaves a, v becomes b(p − p*) + φ/β, and d gains (φ/β)′. N̂ being constant, |β′| ≤ μ′·N̂|x2|/b with the
 largest slope μ′, so |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b, because β ≥ 1. Where friction depends on the slip rate
-as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0.
+as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0. A disturbance of this
+class is one of the class amplitude too, so the smaller of both bounds holds for every output.
 
 **Implicit root.** A law that uses the end w of an implicit step is linear but for the sampled input ``root``, w_k +
 γe1/T_s at the samples, γ the middle of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤ R
@@ -28,7 +29,7 @@ within the claims up to kT_s, where it is continuous, and the sample at kT_s obe
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Any
 
@@ -124,7 +125,12 @@ def certified_bounds(task: Task, loop: PeriodicLoop, root: ImplicitRoot | None =
         When the nominal loop is not found to be stable.
     """
     gains = norms(loop) if loop.segments else flow_norms(loop)
-    return bounds_from(task, gains, root, loop.period)
+    classes = [task] if task.change is None else [task, replace(task, change=None)]
+    found = [bounds_from(one, gains, root, loop.period) for one in classes]
+    proved = [bounds for bounds in found if isinstance(bounds, Bounds)]
+    if not proved:
+        return found[0]
+    return Bounds(**{part.name: min(getattr(bounds, part.name) for bounds in proved) for part in fields(Bounds)})
 
 
 def bounds_from(

@@ -104,6 +104,14 @@ def test_the_statement_says_the_slip_rate_of_this_fault():
     assert f"the slip rate of this fault never exceeds {float(found.claims.peak_slip_rate):.4g} m/s" in lines
 
 
+def test_a_slower_disturbance_is_never_bounded_worse():
+    """The published integrals are so slow that the shifted pressure drifts too much; the larger class bounds them."""
+    law = exact_integrals(tuple(map(F, ("1880000000", "579000000", "1020000", "18.52"))))
+    any_, slow = (continuous_peaks(task_of(load_fault("real-fault"), rate_limited=k), law) for k in (False, True))
+    assert slow.claims == any_.claims
+    assert package(guarantee_text(slow)) == standalone(guarantee_text(slow)) == "proved"
+
+
 def test_the_statement_about_continuous_time_says_so_in_both():
     found = claim("continuous")
     said = "for a pressure that acts at once (continuous time)"

@@ -89,7 +89,7 @@ def test_gains_with_poles_that_are_far_apart_are_decided_too(name, box):
     """The published integrals are 10^6 times slower than the fastest pole."""
     gains = replace(published(name)["elqr"], feedback="error")
     found = {kind: certified_peaks(qd.load_fault(name, box=box), gains, disturbance_class=kind) for kind in CLASSES}
-    assert all(isinstance(one, ContinuousPeaks) for one in found.values())
+    assert found["rate"].claims.slip_rate_error <= found["amplitude"].claims.slip_rate_error
     assert worst_found(found["amplitude"]).slip_rate_error < found["amplitude"].claims.slip_rate_error
 
 
