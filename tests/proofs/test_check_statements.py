@@ -500,3 +500,15 @@ def test_a_guarantee_needs_the_module_beside_the_checker(tmp_path, monkeypatch, 
     checker.guarantee_module.cache_clear()
     assert checker.main([str(tmp_path / "guarantee.json")]) == 2
     assert "guarantee.py must stand beside check.py" in capsys.readouterr().err
+
+
+def test_a_bound_under_inputs_is_no_longer_read(tmp_path, capsys):
+    path = tmp_path / "old.json"
+    path.write_text('{"format": 1, "inputs": {}}')
+    assert checker.main([str(path)]) == 2
+    assert "a bound under inputs: no longer read" in capsys.readouterr().err
+
+
+def test_keys_are_looked_at_before_anything_is_read():
+    with pytest.raises(checker.Refused, match="the file must be complete; law is missing"):
+        checker.check('{"format": 1, "other": 1}')
