@@ -25,6 +25,11 @@ os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
 """
 
 
+def pytest_collection_modifyitems(items):
+    """The longest files first, so that no worker is left alone with one of them at the end."""
+    items.sort(key=lambda item: (item.path.suffix != ".ipynb", item.path.name != "test_cli.py"))
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _no_warning_wanders():
     """What a file of tests has left open is warned of there, and not in another file."""

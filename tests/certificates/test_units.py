@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from fractions import Fraction as F
+from functools import cache
 from typing import ClassVar
 
 import pytest
@@ -53,7 +54,7 @@ def test_a_controller_from_outside_the_package_is_judged_on_a_fault():
 
 @pytest.mark.parametrize("unit", ["4", "1/16", "1/256"])
 def test_what_is_certified_does_not_depend_on_the_unit_of_the_second_state(unit):
-    one, other = (_judged(rescaled_twisting(sp.Rational(u))) for u in ("1", unit))
+    one, other = _judged("1"), _judged(unit)
     assert other.verdict is one.verdict is Verdict.PROVED
     assert other.domain.start_slip_error == pytest.approx(one.domain.start_slip_error, rel=0.02)
     assert other.domain.method == one.domain.method
@@ -84,7 +85,8 @@ def rescaled_twisting(unit):
     return Rescaled
 
 
-def _judged(law):
-    fault = load_fault("real-fault")
+@cache
+def _judged(unit):
+    fault, law = load_fault("real-fault"), rescaled_twisting(sp.Rational(unit))
     gains = tuple(map(F, ("7", "5", "23/10", "11/10")))
     return assess(fault, law.from_values(gains, scale=F(1, 100), divisor=least_authority(fault)))
