@@ -9,12 +9,12 @@ import pytest
 from quakedesign.workers import Processes
 
 PROGRAM = """
-import sys, time
+import os, sys, time
 from quakedesign.interruption import ending
 from quakedesign.workers import Processes
 
 def work(kind):
-    print("there", flush=True)
+    os.write(1, b"there\\n")  # two write at once: a line in one piece
     while kind == "idle":
         time.sleep(1)
     while kind == "busy":
