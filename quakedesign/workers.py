@@ -7,6 +7,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
@@ -114,7 +115,10 @@ class Processes(Crew):
     def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Crew.submit`."""
         with _undisturbed():
-            return self._pool.submit(task, *arguments)
+            try:
+                return self._pool.submit(task, *arguments)
+            except (OSError, ValueError) as error:  # a death closed the pipes of the process that was to start
+                raise BrokenProcessPool("a process of the pool died while another was started") from error
 
     def renew(self) -> None:
         """See `Crew.renew`."""

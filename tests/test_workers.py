@@ -68,6 +68,15 @@ def test_a_worker_that_was_killed_is_replaced_and_answers_keep_their_places():
     assert found == {i: divmod(i, 7) for i in range(20)}
 
 
+def test_a_death_that_closes_the_pipes_of_a_process_about_to_start_is_a_death(monkeypatch):
+    """A pool that breaks while `submit` starts a process ends in an error of the system's, not of the pool's."""
+    with Processes(1) as crew:
+        broken = crew._pool
+        monkeypatch.setattr(broken, "submit", lambda *_: os.close(-1))
+        assert dict(crew.answers(divmod, [(5, 7)])) == {0: (0, 5)}
+        assert crew._pool is not broken
+
+
 def test_an_error_of_a_task_is_that_of_the_caller():
     with pytest.raises(ZeroDivisionError), Processes(1) as crew:
         list(crew.answers(divmod, [(1, 0)]))
