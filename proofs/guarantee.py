@@ -119,6 +119,8 @@ class Task:
     beta: tuple[Fraction, Fraction]
     rest: tuple[Fraction, Fraction]
     reference_rate: Fraction
+    reference_acceleration: Fraction
+    reference_jerk: Fraction | None
     reference_force: Fraction
     drift: Fraction
     amplitude: Fraction
@@ -161,6 +163,8 @@ def read_task(document: dict[str, Any]) -> Task:
     w = damping[0] - sheared - grows["rate"], damping[1] + sheared - grows["rate"]
     first = max(abs(v) for v in on_unit_interval(slope(shape))) * target / duration
     second = max(abs(v) for v in on_unit_interval(slope(slope(shape)))) * target / duration**2
+    bent = slope(slope(shape))
+    third = max(abs(v) for v in on_unit_interval(slope(bent))) * target / duration**3
     return Task(
         name=name,
         b=b,
@@ -169,6 +173,8 @@ def read_task(document: dict[str, Any]) -> Task:
         beta=(Fraction(1), mu["largest"] * area[1] / b),
         rest=(sigma - stress[1], sigma - stress[0]),
         reference_rate=first,
+        reference_acceleration=second,
+        reference_jerk=None if bent[0] or sum(bent) else third,
         reference_force=max(abs(v) for v in w) * first + second,
         drift=max(abs(v) for v in s) * first,
         amplitude=amplitude,
@@ -314,7 +320,8 @@ def root_within(root: Root, step: Fraction, slip: Fraction, rate: Fraction) -> b
 class Loop:
     """Flow x' = Ax, then events (map, time until the next one; none in continuous time), inputs, the implicit step.
 
-    The first two inputs flow, the third, if there is an implicit step, enters with the first event.
+    The first two inputs flow, the third, if there is an implicit step, enters with the first event. Without events
+    there may be two more, the second and third derivatives of the reference.
     """
 
     flow: list[Row]
@@ -362,7 +369,11 @@ def read_loop(value: Any, task: Task) -> Loop:
     arrival[valve] = unit(size)[valve - 1]
     pressures = [Fraction(0)] * (2 + n) + [Fraction(-1)] * (waiting + 1) + [Fraction(0)] * (lag > 0)
     still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(update)]
-    drift = [*pressures[:2], *(-v / task.b for v in steady_states(still, output)), *pressures[2 + n :]]
+    drift = [
+        *pressures[:2],
+        *(-v / task.b for v in steady_states(still, output, [Fraction(0)] * n, Fraction(1))),
+        *pressures[2 + n :],
+    ]
     push = [Fraction(i >= valve) for i in range(size)]
     if lag > 0:  # the fault's pressure stays while the valve's jumps
         last = arrival if part else sample
@@ -376,7 +387,8 @@ def read_loop(value: Any, task: Task) -> Loop:
 
 def read_continuous(value: Any, task: Task) -> Loop:
     """Build the error loop of a law whose pressure acts at once: e1, e2 and the law's states."""
-    given = keys(value, "loop", "states", "rates", "measured", "output", "feedback")
+    parts = ("states", "rates", "measured", "output", "feedback")
+    given = keys(value, "loop", *parts, *(["of_reference"] if "of_reference" in value else []))
     n = count_states(given["states"])
     rates, seen = matrix(given["rates"], "rates", n, n), matrix(given["measured"], "measured", n, 2)
     output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2)
@@ -385,8 +397,14 @@ def read_continuous(value: Any, task: Task) -> Loop:
     flow = [unit(2 + n)[1]]
     flow.append([v + sum(task.beta) / 2 * p for v, p in zip(middles, push, strict=True)])
     flow += [[*fed, *kept] for fed, kept in zip(seen, rates, strict=True)]
-    drift = [Fraction(0)] * 2 + [-v / task.b for v in steady_states(rates, output)]
-    return Loop(flow, [], [unit(2 + n)[0], unit(2 + n)[1], push], [unit(2 + n)[1], drift], None, Fraction(0))
+    steady = steady_states(rates, output, [Fraction(0)] * n, Fraction(1))
+    inputs = [unit(2 + n)[1], [Fraction(0)] * 2 + [-v / task.b for v in steady]]
+    forward = row(given.get("of_reference", ["0", "0"]), "of_reference", 2)
+    if any(forward):
+        need(task.reference_jerk is not None, "the reference must start and end without acceleration for this law")
+        moving = steady_states(rates, output, steady, Fraction(0))
+        inputs += [[Fraction(0)] * 2 + [k * v for v in moving] for k in forward]
+    return Loop(flow, [], [unit(2 + n)[0], unit(2 + n)[1], push], inputs, None, Fraction(0))
 
 
 def count_states(names: Any) -> int:
@@ -406,11 +424,11 @@ def unit(size: int) -> list[Row]:
     return [[Fraction(i == j) for j in range(size)] for i in range(size)]
 
 
-def steady_states(own: list[Row], output: Row) -> Row:
-    """Some z with Mz = 0 and Cz = 1, by elimination."""
+def steady_states(own: list[Row], output: Row, rates: Row, asked: Fraction) -> Row:
+    """Some z with Mz = rates and Cz = asked, by elimination."""
     n = len(output)
-    table = [[*line, Fraction(0)] for line in own]
-    table.append([*output, Fraction(1)])
+    table = [[*line, rate] for line, rate in zip(own, rates, strict=True)]
+    table.append([*output, asked])
     found = [Fraction(0)] * n
     pivots: list[tuple[int, Row]] = []
     for column in range(n):
@@ -722,6 +740,10 @@ def of_class(task: Task, loop: Loop, found: list[list[list[Fraction]]]) -> tuple
         low, high = loop.root.slopes
         own.append(loop.root.remainder)
         shares.append([(high - low) / 2 / loop.step, Fraction(0), Fraction(0)])
+    if not loop.events and len(loop.inputs) > 2:
+        assert task.reference_jerk is not None
+        own += [task.reference_acceleration, task.reference_jerk]
+        shares += [[Fraction(0)] * 3] * 2
     table = [
         [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
         for share in shares

@@ -11,7 +11,7 @@ from quakedesign.loop.periodic import PeriodicLoop
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContinuousLaw:
-    """p = Cz + Dy and z′ = Fz + Gy at every time, y = (e1, e2), z from 0.
+    """p = Cz + Dy + R(r, r′) and z′ = Fz + Gy at every time, y = (e1, e2), z from 0, r the reference.
 
     Attributes
     ----------
@@ -25,6 +25,8 @@ class ContinuousLaw:
         C, so that Cz is in Pa.
     feedback : (Fraction, Fraction)
         D [Pa/m, Pa·s/m].
+    of_reference : (Fraction, Fraction)
+        R [Pa/m, Pa·s/m], D for feedback of the state in place of the errors.
 
     Raises
     ------
@@ -37,18 +39,21 @@ class ContinuousLaw:
     measured: Matrix
     output: Row
     feedback: Row
+    of_reference: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
 
     def __post_init__(self) -> None:
         require_sizes(self.states, self.rates, self.measured, self.output, self.feedback)
 
 
-def exact_integrals(gains: tuple[Fraction, ...]) -> ContinuousLaw:
+def exact_integrals(gains: tuple[Fraction, ...], *, of_state: bool = False) -> ContinuousLaw:
     """The e-LQR in continuous time: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1′ = e1, ξ2′ = ξ1.
 
     Parameters
     ----------
     gains : tuple of Fraction
         k1 … k4 [Pa/m, Pa·s/m, Pa/(m s), Pa/(m s²)].
+    of_state : bool
+        k1 and k2 act on slip and slip rate, as printed, instead of their errors.
 
     Raises
     ------
@@ -65,11 +70,16 @@ def exact_integrals(gains: tuple[Fraction, ...]) -> ContinuousLaw:
         measured=((one, zero), (zero, zero)),
         output=(-k3, -k4),
         feedback=(-k1, -k2),
+        of_reference=(-k1, -k2) if of_state else (zero, zero),
     )
 
 
 def continuous_loop(law: ContinuousLaw, model: Model, authority: Fraction) -> PeriodicLoop:
-    """The error loop about p*, with the inputs and outputs of `held_loop`; states e1, e2 and the law's less its steady.
+    """The error loop about p*, with the inputs and outputs of `held_loop`; states e1, e2 and z − z*.
+
+    z* = ζ(p* − R(r, r′)) − ηR(r, r′)′ with Fζ = 0, Cζ = 1, Fη = ζ and Cη = 0, so that Cz* + R(r, r′) = p*. Where R is
+    not zero its entries give two inputs more, ``reference_acceleration`` r″ and ``reference_jerk`` r‴, through
+    ηR(r, r′)″.
 
     Parameters
     ----------
@@ -82,22 +92,28 @@ def continuous_loop(law: ContinuousLaw, model: Model, authority: Fraction) -> Pe
     Raises
     ------
     ParameterError
-        For a law that leaves an error under a constant p*.
+        For a law that leaves an error under a constant p*, or that feeds the reference forward without two integrals.
     """
     zero, one, n = Fraction(0), Fraction(1), 2 + len(law.states)
     push = tuple(authority * v for v in (*law.feedback, *law.output))
     plant = (model.slip, -model.rate, *[zero] * len(law.states))
     pushed = tuple(v + model.gain / authority * p for v, p in zip(plant, push, strict=True))
     own = tuple((*fed, *kept) for fed, kept in zip(law.measured, law.rates, strict=True))
-    steady = steady_states(law.rates, law.output)
+    still = (zero,) * len(law.states)
+    steady = steady_states(law.rates, law.output, still, one)
+    inputs = {
+        "acceleration": tuple(Fraction(i == 1) for i in range(n)),
+        "drift": (zero, zero, *(-v / authority for v in steady)),
+    }
+    for name, fed in zip(("reference_acceleration", "reference_jerk"), law.of_reference, strict=True):
+        if fed:
+            moving = steady_states(law.rates, law.output, steady, zero)
+            inputs[name] = (zero, zero, *(fed * v for v in moving))
     return PeriodicLoop(
         states=("e1", "e2", *law.states),
         flow=((zero, one, *[zero] * len(law.states)), pushed, *own),
         segments=(),
-        inputs={
-            "acceleration": tuple(Fraction(i == 1) for i in range(n)),
-            "drift": (zero, zero, *(-v / authority for v in steady)),
-        },
+        inputs=inputs,
         outputs={
             "slip_error": tuple(Fraction(i == 0) for i in range(n)),
             "slip_rate_error": tuple(Fraction(i == 1) for i in range(n)),

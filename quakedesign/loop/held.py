@@ -54,7 +54,7 @@ def held_loop(
     names = ("e1", "e2", *law.states, *(f"waiting{i}" for i in range(waiting)), "valve", *(("behind",) if lag else ()))
     n, valve = len(names), len(names) - (2 if lag else 1)
     still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
-    steady = steady_states(still, law.output)
+    steady = steady_states(still, law.output, (Fraction(0),) * len(law.states), Fraction(1))
     zero, one = Fraction(0), Fraction(1)
     sample, arrival = _events(law, authority, n, waiting, valve, part > 0)
     slope = Fraction(0) if law.root is None else law.root.middle / step
@@ -79,8 +79,8 @@ def held_loop(
     )
 
 
-def steady_states(own: Matrix, output: Row) -> Row:
-    """States of a law that asks for 1 Pa without errors for ever: Mz = 0 and Cz = 1, by elimination.
+def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
+    """States of a law that asks for p without errors and has the rates v: Mz = v and Cz = p, by elimination.
 
     Raises
     ------
@@ -88,8 +88,8 @@ def steady_states(own: Matrix, output: Row) -> Row:
         When there are none.
     """
     n = len(output)
-    rows = [[*row, Fraction(0)] for row in own]
-    rows.append([*output, Fraction(1)])
+    rows = [[*row, rate] for row, rate in zip(own, rates, strict=True)]
+    rows.append([*output, asked])
     pivots: list[tuple[int, list[Fraction]]] = []
     for column in range(n):
         pivot = next((row for row in rows if row[column]), None)

@@ -38,6 +38,26 @@ def test_a_drift_of_the_pressure_at_rest_enters_where_the_integrals_carry_it():
     assert loop.segments == ()
 
 
+def test_a_law_that_uses_the_reference_follows_it_with_its_states():
+    """z* = ζ(p* − f) − ηf′ asks for p* with f fed forward, and moves by nothing but p*′, r″ and r‴."""
+    t, zero = sp.Symbol("t"), sp.zeros(2, 1)
+    law = exact_integrals(GAINS, of_state=True)
+    loop = continuous_loop(law, MODEL, AUTHORITY)
+    k1, k2, k3, k4 = map(sp.Rational, GAINS)
+    r, rest = 1 + 4 * t + 5 * t**2 / 2 + 7 * t**3, 2 + 3 * t
+    fed = -k1 * r - k2 * r.diff(t)
+    steady = sp.Matrix([fed.diff(t) / k4, -(rest - fed) / k4 - k3 * fed.diff(t) / k4**2])
+    assert sp.simplify(-k3 * steady[0] - k4 * steady[1] + fed - rest) == 0
+    drift, bent, jerk = (
+        sp.Matrix([sp.Rational(v) for v in loop.inputs[name][2:]])
+        for name in ("drift", "reference_acceleration", "reference_jerk")
+    )
+    left = sp.Matrix(law.rates) * steady - steady.diff(t)
+    inputs = drift * sp.Rational(AUTHORITY) * rest.diff(t) + bent * r.diff(t, 2) + jerk * r.diff(t, 3)
+    assert sp.simplify(left - inputs) == zero
+    assert loop.flow == continuous_loop(exact_integrals(GAINS), MODEL, AUTHORITY).flow
+
+
 def test_the_held_loop_tends_to_it():
     """Poles of the map of a short period, (λ − 1)/T_s, against those of the flow."""
     step = F(1, 10**5)

@@ -39,7 +39,7 @@ class ContinuousPeaks:
     @property
     def loop(self) -> PeriodicLoop:
         """Nominal error loop."""
-        return continuous_loop(self.law, self.task.model, self.task.authority)
+        return _loop(self.task, self.law)
 
     def bounds(self) -> Bounds | NoGuarantee:
         """What the theorem gives, computed anew."""
@@ -81,8 +81,16 @@ def continuous_peaks(task: Task, law: ContinuousLaw) -> ContinuousPeaks | NoGuar
     return ContinuousPeaks(task=task, law=law, claims=Claims.of(task, found).rounded())
 
 
-def _bounds(task: Task, law: ContinuousLaw) -> Bounds | NoGuarantee:
+def _loop(task: Task, law: ContinuousLaw) -> PeriodicLoop:
+    """Nominal error loop, of a law that fits the reference."""
     loop = continuous_loop(law, task.model, task.authority)
+    if any(law.of_reference):
+        task.require_smooth_reference()
+    return loop
+
+
+def _bounds(task: Task, law: ContinuousLaw) -> Bounds | NoGuarantee:
+    loop = _loop(task, law)
     try:
         return certified_bounds(task, loop)
     except ParameterError:

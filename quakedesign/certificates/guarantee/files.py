@@ -66,6 +66,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
     if isinstance(claim, ContinuousPeaks):
         law: LinearLaw | ContinuousLaw = claim.law
         times, own = dict[str, str](), dict[str, Any](rates=[_texts(row) for row in claim.law.rates])
+        own |= {"of_reference": _texts(claim.law.of_reference)} if any(claim.law.of_reference) else {}
     else:
         law, times = claim.held.law, {name: str(getattr(claim.held, name)) for name in _TIMES}
         own = {"update": [_texts(row) for row in claim.held.law.update]}
@@ -146,8 +147,10 @@ def _held(raw: Any) -> Held:
 
 
 def _continuous(raw: Any) -> ContinuousLaw:
-    with_keys(raw, {"rates", *_LAW})
-    return ContinuousLaw(rates=_square(raw, "rates"), **_rest(raw))
+    fed = {"of_reference"} if "of_reference" in raw else set()
+    with_keys(raw, {"rates", *_LAW} | fed)
+    of_reference = _ends(raw["of_reference"], "of_reference") if fed else (Fraction(0), Fraction(0))
+    return ContinuousLaw(of_reference=of_reference, rates=_square(raw, "rates"), **_rest(raw))
 
 
 def _square(raw: dict[str, Any], name: str) -> tuple[tuple[Fraction, ...], ...]:

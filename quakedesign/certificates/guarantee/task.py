@@ -190,6 +190,26 @@ class Task:
         return found[0], found[1]
 
     @property
+    def reference_jerk(self) -> Fraction:
+        """Bound of |r‴| [m/s³] within the task; where r″ jumps at its ends there is none."""
+        bound = max(map(abs, _range_of(_derived(self.shape, 3))))
+        return bound * self.target_slip / self.operation_time**3
+
+    def require_smooth_reference(self) -> None:
+        """Refuse a reference whose acceleration jumps at its start or end.
+
+        Raises
+        ------
+        ParameterError
+        """
+        bent = _derived(self.shape, 2)
+        if bent[0] or sum(bent):
+            raise ParameterError(
+                "a law that uses the slip rate itself needs a reference that starts and ends without acceleration. "
+                f"Received one of {self.name} that does not. Feed back the errors."
+            )
+
+    @property
     def model(self) -> Model:
         """Middle of the ranges."""
         s, w, beta = ((low + high) / 2 for low, high in (self.slip_chord, self.rate_chord, self.beta))

@@ -28,7 +28,7 @@ them at the samples before kT_s, then the inputs up to kT_s, which these samples
 within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do. ∎
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Any
@@ -137,7 +137,7 @@ def bounds_from(
     task: Task, gains: Mapping[tuple[str, str], tuple[Any, ...]], root: ImplicitRoot | None, step: Fraction
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains of the nominal loop; of floats, floats."""
-    channels = channels_of(task, root, step)
+    channels = (*channels_of(task, root, step), *_fed_forward(task, {name for _, name in gains}))
     loops = [
         [
             max(sum((c * gains[y, k.name][j] for y, c in i.shares.items()), _ZERO) for j in _parts(gains))
@@ -176,6 +176,14 @@ def channels_of(task: Task, root: ImplicitRoot | None, step: Fraction) -> tuple[
         Channel(name="drift", own=drift, shares={"slip_rate_error": coupling}),
         *implicit,
     )
+
+
+def _fed_forward(task: Task, names: Collection[str]) -> Iterator[Channel]:
+    """Inputs of a law in continuous time that uses the reference itself (`continuous_loop`)."""
+    if "reference_acceleration" in names:
+        yield Channel(name="reference_acceleration", own=task.reference_rates[1], shares={})
+    if "reference_jerk" in names:
+        yield Channel(name="reference_jerk", own=task.reference_jerk, shares={})
 
 
 def spectral_radius(matrix: Sequence[Sequence[Any]]) -> Any:

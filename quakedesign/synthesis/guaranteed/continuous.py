@@ -18,7 +18,7 @@ def certified_peaks(
     ----------
     fault : Fault
     controller : ExtendedLQR
-        Feedback of the errors.
+        With either feedback.
     disturbance_class : str
         ``"amplitude"``: any measurable disturbance as large as the fault's; ``"rate"``: no faster either.
 
@@ -27,19 +27,16 @@ def certified_peaks(
     UnknownNameError
         For an unknown class.
     ParameterError
-        For a law that starts with a pressure other than zero or feeds back the state, friction with a state, or the
-        class ``rate`` and a disturbance that does not start at 0.
+        For a law that starts with a pressure other than zero, friction with a state, or the class ``rate`` and a
+        disturbance that does not start at 0.
     """
     if disturbance_class not in CLASSES:
         raise UnknownNameError(
             f"disturbance class must be one of {', '.join(CLASSES)}. Received {disturbance_class!r}."
         )
-    if controller.offset or controller.feedback != "error":
-        raise ParameterError(
-            "a certified peak needs a law that starts with p = 0 and feeds back the errors. Received offset "
-            f"{float(controller.offset):.4g} Pa, feedback {controller.feedback}. Use feedback error without an offset."
-        )
-    law = exact_integrals(tuple(controller.gains.values()))
+    if controller.offset:
+        raise ParameterError("a certified peak needs a law that starts with p = 0. Received one with an offset.")
+    law = exact_integrals(tuple(controller.gains.values()), of_state=controller.feedback == "state")
     found, limits = continuous_peaks(task_of(fault, rate_limited=disturbance_class == "rate"), law), controller.limits
     if limits is None or isinstance(found, NoGuarantee):
         return found

@@ -61,7 +61,8 @@ LOOPS = {
     "integrals": Held(law=INTEGRALS, step=STEP),
     "lagging": Held(law=ESTIMATE, step=F("0.1"), lag=F("0.03")),
 }
-CONTINUOUS = exact_integrals(tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5"))))
+CONTINUOUS_GAINS = tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5")))
+CONTINUOUS = exact_integrals(CONTINUOUS_GAINS)
 EVERY = (*LOOPS, "continuous")
 
 
@@ -102,6 +103,25 @@ def test_the_statement_says_the_slip_rate_of_this_fault():
     found = claim()
     lines = checker.check(guarantee_text(found)).statement
     assert f"the slip rate of this fault never exceeds {float(found.claims.peak_slip_rate):.4g} m/s" in lines
+
+
+STATE = exact_integrals(CONTINUOUS_GAINS, of_state=True)
+
+
+def test_feedback_of_the_state_is_accepted_by_both_and_needs_a_smooth_reference():
+    """A cubic reference starts and ends with an acceleration, which the law would pass on as a jump."""
+    text = guarantee_text(continuous_peaks(task_of(load_fault("real-fault")), STATE))
+    assert parse_guarantee(text).law == STATE
+    assert package(text) == standalone(text) == "proved"
+    raw = json.loads(text)
+    cubic = json.dumps(changed(raw, ("reference", "shape"), ["0", "0", "3", "-2"]))
+    assert "without acceleration" in standalone(cubic)
+    assert "without acceleration" in package(cubic)
+    much = [str(10**8 * F(v)) for v in raw["loop"]["of_reference"]]
+    for new in (much, ["0"], ["1", "2", "3"], "1", ["x", "1"]):
+        text = json.dumps(changed(raw, ("loop", "of_reference"), new))
+        assert standalone(text).startswith("invalid"), new
+        assert package(text) != "proved", new
 
 
 def test_a_slower_disturbance_is_never_bounded_worse():

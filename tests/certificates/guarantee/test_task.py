@@ -61,6 +61,15 @@ def test_the_fault_s_own_law_stays_inside_the_ranges(name):
     assert drift.max() <= float(task.drift)
 
 
+def test_the_jerk_is_that_of_the_quintic():
+    """60·d/t³ at both ends."""
+    task = task_of(load_fault("real-fault"))
+    assert F(60) <= task.reference_jerk * task.operation_time**3 / task.target_slip <= F(60) * F(1001, 1000)
+    task.require_smooth_reference()
+    with pytest.raises(ParameterError, match="without acceleration"):
+        replace(task, shape=(F(0), F(0), F(3), F(-2))).require_smooth_reference()
+
+
 def test_the_drift_is_that_of_the_worst_friction_but_for_a_tenth():
     # friction falls as steeply as the box allows and ends where r' is largest; p* by hand from the balance at rest
     fault = load_fault("real-fault")
