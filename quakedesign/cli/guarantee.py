@@ -17,6 +17,7 @@ def guarantee(
     controller: str = "elqr",
     objective: Literal["tracking", "peak"] = "tracking",
     gains: Gains = (),
+    scheme: str | None = None,
     step: ExactSeconds | None = None,
     delay: ExactSeconds = "0",
     lag: ExactSeconds = "0",
@@ -36,12 +37,14 @@ def guarantee(
     fault
         Preset or path of a .toml file.
     controller
-        elqr; sliding modes get none.
+        elqr, or a sliding mode: cta, dia.
     objective
         Of a design: tracking, or peak for the smallest proved slip-rate error.
     gains
         k1 to k4 of an e-LQR whose integrals are summed once per sample; a law with an estimate of the disturbance is
-        designed unless given.
+        designed unless given. Of a sliding mode its base gains, scaled by λ.
+    scheme
+        Of a sliding mode: compensated unless given; no other has a guarantee. The e-LQR runs in explicit.
     step
         T_s, such as '184 ms' or 7/50 (s); the fault's unless given.
     delay
@@ -73,6 +76,7 @@ def guarantee(
         controller=controller,
         gains=gains,
         objective=objective,
+        scheme=scheme,
         step=None if step is None else rational(step, "step"),
         delay=rational(delay, "delay"),
         lag=rational(lag, "lag"),

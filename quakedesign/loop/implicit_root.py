@@ -15,6 +15,8 @@ from quakedesign.errors import ParameterError
 SIGNALS = ("slip", "rate")
 MOST_TERMS = 16
 MOST_EXPONENT = 6
+_TINY = 1e-300
+_HALVINGS = 50
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +103,21 @@ def pulled(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
         sign = (value > 0) * 1.0 - (value < 0)
         total = total + float(sum(term.factor)) / 2 * sign * abs(value) ** float(term.exponent)
     return total
+
+
+def root_of(terms: tuple[Power, ...], step: float, slip: Any, rate: Any) -> Any:
+    """w in floats or arrays of them, by halving down to rounding; exact where the sign of the end slip holds it."""
+    deadbeat = -slip / step
+    after, before = (deadbeat - rate + pulled(terms, way * _TINY, deadbeat) for way in (1, -1))
+    first = -rate + pulled(terms, slip, 0 * rate)
+    low, high = (first > 0) * -first, (first < 0) * -first
+    held = (before <= 0) & (after >= 0)
+    if not (held | (low == high)).all():
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            above = middle - rate + pulled(terms, slip + step * middle, middle) > 0
+            low, high = low + (middle - low) * ~above, high + (middle - high) * above
+    return deadbeat * held + (low + high) / 2 * ~held
 
 
 def _all_terms(terms: tuple[Power, ...]) -> Iterator[Power]:

@@ -68,16 +68,49 @@ def test_gains_that_do_not_hold_the_nominal_fault_either(call):
     assert out.startswith("none: held over 0.184 s even the nominal loop is not stable")
 
 
-def test_sliding_modes_get_an_honest_none(call):
-    code, out, _ = call("real-fault", "--controller", "cta")
+def test_a_sliding_mode_with_its_file(call, tmp_path):
+    path = tmp_path / "cta.json"
+    code, out, _ = call("real-fault", "--controller", "cta", "--json", "--out", str(path))
+    found = json.loads(out)
+    assert (code, found["verdict"], found["controller"]["scheme"]) == (0, "proved", "compensated")
+    assert F(found["slip_rate_error"]) <= F(4, 10**4)
+    assert F(found["slip_error"]) <= F(6, 10**5)
+    for seen in ("worst_found", "worst_found_with_stick"):
+        assert 0 < found[seen]["slip_error"] <= F(found["slip_error"])
+        assert 0 < found[seen]["slip_rate_error"] <= F(found["slip_rate_error"])
+    assert F(found["slip_rate_error"]) <= 2 * found["worst_found"]["slip_rate_error"]
+    assert 0 < found["small_gain"] < 1
+    assert F(1, 10**4) < F(found["limit"]["slip_rate_error"]) < F(found["slip_rate_error"])
+    assert check_files([path], "real-fault")[str(path)][0] == "proved"
+
+
+def test_a_sliding_mode_with_given_gains_for_people(call):
+    code, out, _ = call("real-fault", "--controller", "dia", "--gains", "1", "20", "1", "0", "--objective", "peak")
+    assert code == 0
+    assert out.startswith("proved: from rest, held over 0.184 s")
+    assert "2-DIA with kI1 = 1, kI2 = 20, kI3 = 1, kI4 = 0" in out
+    assert "its implicit step is deadbeat" in out
+
+
+@pytest.mark.parametrize(
+    ("scheme", "words"),
+    [("explicit", "chatters"), ("semi-implicit", "chatters"), ("continuous", "at every instant"),
+     ("implicit", "a constant pressure p* holds it at e1 = T_s²·B0·p*, here up to 0.0091 m")],
+)  # fmt: skip
+def test_other_schemes_of_sliding_modes_get_an_honest_none(call, scheme, words):
+    code, out, _ = call("real-fault", "--controller", "cta", "--scheme", scheme)
     assert code == 1
     assert out.startswith("none: ")
+    assert words in out
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (("real-fault", "--gains", "1", "2"), "four numbers"),
+        (("real-fault", "--controller", "cta", "--gains", "1", "2"), "4 gains"),
+        (("real-fault", "--controller", "cta", "--scheme", "none"), "scheme must be one of"),
+        (("real-fault", "--scheme", "compensated"), "runs in the scheme explicit"),
         (("real-fault", "--step", "0"), "step must be positive"),
         (("real-fault", "--step", "1e-300"), "step must be positive"),
         (("real-fault", "--gains", *GAINS, "--delay", "-1"), "delay"),

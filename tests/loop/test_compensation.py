@@ -10,8 +10,9 @@ from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop import ImplicitRoot, Power, compensated
-from quakedesign.loop.implicit_root import pulled
+from quakedesign.loop.implicit_root import pulled, root_of
 from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.synthesis.guaranteed.implicit_pull import implicit_pull
 
 STEP, AUTHORITY, WEIGHT = F("0.184"), F("2.25e-8"), F("0.3")
 GAIN = STEP * AUTHORITY
@@ -74,3 +75,19 @@ def test_floats_of_a_sum_of_powers():
 def test_impossible_weights_and_gains_are_refused(weight, gain):
     with pytest.raises(ParameterError, match="compensated step"):
         compensated(ROOT, weight, gain)
+
+
+def test_roots_in_arrays_solve_their_equation():
+    """Away from the jump w − e2 + q vanishes; at the jump e1 + T·w is 0 and the sides of the sign differ in sign."""
+    law = control_law("cta").from_values(("7", "5", "2.3", "1.1"), scale="0.1", divisor=F(2353, 125000000000))
+    pull, step = implicit_pull(law, STEP, AUTHORITY), float(STEP)
+    random = np.random.default_rng(2)
+    e1, e2 = random.standard_normal((2, 400)) * 10.0 ** random.uniform(-8, 0, (2, 400))
+    w = root_of(pull, step, e1, e2)
+    held = np.abs(e1 + step * w) <= 4e-16 * np.abs(e1)
+    assert 40 < held.sum() < 360
+    residual = np.abs(w - e2 + pulled(pull, e1 + step * w, w))[~held & (w != 0)]
+    assert np.all((residual < 1e-9) | (np.abs(w[~held & (w != 0)]) < 1e-14))
+    sides = [w - e2 + pulled(pull, sign * np.full(400, 1e-300), w) for sign in (1, -1)]
+    assert np.all((sides[0] >= 0)[held])
+    assert np.all((sides[1] <= 0)[held])

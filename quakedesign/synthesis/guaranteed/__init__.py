@@ -3,6 +3,7 @@
 from quakedesign.arguments import check_arguments
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.answer import Answer, answer
+from quakedesign.synthesis.guaranteed.compensated import Compensation, compensated, design_compensated
 from quakedesign.synthesis.guaranteed.continuous import CLASSES, certified_peaks
 from quakedesign.synthesis.guaranteed.design import OBJECTIVES, design_held
 
@@ -10,9 +11,12 @@ __all__ = [
     "CLASSES",
     "OBJECTIVES",
     "Answer",
+    "Compensation",
     "WorstFound",
     "answer",
     "certified_peaks",
+    "compensated",
+    "design_compensated",
     "design_held",
     "worst_found",
 ]

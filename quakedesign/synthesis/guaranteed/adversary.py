@@ -9,11 +9,13 @@ import numpy as np
 from scipy.linalg import expm
 
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Task
-from quakedesign.loop import PeriodicLoop, Segment
+from quakedesign.loop import ImplicitRoot, PeriodicLoop, Segment
+from quakedesign.loop.implicit_root import root_of
 
 _PERIODS = 64
 _PIECES = 6
 _SWEEPS = 8
+_MANY, _FEW = 512, 2  # courses that switch after random times, and their sweeps: where the fault sticks, sweeps stall
 _COURSES = 24  # for each of the two outputs
 _SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
 _SEED = 7
@@ -41,10 +43,17 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64
     periods long; in continuous time a period is that of the fastest pole, 1/|λ|. With `sticks` the fault does not
     slide backward: friction holds it wherever the loop would, along the reference at its largest rate and at a
-    twentieth of that.
+    twentieth of that, and courses that switch after random times are tried as well. An implicit step ends where its
+    equation says, inside its lines or not.
     """
-    search = _Search(claim.task, claim.loop, sticks)
-    return WorstFound(slip_error=search.largest[0], slip_rate_error=search.largest[1])
+    root = claim.held.law.root if isinstance(claim, Guarantee) else None
+    searches = [_Search(claim.task, claim.loop, root, sticks, 2 * _COURSES)]
+    searches[0].follow(searches[0].random(), _SWEEPS)
+    if sticks:
+        searches.append(_Search(claim.task, claim.loop, root, sticks, _MANY))
+        searches[1].follow(searches[1].switching(), _FEW)
+    slip, rate = (max(search.largest[k] for search in searches) for k in (0, 1))
+    return WorstFound(slip_error=slip, slip_rate_error=rate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +67,13 @@ class _Pieces:
 
 
 class _Search:
-    """One run of sweeps; `largest` holds |e1| and |e2|."""
+    """Many courses at once; `largest` holds |e1| and |e2|."""
 
-    def __init__(self, task: Task, loop: PeriodicLoop, sticks: bool) -> None:
+    def __init__(self, task: Task, loop: PeriodicLoop, root: ImplicitRoot | None, sticks: bool, courses: int) -> None:
         self.limit = float(task.amplitude) if task.change is not None else None
         flow, inputs = _with_disturbance(task, loop)
-        self.size = len(flow)
+        self.size, self.root, self.step = len(flow), root, float(loop.period)
+        self.sudden = np.array([*loop.sampled.get("root", ()), *[0] * self.size], dtype=float)[: self.size]
         beta = [float(b) for b in task.beta]
         push = np.zeros(self.size)
         push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
@@ -73,7 +83,6 @@ class _Search:
         self.parts = [
             _pieces(vertices, inputs, _widened(s.jump, self.size), float(s.duration) / _PIECES) for s in segments
         ]
-        courses = 2 * _COURSES
         paces = np.where(np.arange(courses) // 2 % 2, 1, _SLOW)
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.allowed = np.ones((courses, len(vertices)), dtype=bool)
@@ -81,23 +90,36 @@ class _Search:
             half = len(vertices) // 2
             self.allowed[::2, :half] = self.allowed[1::2, half:] = False
         self.aim = np.zeros((courses, self.size))
-        self.aim[:_COURSES, 0] = self.aim[_COURSES:, 1] = 1
+        self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
+        self.steps = _PERIODS * len(self.parts) * _PIECES
         self.largest = (0.0, 0.0)
-        self._sweep()
 
-    def _sweep(self) -> None:
-        random = np.random.default_rng(_SEED)
-        steps = _PERIODS * len(self.parts) * _PIECES
-        costates = random.standard_normal((steps, *self.aim.shape)) * random.choice([1.0, 1e3], (1, *self.aim.shape))
-        for _ in range(_SWEEPS):
+    def follow(self, costates: np.ndarray, sweeps: int) -> None:
+        """Follow the maximum principle forward and backward."""
+        for _ in range(sweeps):
             chosen, held = self._forward(costates)
             costates = self._backward(chosen, held)
+
+    def random(self) -> np.ndarray:
+        """Costates that change at every step."""
+        random = np.random.default_rng(_SEED)
+        found = random.standard_normal((self.steps, *self.aim.shape))
+        return found * random.choice([1.0, 1e3], (1, *self.aim.shape))
+
+    def switching(self) -> np.ndarray:
+        """Costates of the slip-rate error that change sign after random times."""
+        random, courses = np.random.default_rng(_SEED), len(self.aim)
+        flips = np.cumsum(random.random((self.steps, courses)) < 10 ** random.uniform(-2.5, 0, courses), axis=0)
+        found = np.zeros((self.steps, *self.aim.shape))
+        found[:, :, 1] = 1 - 2 * ((flips + random.integers(2, size=courses)) % 2)
+        return found
 
     def _forward(self, costates: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
         state, chosen, held = np.zeros_like(self.aim), [], []
         for number, costate in enumerate(costates):
             part = self.parts[number // _PIECES % len(self.parts)]
-            state = state @ part.jump.T if number % _PIECES == 0 else state
+            if number % _PIECES == 0:
+                state = state @ part.jump.T + self._beside_the_line(state, number)
             ahead = np.einsum("vij,cj->cvi", part.steps, state)
             push = np.einsum("vij,ci->cvj", part.added, costate)
             gain = np.einsum("cvi,ci->cv", ahead, costate) + np.abs(push).sum(axis=2)
@@ -110,6 +132,13 @@ class _Search:
             slip, rate = np.abs(state[:, :2]).max(axis=0)
             self.largest = max(self.largest[0], float(slip)), max(self.largest[1], float(rate))
         return chosen, held
+
+    def _beside_the_line(self, state: np.ndarray, number: int) -> np.ndarray | float:
+        """What the true end of an implicit step adds to that of the nominal loop."""
+        if self.root is None or number // _PIECES % len(self.parts):
+            return 0.0
+        line = float(self.root.middle) / self.step * state[:, 0]
+        return np.outer(root_of(self.root.pull, self.step, state[:, 0], state[:, 1]) + line, self.sudden)
 
     def _held(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
         """Keep every state where it can be; mask of what is held there."""

@@ -1,19 +1,21 @@
 """What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, Task, guarantee, task_of
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
-from quakedesign.controllers import control_law
+from quakedesign.controllers import SlidingMode, control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.loop import LinearLaw, summed_integrals
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
+from quakedesign.synthesis.guaranteed.compensated import Compensation
 from quakedesign.synthesis.guaranteed.continuous import CLASSES
 from quakedesign.synthesis.guaranteed.design import design_held
+from quakedesign.synthesis.guaranteed.sliding import GUARANTEED, sliding_mode
 
 _SHORTER = Fraction(4, 5)
 _TRIALS = 24
@@ -31,6 +33,8 @@ class Answer:
         Of a search on the same loop; None without a guarantee.
     shorter : Guarantee or None
         For a design without a guarantee at its step: one near the longest step that has one.
+    compensation : Compensation or None
+        Gains, scale and settings of a sliding mode that runs in the scheme ``compensated``.
     """
 
     fault: Fault
@@ -38,6 +42,7 @@ class Answer:
     worst: WorstFound | None = None
     worst_with_stick: WorstFound | None = None
     shorter: Guarantee | None = None
+    compensation: Compensation | None = None
 
     @property
     def proved(self) -> bool:
@@ -52,6 +57,8 @@ class Answer:
                 said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             return said
         said = [f"proved: {self.found.sentence()}"]
+        if self.compensation is not None:
+            said.append(self.compensation.sentence())
         for name, seen in (("worst found", self.worst), ("worst found with stick", self.worst_with_stick)):
             if seen is not None:
                 said.append(
@@ -103,6 +110,7 @@ class Answer:
             "limit": _limit(self.limit),
             "step": str(self.found.held.step),
             "law": _law(self.found.held.law),
+            **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
 
 
@@ -112,22 +120,26 @@ def answer(
     controller: str = "elqr",
     gains: tuple[str, ...] = (),
     objective: str = "tracking",
+    scheme: str | None = None,
     step: Fraction | None = None,
     delay: Fraction = Fraction(0),
     lag: Fraction = Fraction(0),
     disturbance_class: str = "amplitude",
 ) -> Answer:
-    """Guarantee of given e-LQR gains with summed integrals, or of a law that is designed for it.
+    """Guarantee of given e-LQR gains with summed integrals, of a law that is designed for it, or of a sliding mode.
 
     Parameters
     ----------
     fault : Fault
     controller : str
-        ``elqr``; no other law has an analysis under a held pressure yet.
+        ``elqr``, or a sliding mode, ``cta`` or ``dia``.
     gains : tuple of str
-        k1 … k4 of the e-LQR, run by the scheme ``explicit``; none to design a law with a disturbance estimate.
+        k1 … k4 of the e-LQR, run by the scheme ``explicit``; none to design a law with a disturbance estimate. Base
+        gains of a sliding mode; none for those that a design tries first.
     objective : str
         ``tracking`` or ``peak``, of a design.
+    scheme : str, optional
+        Of a sliding mode: ``compensated`` unless given, the only one with a guarantee; of the e-LQR ``explicit``.
     step : Fraction, optional
         T_s [s]; the fault's unless given.
     delay, lag : Fraction
@@ -145,12 +157,19 @@ def answer(
     if not Fraction(1, 10**9) <= period <= 10**9:
         raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")
     task = task_of(fault, rate_limited=disturbance_class == "rate")
-    if control_law(controller).loop_field().domain != "reals":
-        reason = f"no analysis of {controller} under a held pressure is known here. Use --controller elqr"
-        return Answer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
+    law = control_law(controller)
+    if issubclass(law, SlidingMode):
+        made = sliding_mode(
+            task, law, period, gains=gains, scheme=scheme or GUARANTEED, objective=objective, delay=delay, lag=lag
+        )
+        if isinstance(made, NoGuarantee):
+            return Answer(fault=fault, found=made)
+        return replace(_with_worst(fault, made.found), compensation=made)
+    if scheme not in (None, "explicit"):
+        raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {scheme!r}. Leave it out.")
     if gains:
-        law = summed_integrals(_four(gains), period)
-        return _with_worst(fault, guarantee(task, Held(law=law, step=period, delay=delay, lag=lag)))
+        summed = summed_integrals(_four(gains), period)
+        return _with_worst(fault, guarantee(task, Held(law=summed, step=period, delay=delay, lag=lag)))
     found = design_held(task, period, objective=objective, delay=delay, lag=lag)
     if isinstance(found, Guarantee):
         return _with_worst(fault, found)
@@ -197,7 +216,10 @@ def _limit(limit: SmallestPeak | None) -> dict[str, str | None] | None:
 
 
 def _law(law: LinearLaw) -> dict[str, Any]:
+    root = law.root
+    lines = {} if root is None else {"slopes": [str(v) for v in root.slopes], "remainder": str(root.remainder)}
     return {
+        **lines,
         "states": list(law.states),
         "update": [[str(v) for v in row] for row in law.update],
         "measured": [[str(v) for v in row] for row in law.measured],

@@ -1,7 +1,7 @@
 """A simulator of a held loop that knows numbers only, and courses made to hurt it. NumPy; nothing of the package.
 
 The plant e1′ = e2, e2′ = s·e1 − w·e2 + β·b·p + φ is integrated by RK4 in small steps, many courses at once. The law is
-p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later.
+p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later; y = (e1, e2), or (e1, e2, w) with w by a rule.
 """
 
 from dataclasses import dataclass
@@ -24,6 +24,7 @@ class Held:
     step: float
     delay: float
     force: float
+    ends: object = None
 
 
 def middle(ends):
@@ -42,8 +43,9 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None):
     waiting, largest = [], np.zeros((2, courses))
     for k in range(periods * pieces):
         if k % pieces == 0:
-            waiting.append((k + late, held.b * (held.C @ z + held.D @ e)))
-            z = held.F @ z + held.G @ e
+            y = e if held.ends is None else np.vstack([e, held.ends(e[0], e[1])])
+            waiting.append((k + late, held.b * (held.C @ z + held.D @ y)))
+            z = held.F @ z + held.G @ y
         if waiting and waiting[0][0] == k:
             v = waiting.pop(0)[1]
         if kick is not None:
@@ -56,8 +58,9 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None):
         k1 = rate(e)
         k2 = rate(e + h / 2 * k1)
         k3 = rate(e + h / 2 * k2)
-        e = e + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(e + h * k3))
-        if back is not None:
+        before, e = e, e + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(e + h * k3))
+        if back is not None:  # a step that ends stuck: the slip rate falls evenly, none of it is backward
+            e[0] = np.where(e[1] < -back, before[0] + h / 2 * (before[1] - back), e[0])
             e[1] = np.maximum(e[1], -back)
         largest = np.maximum(largest, np.abs(e))
     return largest, e
@@ -68,10 +71,10 @@ def nominal(held):
     return lambda k, e, v: (middle(held.s), middle(held.w), middle(held.beta), 0.0)
 
 
-def responses(held, periods, pieces):
-    """e1 and e2 at the end of the last period after a unit kick at every earlier small step."""
+def responses(held, periods, pieces, size=1.0):
+    """e1 and e2 at the end of the last period after a kick at every earlier small step."""
     count = periods * pieces
-    _, end = run(held, periods, pieces, nominal(held), count, kick=lambda k: np.arange(count) == k)
+    _, end = run(held, periods, pieces, nominal(held), count, kick=lambda k: size * (np.arange(count) == k))
     return end
 
 

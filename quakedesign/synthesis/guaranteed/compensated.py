@@ -1,0 +1,213 @@
+"""A sliding mode in the scheme ``compensated``: scale, weight and authority chosen by what can be guaranteed."""
+
+from bisect import bisect_left
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import partial
+from itertools import product
+from typing import Any
+
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
+from quakedesign.certificates.guarantee.sector import holds
+from quakedesign.controllers import SlidingMode
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.loop import ImplicitRoot, Power
+from quakedesign.loop import compensated as compensated_law
+from quakedesign.synthesis.guaranteed.design import OBJECTIVES
+from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated
+from quakedesign.synthesis.guaranteed.implicit_pull import implicit_pull
+
+_WEIGHTS = tuple(Fraction(k, 20) for k in range(2, 11))
+_RATIOS = tuple(Fraction(k, 20) for k in range(17, 22))  # of B0 to the middle of the input gain
+_ROOM = Fraction(5, 4)  # share of the smallest peak that `tracking` may spend
+_SLOPES = tuple(Fraction(v) for v in ("1", "0.99", "0.97", "0.93", "0.88", "0.8", "0.7", "0.6"))
+_REMAINDERS = tuple(Fraction(v) for v in ("0", "0.02", "0.1"))  # of the slip-rate error of a deadbeat step
+_NEARLY = 2  # of these slopes are near enough to a deadbeat step for the choice of a scale
+_MARGIN = Fraction(21, 20)
+_DEADBEAT = ImplicitRoot(pull=(Power(factor=(Fraction(1), Fraction(1)), exponent=Fraction(0), argument="slip"),))
+_ROOTS = tuple(Fraction(f"{10 ** (k / 24):.1e}") for k in range(-48, 73))  # ρ of λ = ρ⁶
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Compensation:
+    """A sliding mode with the settings of its scheme, and what is guaranteed of both.
+
+    Attributes
+    ----------
+    controller : SlidingMode
+    weight, authority : Fraction
+        a [-] and B0 [m²/kg] of the scheme ``compensated``.
+    found : Guarantee or NoGuarantee
+    """
+
+    controller: SlidingMode
+    weight: Fraction
+    authority: Fraction
+    found: Guarantee | NoGuarantee
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Of the scheme ``compensated`` in `simulate`."""
+        return {"weight": float(self.weight), "authority": float(self.authority)}
+
+    def sentence(self) -> str:
+        """Settings for people, and how the step ends."""
+        law = self.controller
+        gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in law.gains.items())
+        settings = f"weight {float(self.weight):g} and B0 = {float(self.authority):.4g} m²/kg"
+        return (
+            f"{law.title} with {gains}, λ = {float(law.scale):.4g} and the divisor {float(law.divisor):.6g} m²/kg, in "
+            f"the scheme compensated with {settings}{self._end()}"
+        )
+
+    def _end(self) -> str:
+        if isinstance(self.found, NoGuarantee) or self.found.held.law.root is None:
+            return ""
+        root = self.found.held.law.root
+        low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
+        if low == high == 1 and not root.remainder:
+            return "; its implicit step is deadbeat, e1 + T_s·w = 0, for all errors that are claimed"
+        return (
+            f"; its implicit step ends at w = -γ·e1/T_s with γ from {low:.3g} to {high:.3g}, up to "
+            f"{UpperBound(root.remainder):.2g} m/s, for all errors that are claimed"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts."""
+        law = self.controller
+        return {
+            "scheme": "compensated",
+            "gains": {name: str(v) for name, v in law.gains.items()},
+            "scale": str(law.scale),
+            "divisor": str(law.divisor),
+            "weight": str(self.weight),
+            "authority": str(self.authority),
+        }
+
+
+def compensated(
+    task: Task,
+    controller: SlidingMode,
+    weight: Fraction,
+    authority: Fraction,
+    step: Fraction,
+    *,
+    delay: Fraction = Fraction(0),
+    lag: Fraction = Fraction(0),
+) -> Guarantee | NoGuarantee:
+    """Guarantee of given settings: the narrowest lines around the root, of a few, that close the circle.
+
+    Raises
+    ------
+    ParameterError
+        For a weight outside (0, 1], an authority or times that are not positive.
+    """
+    try:
+        pull = implicit_pull(controller, step, authority)
+    except UnsupportedError as error:
+        return NoGuarantee(reason=str(error), small_gain=None)
+    held = _held(ImplicitRoot(pull=pull), weight, authority, step, delay, lag)
+    first = guarantee(task, held)
+    deadbeat = estimated(task, held)
+    if isinstance(first, Guarantee) or deadbeat is None or isinstance(deadbeat.bounds, NoGuarantee):
+        return first
+    size = Fraction(deadbeat.bounds.slip_rate_error)
+    for share, slope in product(_REMAINDERS, _SLOPES):
+        root = ImplicitRoot(pull=pull, slopes=(slope, Fraction(1)), remainder=share * size)
+        wider = replace(held, law=replace(held.law, root=root))
+        near = estimated(task, wider)
+        if near is None or isinstance(near.bounds, NoGuarantee):
+            continue
+        errors = Fraction(near.bounds.slip_error), Fraction(near.bounds.slip_rate_error)
+        found = guarantee(task, wider) if holds(root, step, *errors) else None
+        if isinstance(found, Guarantee):
+            return found
+    return first
+
+
+def design_compensated(
+    task: Task,
+    controller: SlidingMode,
+    step: Fraction,
+    *,
+    objective: str = "tracking",
+    delay: Fraction = Fraction(0),
+    lag: Fraction = Fraction(0),
+) -> Compensation:
+    """Weight, authority and scale of a sliding mode with given base gains, chosen over certified bounds.
+
+    Where the sign of the slip error holds the root, the step is deadbeat, e1 + T_s·w = 0, whatever the gains. So weight
+    and authority are chosen for the deadbeat step, on a grid: ``peak`` for the smallest certified slip-rate error,
+    ``tracking`` for the smallest slip error under a disturbance that drifts, among those whose certified slip-rate
+    error is at most a quarter above the smallest. λ = ρ⁶ is then the smallest for which the step is deadbeat, or nearly
+    so, for all errors that are claimed.
+
+    Raises
+    ------
+    ParameterError
+    """
+    weight, authority, errors = _deadbeat(task, step, objective, delay, lag)
+    law = controller
+    try:
+        if errors is not None:
+            law = controller.scaled(_scale(controller, authority, step, errors))
+    except UnsupportedError as error:
+        return Compensation(
+            controller=law, weight=weight, authority=authority, found=NoGuarantee(reason=str(error), small_gain=None)
+        )
+    found = compensated(task, law, weight, authority, step, delay=delay, lag=lag)
+    return Compensation(controller=law, weight=weight, authority=authority, found=found)
+
+
+def _deadbeat(
+    task: Task, step: Fraction, objective: str, delay: Fraction, lag: Fraction
+) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
+    """Weight and authority for a deadbeat step, and the errors that it leaves, if it has a guarantee."""
+    if objective not in OBJECTIVES:
+        raise ParameterError(f"objective must be one of {', '.join(OBJECTIVES)}. Received {objective!r}.")
+    worst, seen = replace(task, change=None), dict[tuple[Fraction, Fraction], Estimate]()
+    for weight, ratio in product(_WEIGHTS, _RATIOS):
+        choice = weight, _short(ratio * task.model.gain)
+        found = estimated(worst, _held(_DEADBEAT, *choice, step, delay, lag))
+        if found is not None and isinstance(found.bounds, Bounds):
+            seen[choice] = found
+    if not seen:
+        return _WEIGHTS[0], _short(task.model.gain), None
+    peaks = {choice: float(_bounds(found).slip_rate_error) for choice, found in seen.items()}
+    least = min(peaks, key=lambda choice: peaks[choice])
+    if objective == "tracking":
+        allowed = [choice for choice in seen if peaks[choice] <= _ROOM * peaks[least]]
+        least = min(allowed, key=lambda choice: seen[choice].drift_gain)
+    bounds = _bounds(seen[least])
+    return *least, (Fraction(bounds.slip_error), Fraction(bounds.slip_rate_error))
+
+
+def _scale(controller: SlidingMode, authority: Fraction, step: Fraction, errors: tuple[Fraction, Fraction]) -> Fraction:
+    """Smallest λ of a ladder for which the step is deadbeat, or nearly, for errors of a size and a little more."""
+    slip, rate = (_MARGIN * v for v in errors)
+
+    def deadbeat(slope: Fraction, root: Fraction) -> bool:
+        pull = implicit_pull(controller.scaled(root**6), step, authority)
+        return holds(ImplicitRoot(pull=pull, slopes=(slope, Fraction(1))), step, slip, rate)
+
+    for slope in _SLOPES[:_NEARLY]:
+        index = bisect_left(_ROOTS, True, key=partial(deadbeat, slope))
+        if index < len(_ROOTS):
+            return _ROOTS[index] ** 6
+    return controller.scale
+
+
+def _held(
+    root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, delay: Fraction, lag: Fraction
+) -> Held:
+    return Held(law=compensated_law(root, weight, step * authority), step=step, delay=delay, lag=lag)
+
+
+def _bounds(found: Estimate) -> Bounds:
+    assert isinstance(found.bounds, Bounds)
+    return found.bounds
+
+
+def _short(value: Fraction) -> Fraction:
+    return Fraction(f"{float(value):.3e}")
