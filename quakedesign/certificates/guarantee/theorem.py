@@ -136,7 +136,7 @@ def certified_bounds(task: Task, loop: PeriodicLoop, root: ImplicitRoot | None =
 def bounds_from(
     task: Task, gains: Mapping[tuple[str, str], tuple[Any, ...]], root: ImplicitRoot | None, step: Fraction
 ) -> Bounds | NoGuarantee:
-    """Bounds of the theorem from the gains of the nominal loop; of floats, floats."""
+    """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
     channels = (*channels_of(task, root, step), *_fed_forward(task, {name for _, name in gains}))
     loops = [
         [
@@ -156,10 +156,10 @@ def bounds_from(
         for y in OUTPUTS
     }
     return Bounds(
-        slip_error=found["slip_error"],
-        slip_rate_error=found["slip_rate_error"],
-        push=found["push"] + _unshifted(task),
-        small_gain=small_gain,
+        slip_error=Fraction(found["slip_error"]),
+        slip_rate_error=Fraction(found["slip_rate_error"]),
+        push=Fraction(found["push"] + _unshifted(task)),
+        small_gain=Fraction(small_gain),
     )
 
 

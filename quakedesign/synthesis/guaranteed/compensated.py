@@ -112,15 +112,15 @@ def compensated(
     deadbeat = estimated(task, held)
     if isinstance(first, Guarantee) or deadbeat is None or isinstance(deadbeat.bounds, NoGuarantee):
         return first
-    size = Fraction(deadbeat.bounds.slip_rate_error)
+    size = deadbeat.bounds.slip_rate_error
     for share, slope in product(_REMAINDERS, _SLOPES):
         root = ImplicitRoot(pull=pull, slopes=(slope, Fraction(1)), remainder=share * size)
         wider = replace(held, law=replace(held.law, root=root))
         near = estimated(task, wider)
         if near is None or isinstance(near.bounds, NoGuarantee):
             continue
-        errors = Fraction(near.bounds.slip_error), Fraction(near.bounds.slip_rate_error)
-        found = guarantee(task, wider) if holds(root, step, *errors) else None
+        within = holds(root, step, near.bounds.slip_error, near.bounds.slip_rate_error)
+        found = guarantee(task, wider) if within else None
         if isinstance(found, Guarantee):
             return found
     return first
@@ -180,7 +180,7 @@ def _deadbeat(
         allowed = [choice for choice in seen if peaks[choice] <= _ROOM * peaks[least]]
         least = min(allowed, key=lambda choice: seen[choice].drift_gain)
     bounds = _bounds(seen[least])
-    return *least, (Fraction(bounds.slip_error), Fraction(bounds.slip_rate_error))
+    return *least, (bounds.slip_error, bounds.slip_rate_error)
 
 
 def _scale(controller: SlidingMode, authority: Fraction, step: Fraction, errors: tuple[Fraction, Fraction]) -> Fraction:
