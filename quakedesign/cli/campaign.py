@@ -37,7 +37,7 @@ def campaign(
     gains: Gains = ("published",),
     scale: str | None = None,
     feedforward: str = "none",
-    scheme: str = "explicit",
+    scheme: str | None = None,
     step: Seconds | None = None,
     substeps: Whole = 1,
     method: str = "dormand-prince",
@@ -80,7 +80,7 @@ def campaign(
     feedforward
         none, nominal or centred.
     scheme
-        explicit, implicit, semi-implicit or compensated (sampled control), or continuous.
+        explicit (unless given), implicit, semi-implicit or compensated (sampled control), or continuous.
     step
         Length of one step; the fault's sampling time unless given.
     substeps
@@ -124,16 +124,18 @@ def campaign(
     from quakedesign.simulation import perturbation as read_perturbation
     from quakedesign.simulation.campaign import campaign_problem, run_campaign
     from quakedesign.simulation.run import sampled_scheme
+    from quakedesign.simulation.schemes import own_way
 
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
     found = load_fault(fault, box=box)
-    period = found.sampling_time if step is None else step
     law = optional_choice(found, controller, gains, scale=scale, feedforward=feedforward)
+    way, step = own_way(law.controller if law else None, scheme, step)
+    period = found.sampling_time if step is None else step
     problem = campaign_problem(
         found,
         law.controller if law else None,
-        scheme=sampled_scheme(scheme, substeps, actuator.build(period), sensors.build(period)),
+        scheme=sampled_scheme(way, substeps, actuator.build(period), sensors.build(period)),
         step=step,
         method=method,
         duration=duration,

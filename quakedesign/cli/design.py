@@ -1,12 +1,48 @@
 """The main job."""
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from quakedesign.cli.shared import Force, Json, app, console, print_json, print_lines, progress
 from quakedesign.errors import ParameterError, UnknownNameError
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class LinearOptions:
+    """How the e-LQR is designed.
+
+    Parameters
+    ----------
+    objective
+        Of the e-LQR: tracking, or peak for the smallest guaranteed slip-rate error.
+    continuous
+        Design the e-LQR in continuous time, as in the paper, in place of the loop that samples and holds.
+    """
+
+    objective: Literal["tracking", "peak"] = "tracking"
+    continuous: Annotated[bool, Parameter(negative="")] = False
+
+    def told(self, names: list[str]) -> dict[str, Any]:
+        """Options of `quakedesign.design`, for laws that have them.
+
+        Raises
+        ------
+        ParameterError
+            When no e-LQR is designed.
+        """
+        if self != LinearOptions() and "elqr" not in names:
+            raise ParameterError(
+                f"--continuous and --objective are for the e-LQR. Received --controller {', '.join(names)}. "
+                "Leave them out."
+            )
+        return asdict(self)
+
+
+_AS_USUAL = LinearOptions()
 
 
 @app.command
@@ -16,8 +52,8 @@ def design(
     *,
     controller: str = "all",
     box: str | None = None,
-    held: Annotated[bool, Parameter(negative="")] = False,
-    scheme: str = "continuous",
+    linear: LinearOptions = _AS_USUAL,
+    scheme: str | None = None,
     published_scheme: str = "continuous",
     out: Path | None = None,
     force: Force = False,
@@ -25,8 +61,8 @@ def design(
 ) -> int:
     """Derive, synthesise, prove, simulate, compare with the published gains, and write a report.
 
-    Exit code 0 if every designed controller is proved, its premise along the reference holds, and its run is neither an
-    earthquake nor diverges nor opens the fault; 1 otherwise.
+    Exit code 0 if every designed controller is proved, for the fault's T_s, its premise along the reference holds, and
+    its run is neither an earthquake nor diverges nor opens the fault; 1 otherwise.
 
     Parameters
     ----------
@@ -36,11 +72,9 @@ def design(
         cta, dia, elqr or all.
     box
         Uncertainty box: paper or ten-percent.
-    held
-        Gains of the e-LQR that are proved with p held over the sampling time as well.
     scheme
-        Of the runs of designed gains: continuous, as in the paper, or sampled and held: explicit, implicit,
-        semi-implicit, compensated.
+        Of the runs of designed gains: continuous (unless given), as in the paper, or sampled and held: explicit,
+        implicit, semi-implicit, compensated. The e-LQR that samples runs as it was designed.
     published_scheme
         Of the runs of published gains.
     out
@@ -54,8 +88,7 @@ def design(
     from quakedesign.report.folder import prepare
 
     names = controllers(controller)
-    if held and "elqr" not in names:
-        raise ParameterError(f"--held is for the e-LQR. Received --controller {controller}. Leave it out.")
+    options = linear.told(names)
     found = load_fault(fault, box=box)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
@@ -64,7 +97,12 @@ def design(
 
     with progress() as tell:
         comparison = designed_comparison(
-            found, names, tell, held=held, scheme=scheme, published_scheme=published_scheme
+            found,
+            names,
+            tell,
+            linear=options,
+            scheme=scheme,
+            published_scheme=published_scheme,
         )
         results = write_folder(comparison, folder, force=force, tell=tell)
     if json:
@@ -93,7 +131,7 @@ def controllers(name: str) -> list[str]:
 
 def positive(comparison: Any) -> bool:
     """Whether every design is proved and its premises hold but for those on run and start, and its run is harmless."""
-    needed = {"along_reference", "control_coefficient", "friction_slope"}
+    needed = {"along_reference", "control_coefficient", "friction_slope", "sampling_time"}
     return all(
         str(entry.design.verdict) == "proved"
         and all(p.holds for p in entry.design.premises if p.name in needed)

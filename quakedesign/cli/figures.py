@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
-from quakedesign.cli.design import controllers, positive
+from quakedesign.cli.design import LinearOptions, controllers, positive
 from quakedesign.cli.shared import Force, Json, app, console, print_json, print_lines, progress
+
+_AS_USUAL = LinearOptions()
 
 
 @app.command
@@ -13,7 +15,8 @@ def compare(
     *,
     controller: str = "all",
     box: str | None = None,
-    scheme: str = "continuous",
+    linear: LinearOptions = _AS_USUAL,
+    scheme: str | None = None,
     published_scheme: str = "continuous",
     json: Json = False,
 ) -> int:
@@ -31,8 +34,8 @@ def compare(
     box
         Uncertainty box: paper or ten-percent.
     scheme
-        Of the runs of designed gains: continuous, as in the paper, or sampled and held: explicit, implicit,
-        semi-implicit, compensated.
+        Of the runs of designed gains: continuous (unless given), as in the paper, or sampled and held: explicit,
+        implicit, semi-implicit, compensated. The e-LQR that samples runs as it was designed.
     published_scheme
         Of the runs of published gains.
     json
@@ -44,8 +47,11 @@ def compare(
     from quakedesign.report.numbers import printed, printed_lines, table
 
     names, found = controllers(controller), load_fault(fault, box=box)
+    options = linear.told(names)
     with progress() as tell:
-        comparison = designed_comparison(found, names, tell, scheme=scheme, published_scheme=published_scheme)
+        comparison = designed_comparison(
+            found, names, tell, linear=options, scheme=scheme, published_scheme=published_scheme
+        )
     if json:
         beside = {"numbers": table(comparison), "printed": printed(comparison)}
         print_json({**results(comparison, stored=False), **beside})
@@ -64,7 +70,8 @@ def figures(
     *,
     controller: str = "all",
     box: str | None = None,
-    scheme: str = "continuous",
+    linear: LinearOptions = _AS_USUAL,
+    scheme: str | None = None,
     published_scheme: str = "continuous",
     out: Path | None = None,
     force: Force = False,
@@ -83,8 +90,8 @@ def figures(
     box
         Uncertainty box: paper or ten-percent.
     scheme
-        Of the runs of designed gains: continuous, as in the paper, or sampled and held: explicit, implicit,
-        semi-implicit, compensated.
+        Of the runs of designed gains: continuous (unless given), as in the paper, or sampled and held: explicit,
+        implicit, semi-implicit, compensated. The e-LQR that samples runs as it was designed.
     published_scheme
         Of the runs of published gains.
     out
@@ -98,6 +105,7 @@ def figures(
     from quakedesign.report.folder import prepare, write_folder
 
     names, found = controllers(controller), load_fault(fault, box=box)
+    options = linear.told(names)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
@@ -106,7 +114,9 @@ def figures(
     from quakedesign.report.paper_study import paper_study
 
     with progress() as tell:
-        comparison = designed_comparison(found, names, tell, scheme=scheme, published_scheme=published_scheme)
+        comparison = designed_comparison(
+            found, names, tell, linear=options, scheme=scheme, published_scheme=published_scheme
+        )
         study = paper_study(comparison, progress=tell)
         results = write_folder(comparison, folder, force=force, study=study, tell=tell)
     if json:

@@ -35,7 +35,7 @@ def simulate(
     feedforward: str = "none",
     step: Seconds | None = None,
     duration: Seconds | None = None,
-    scheme: str = "continuous",
+    scheme: str | None = None,
     substeps: Whole = 1,
     method: str = "dormand-prince",
     plant: str = "smooth",
@@ -69,8 +69,8 @@ def simulate(
     duration
         The operation time unless given. Without a controller: the fault under its own disturbance.
     scheme
-        continuous (the law in every stage of the integrator), or sampled and held: explicit, implicit, semi-implicit,
-        compensated.
+        continuous (unless given; the law in every stage of the integrator), or sampled and held: explicit, implicit,
+        semi-implicit, compensated. The designed e-LQR is sampled and has its own.
     substeps
         Steps of the integrator per sample.
     method
@@ -94,11 +94,13 @@ def simulate(
     from quakedesign.report.single import optional_choice, run_single
     from quakedesign.simulation import Load
     from quakedesign.simulation import perturbation as read_perturbation
+    from quakedesign.simulation.schemes import own_way
 
     new_file(out, "output file", force=force)
     found = load_fault(fault)
     law = optional_choice(found, controller, gains, scale=scale, feedforward=feedforward)
     pushed = None if perturbation is None else read_perturbation(perturbation)
+    way, step = own_way(law.controller if law else None, scheme, step, "continuous")
     period = found.sampling_time if step is None else step
     chain, told = actuator.build(period), sensors.build(period, seed)
     with progress() as tell:
@@ -109,7 +111,7 @@ def simulate(
             duration=duration,
             load=Load(drift=drift, perturbation=pushed) if drift or pushed is not None else None,
             step=step,
-            scheme=scheme,
+            scheme=way,
             method=method,
             plant=plant,
             substeps=substeps,
@@ -207,7 +209,11 @@ def sampling(
     prepare(folder, force=force)
     with progress() as tell:
         tell("gains", 0.0)
-        law = design(found, controller) if gains == DESIGNED else chosen_controller(found, controller, gains)
+        law = (
+            design(found, controller, continuous=controller == "elqr")
+            if gains == DESIGNED
+            else chosen_controller(found, controller, gains)
+        )
         report = sampling_report(found, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
         results = write_sampling(report, folder)
     if json:
@@ -228,7 +234,7 @@ def export(
     scale: str | None = None,
     feedforward: str = "none",
     step: Seconds | None = None,
-    scheme: str = "explicit",
+    scheme: str | None = None,
     sensors: EstimateOptions = _TOLD,
     out: Path | None = None,
     force: Force = False,
@@ -251,7 +257,7 @@ def export(
     step
         Sampling period; the fault's unless given.
     scheme
-        explicit, implicit, semi-implicit or compensated.
+        explicit (unless given), implicit, semi-implicit or compensated.
     out
         Folder to write; ./quakedesign-FAULT-CONTROLLER unless given.
     force

@@ -190,6 +190,11 @@ class Controller(Law):
 
     integral_units: ClassVar[tuple[str, ...]]
 
+    @property
+    def sampling_time(self) -> float | None:
+        """T_s [s] of a law of samples, which runs at that T_s by the scheme ``explicit``; None in continuous time."""
+        return None
+
     @abstractmethod
     def pressure(self, signals: Signals) -> sp.Expr:
         """Fluid pressure p [Pa] that the law asks for."""

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import sympy as sp
@@ -22,16 +24,34 @@ class SampledController(Controller):
     law : LinearLaw
     step : Fraction
         T_s [s] for which it is meant.
+    gains : mapping of str to Fraction
+        Read off the law: p = −k1·e1 − k2·e2 − Σ gain·state, every state under its name.
     """
 
     name: ClassVar[str] = "sampled"
-    title: ClassVar[str] = "sampled law"
+    title: ClassVar[str] = "e-LQR"
     source: ClassVar[str] = "quakedesign.loop.laws"
-    gain_units: ClassVar[Mapping[str, str]] = {}
 
-    gains: Mapping[str, Fraction] = field(default_factory=dict)
+    gains: Mapping[str, Fraction] = field(default_factory=dict, init=False)
     law: LinearLaw
     step: Fraction
+
+    def __post_init__(self) -> None:
+        values = (-v for v in (*self.law.feedback, *self.law.output))
+        object.__setattr__(self, "gains", MappingProxyType(dict(zip(self.gain_units, values, strict=True))))
+
+    def __reduce__(self) -> tuple[Any, tuple[()]]:
+        return partial(type(self), law=self.law, step=self.step), ()
+
+    @property
+    def sampling_time(self) -> float:
+        """T_s [s]."""
+        return float(self.step)
+
+    @property
+    def gain_units(self) -> Mapping[str, str]:  # type: ignore[override]
+        """Of a state: Pa per its own unit."""
+        return {"k1": "Pa/m", "k2": "Pa s/m", **dict.fromkeys(self.law.states, "Pa")}
 
     @property
     def integral_units(self) -> tuple[str, ...]:  # type: ignore[override]

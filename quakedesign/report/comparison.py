@@ -11,13 +11,13 @@ from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import Variant, certified_lipschitz
 from quakedesign.controllers import SlidingMode, published
 from quakedesign.fault import Fault, require_fault
-from quakedesign.report.headlines import AS_IN_THE_PAPER, headline
+from quakedesign.report.headlines import AS_IN_THE_PAPER, headline, said
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate, simulation_scheme
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis import Design, assess
 from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.analysis.sampling_time import largest_sampling_time, on_trajectory
-from quakedesign.synthesis.guaranteed import CLASSES
+from quakedesign.synthesis.guaranteed import CLASSES, Answer, attacked
 from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
 from quakedesign.synthesis.linear.sampled.held import HeldLoop
 
@@ -47,8 +47,8 @@ class Entry:
         For a linear law: what is decided when p is held over T_s, see `Design.held_loop`.
     peaks : mapping of str to ContinuousPeaks
         For a designed linear law that is proved: peaks in continuous time by class; no class without any.
-    guarantee : Guarantee or NoGuarantee or None
-        For a designed law: what is proved of it with p held over T_s, see `Design.guarantee`.
+    answer : Answer or None
+        For a designed law: what is guaranteed of it with p held over T_s, see `Design.guarantee`, and the worst found.
     """
 
     label: str
@@ -60,12 +60,19 @@ class Entry:
     variants: tuple[Variant, ...] = ()
     held: HeldLoop | None = None
     peaks: Mapping[str, ContinuousPeaks] = field(default_factory=dict)
-    guarantee: Guarantee | NoGuarantee | None = None
+    answer: Answer | None = None
+
+    @property
+    def guarantee(self) -> Guarantee | NoGuarantee | None:
+        """Of the loop with p held over T_s."""
+        return self.answer.found if self.answer else None
 
     def to_dict(self) -> dict[str, Any]:
         """Keys of DESIGN.md; exact quantities as texts, measured ones as numbers, SI."""
         found = self.design
         return {
+            "guarantee": self.guarantee.sentence() if self.guarantee else None,
+            "guaranteed": self.answer.to_dict() | {"certificate": None} if self.answer else None,
             "outcome": self.run.outcome.to_dict() if self.run else None,
             "gains": {name: str(v) for name, v in found.gains.items()},
             "verdict": str(found.verdict),
@@ -76,7 +83,6 @@ class Entry:
             "headline": headline(self),
             "largest_sampling_time": self.largest_step,
             "growth_per_step": self.growth_per_step,
-            "guarantee": self.guarantee.sentence() if self.guarantee else None,
             "held": self.held.to_dict() if self.held else None,
             "peaks": {name: found.to_dict() for name, found in self.peaks.items()} or None,
             "details": dict(found.details),
@@ -127,7 +133,7 @@ class Comparison:
         return figures(self)
 
     def __repr__(self) -> str:
-        return "\n".join((f"Comparison on {self.fault.name}:", *(f"  {e.label}: {headline(e)}" for e in self.entries)))
+        return "\n".join((f"Comparison on {self.fault.name}:", *(f"  {e.label}: {said(e)}" for e in self.entries)))
 
     def _repr_html_(self) -> str:
         from quakedesign.report.page import table_html
@@ -140,7 +146,7 @@ def compare(
     designs: Sequence[Design] = (),
     *,
     with_published: bool = True,
-    scheme: str = AS_IN_THE_PAPER,
+    scheme: str | None = None,
     published_scheme: str | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Comparison:
@@ -154,8 +160,8 @@ def compare(
     with_published : bool
         Add the paper's gains, where the fault has any, with their verdicts and premises.
     scheme, published_scheme : str
-        Of the runs of designed and of published gains, see `quakedesign.simulation.schemes`; the latter ``continuous``,
-        as in the paper, unless given. Labels tell them apart where they differ.
+        Of the runs of designed and of published gains, see `quakedesign.simulation.schemes`; ``continuous``, as in the
+        paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed.
     progress : callable, optional
         Called with what is being done and the fraction done [-].
 
@@ -165,7 +171,7 @@ def compare(
     """
     require_fault(fault)
     tell = progress or (lambda _what, _done: None)
-    schemes = {"designed": scheme, "published": published_scheme or AS_IN_THE_PAPER}
+    schemes = {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}
     for name in schemes.values():
         simulation_scheme(name)
     tell("uncontrolled", 0.0)
@@ -174,14 +180,22 @@ def compare(
     for controller in published(fault.name).values() if with_published else ():
         tell(f"{controller.title} (published): verdict", 0.0)
         entries.append(_entry("published", assess(fault, controller), schemes, tell))
-    entries.extend(replace(_entry("designed", found, schemes, tell), guarantee=found.guarantee) for found in designs)
+    for found in designs:
+        entry = _entry("designed", found, schemes, tell)
+        tell(f"{entry.label}: worst cases", 0.0)
+        entries.append(replace(entry, answer=attacked(fault, found.guarantee)))
     return Comparison(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
 
 
 def designed_comparison(
-    fault: Fault, names: Iterable[str], tell: Callable[[str, float], None], *, held: bool = False, **schemes: Any
+    fault: Fault,
+    names: Iterable[str],
+    tell: Callable[[str, float], None],
+    *,
+    linear: Mapping[str, Any] | None = None,
+    **schemes: Any,
 ) -> Comparison:
-    """Comparison of a fault's designs of the named laws (the e-LQR `held` or not) and the published gains.
+    """Comparison of a fault's designs of the named laws and the published gains.
 
     Parameters
     ----------
@@ -189,7 +203,8 @@ def designed_comparison(
     names : iterable of str
     tell : callable
         Progress.
-    held : bool
+    linear : mapping, optional
+        ``objective`` and ``continuous`` of an e-LQR.
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """
@@ -198,18 +213,21 @@ def designed_comparison(
     designs, wanted = [], list(names)
     for i, name in enumerate(wanted):
         tell(f"synthesis and proof of {name}", i / len(wanted))
-        designs.append(synthesise(fault, name, held=held and name == "elqr"))
+        designs.append(synthesise(fault, name, **(linear or {} if name == "elqr" else {})))
     return compare(fault, designs, progress=tell, **schemes)
 
 
 def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Callable[[str, float], None]) -> Entry:
-    scheme = schemes[origin]
+    sampled = design.controller is not None and design.controller.sampling_time is not None
+    scheme = "explicit" if sampled else schemes[origin]
     differ = len(set(schemes.values())) > 1
     label = f"{design.title} ({origin}, {scheme})" if differ else f"{design.title} ({origin})"
     if design.controller is None:
         return Entry(label=label, origin=origin, design=design, run=None)
     run = simulate(design.fault, design.controller, scheme=scheme, progress=lambda done: tell(label, done))
     continuous = scheme == AS_IN_THE_PAPER
+    if sampled:
+        return Entry(label=label, origin=origin, design=design, run=run)
     if not isinstance(design.controller, SlidingMode):
         poles = vertex_poles(sectors(design.fault), list(design.controller.gains.values()))
         growth = amplification(poles, run.provenance["step"], run.provenance["method"]) if continuous else None

@@ -6,9 +6,11 @@ from typing import Any
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
 from quakedesign.report.estimation import differentiator_premise, sensor
-from quakedesign.simulation import export_controller, simulation_scheme
+from quakedesign.simulation import export_controller
 from quakedesign.simulation.export import HEADER, SOURCE
 from quakedesign.simulation.measurement import EXACT
+from quakedesign.simulation.run import sampled_scheme
+from quakedesign.simulation.schemes import own_way
 from quakedesign.simulation.sensing import OutputFeedback
 
 
@@ -18,7 +20,7 @@ def export_answer(
     folder: Path,
     *,
     step: float | None = None,
-    scheme: str = "explicit",
+    scheme: str | None = None,
     differentiator_bound: float | None = None,
     filter_order: int = 0,
     averaging: int = 1,
@@ -30,7 +32,8 @@ def export_answer(
     ----------
     fault, law, folder, step, force
         As in `quakedesign.simulation.export_controller`.
-    scheme : str
+    scheme : str, optional
+        ``explicit`` unless given.
     differentiator_bound : float, optional
         λ_d [m/s²] of a differentiator with n_d = 1; the law then is told its estimates.
     filter_order : int
@@ -47,13 +50,14 @@ def export_answer(
     ------
     ParameterError, OutputError
     """
+    way, step = own_way(law, scheme, step)
     period = fault.sampling_time if step is None else step
     seen = sensor(period, EXACT, differentiator_bound, filter_order, averaging=averaging)
-    chosen = simulation_scheme(scheme, **({"measurement": seen} if seen.noisy else {}))
+    chosen = sampled_scheme(way, measurement=seen)
     found = export_controller(fault, law, folder, step=step, scheme=chosen, force=force)
     premises = []
     if isinstance(seen, OutputFeedback):
-        premises.append(differentiator_premise(fault, law, seen, scheme=scheme))
+        premises.append(differentiator_premise(fault, law, seen, scheme=chosen.name))
     files = [str(folder / name) for name in (HEADER, SOURCE)]
     return found.to_dict() | {"files": files, "premises": [p.to_dict() for p in premises]}
 

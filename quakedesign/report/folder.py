@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.certificates import certificate_text
-from quakedesign.certificates.guarantee.files import guarantee_text
+from quakedesign.certificates.guarantee import Guarantee
+from quakedesign.certificates.guarantee.files import guarantee_text, save_guarantee
 from quakedesign.errors import OutputError
 from quakedesign.output import require_room, whole_folder
 from quakedesign.report.comparison import Comparison
@@ -50,6 +51,10 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
             told = found[group][entry.design.name]
             if entry.design.certificate is not None:
                 told["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
+            if isinstance(entry.guarantee, Guarantee):
+                path = f"certificates/{entry.design.name}-guarantee.json"
+                told["guaranteed"]["certificate"] = path
+                told["certificate"] = told["certificate"] or path
             for kind in entry.peaks:
                 told["peaks"][kind]["certificate"] = f"certificates/{entry.design.name}-peaks-{kind}.json"
     found["versions"] = {package: version(package) for package in _PACKAGES}
@@ -137,6 +142,8 @@ def _fill(
         if entry.design.certificate is not None:
             path = folder / "certificates" / _file(entry.origin, entry.design.name)
             path.write_text(certificate_text(entry.design.certificate), encoding="utf-8")
+        if isinstance(entry.guarantee, Guarantee):
+            save_guarantee(entry.guarantee, folder / "certificates" / f"{entry.design.name}-guarantee.json")
         for kind, peaks in entry.peaks.items():
             path = folder / "certificates" / f"{entry.design.name}-peaks-{kind}.json"
             path.write_text(guarantee_text(peaks), encoding="utf-8")

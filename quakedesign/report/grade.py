@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
+from quakedesign.certificates.guarantee import Guarantee
 from quakedesign.certificates.premise import Premise
 from quakedesign.rationals import rational
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
 """Premises of a linear law's stability that its certified peaks do without."""
 GRADES = (
+    "guaranteed: the slip rate that the loop as it ran never exceeds, and how far its slip stays from the reference; "
     "proved for this loop and task: every premise holds in the run that is shown; proved, but …: what the proof does "
     "not cover, and how many times over"
 )
@@ -20,11 +22,23 @@ GRADES = (
 
 def grade(entry: "Entry") -> str:
     """Verdict on one controller, and what of its loop and task the proof leaves out."""
+    if isinstance(entry.guarantee, Guarantee):
+        return f"{_guaranteed(entry.guarantee)}{_unmet(entry)}"
     if entry.design.verdict is not Verdict.PROVED:
         return str(entry.design.verdict)
     missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _held(entry)
     reach = f"proved, but {'; '.join(missing)}" if missing else "proved for this loop and task"
     return f"{reach}; UNSTABLE if p is held over T_s" if _unstable_if_held(entry) else reach
+
+
+def _guaranteed(found: Guarantee) -> str:
+    claims = found.claims
+    return f"guaranteed: slip rate <= {claims.peak_slip_rate:.3g} m/s, slip error <= {claims.slip_error:.3g} m"
+
+
+def _unmet(entry: "Entry") -> str:
+    failing = [_failing(p) for p in entry.design.premises if not p.holds]
+    return f", but {'; '.join(failing)}" if failing else ""
 
 
 def _unstable_if_held(entry: "Entry") -> bool:

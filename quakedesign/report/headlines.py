@@ -1,8 +1,10 @@
 """What is said of a comparison: outcome and verdict of every controller with what breaks it, domains, schemes."""
 
 from collections.abc import Iterable
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premises import Domain, Variant
 from quakedesign.report.linear import held_sentence, peaks_sentence
@@ -16,13 +18,39 @@ AS_IN_THE_PAPER = "continuous"
 """Scheme of the paper's simulations."""
 
 
+def guarantee_lines(entry: "Entry") -> list[str]:
+    """What is guaranteed of the loop as it runs, the worst found and what no controller can do; for designed laws."""
+    if entry.answer is None:
+        return []
+    asked = entry.design.details.get("reason") if entry.answer.proved else None
+    fault = entry.design.fault
+    too_long = [f"T_s = {fault.sampling_time:g} s is too long ({asked}): designed for a shorter one"] if asked else []
+    first, *rest = entry.answer.lines()
+    return [*too_long, f"guarantee: {first.removeprefix('proved: ')}", *rest, *_reach(entry)]
+
+
+def _reach(entry: "Entry") -> list[str]:
+    """How long T_s and a delay may be for designs of the same kind."""
+    certified = {p.name: p.certified for p in entry.design.premises if p.name in ("sampling_time", "delay")}
+    if not certified:
+        return []
+    step, delay = (f"{LowerBound(Fraction(certified[name])):.3g} s" for name in ("sampling_time", "delay"))
+    return [f"designs with a guarantee were found for T_s up to {step}, and at the T_s above for delays up to {delay}"]
+
+
+def said(entry: "Entry") -> str:
+    """What is guaranteed, and the headline."""
+    return "; ".join([*guarantee_lines(entry)[:2], headline(entry)])
+
+
 def headline(entry: "Entry") -> str:
     """One sentence: outcome and pressure of the run, the verdict, and every premise that fails."""
     design = entry.design
     if design.controller is None:
         return f"undecided: {design.details.get('reason', 'no gains with a proof were found')}"
+    sampled = design.controller.sampling_time is not None
     verdict = {
-        Verdict.PROVED: "proved in continuous time",
+        Verdict.PROVED: "proved for the loop that ran, for ever" if sampled else "proved in continuous time",
         Verdict.REFUTED: f"refuted: {design.details.get('reason', 'a counterexample checks in exact arithmetic')}",
         Verdict.UNDECIDED: f"undecided: {design.details.get('reason', 'no certificate')}",
     }[design.verdict]
@@ -30,7 +58,7 @@ def headline(entry: "Entry") -> str:
         *(run_sentences(entry.run, design.fault) if entry.run else ()),
         verdict,
         *_broken(design.premises),
-        *_held(entry.run),
+        *([] if sampled else _held(entry.run)),
     ]
     if design.verdict is Verdict.PROVED and all(p.holds for p in design.premises):
         parts.append("every premise holds")
@@ -110,6 +138,7 @@ _SAID = {
     "on_trajectory": "this run leaves the premise on |h'| {:.3g}-fold",
     "control_coefficient": "β leaves its certified range {:.3g}-fold",
     "friction_slope": "the friction slope exceeds the certified sector {:.3g}-fold",
+    "sampling_time": "T_s of the fault is {:.3g} times the longest with a guarantee, and this design samples faster",
     "constant_reference": "the reference moves, the certificate is about constant ones",
     "vanishing_disturbance": "the disturbance does not vanish at the equilibrium, so a bounded error remains",
 }

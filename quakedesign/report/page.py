@@ -8,6 +8,7 @@ from quakedesign.report.headlines import (
     FEEDFORWARD_COLUMNS,
     domain_sentence,
     feedforward_rows,
+    guarantee_lines,
     headline,
     scheme_sentence,
 )
@@ -38,7 +39,7 @@ img{max-width:100%}code{background:#f3f3f3;padding:0 .2rem}</style></head><body>
     + """<p>{{ grades }}. Errors count after a quarter of the task; p &lt; 0 is withdrawal. {{ schemes }}.</p>
 <h2>What is proved, and under which premises</h2>
 {% for e in entries %}<h3>{{ e.label }}</h3>
-{% if e.guarantee %}<p>guarantee: {{ e.guarantee.sentence() }}.</p>{% endif %}<p>{{ headline(e) }}.</p>
+{% for line in guaranteed(e) %}<p>{{ line }}.</p>{% endfor %}<p>{{ headline(e) }}.</p>
 <p>Gains: {% for n, v in e.design.gains.items() %}<code>{{ n }} = {{ number(v) }}</code> {% endfor %}</p>
 <table><thead><tr><th>premise</th><th>note</th><th>required</th><th>certified</th><th>ratio</th>
 <th>holds</th></tr></thead>
@@ -89,6 +90,7 @@ def page_html(comparison: "Comparison", facts: Iterable[str], figures: Iterable[
             **_tables(comparison),
             entries=comparison.entries,
             headline=headline,
+            guaranteed=guarantee_lines,
             domain=domain_sentence,
             known_columns=FEEDFORWARD_COLUMNS,
             known_rows=feedforward_rows,

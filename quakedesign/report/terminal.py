@@ -12,6 +12,7 @@ from quakedesign.report.headlines import (
     FEEDFORWARD_COLUMNS,
     domain_sentence,
     feedforward_rows,
+    guarantee_lines,
     headline,
     scheme_sentence,
 )
@@ -35,8 +36,8 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in entry.design.gains.items())
         console.print()
         console.print(entry.label, style="bold", end=": ")
-        if entry.guarantee is not None:
-            console.print(f"guarantee: {entry.guarantee.sentence()}", end="\n  ")
+        for line in guarantee_lines(entry):
+            console.print(line, end="\n  ")
         console.print(headline(entry))
         console.print(f"  gains: {gains or 'none'}")
         for premise in entry.design.premises:

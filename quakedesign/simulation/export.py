@@ -16,7 +16,7 @@ from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.measurement import EXACT
 from quakedesign.simulation.run import library_versions
-from quakedesign.simulation.schemes import Scheme, simulation_scheme
+from quakedesign.simulation.schemes import Scheme, own_way, simulation_scheme
 from quakedesign.simulation.schemes.sampled import Sampled
 from quakedesign.simulation.sensing import Sensor
 
@@ -58,7 +58,7 @@ class ControllerStep:
 
 
 def controller_step(
-    fault: Fault, controller: Controller, *, step: float | None = None, scheme: str | Scheme = "explicit"
+    fault: Fault, controller: Controller, *, step: float | None = None, scheme: str | Scheme | None = None
 ) -> ControllerStep:
     """Sampled step of a controller, built from that of `simulate` with the same scheme, without noise.
 
@@ -68,10 +68,10 @@ def controller_step(
         For its reference, and its input gain where the scheme needs one.
     controller : Controller
     step : float, optional
-        T_s [s]; the fault's sampling time unless given.
-    scheme : str or Scheme
-        One that samples. Of its measurement the part that runs on the controller is kept: with a `Sensor` the slip is
-        measured alone, else slip and slip rate.
+        T_s [s]; that of a law of samples, or the fault's sampling time, unless given.
+    scheme : str or Scheme, optional
+        One that samples; ``explicit`` unless given. Of its measurement the part that runs on the controller is kept:
+        with a `Sensor` the slip is measured alone, else slip and slip rate.
 
     Returns
     -------
@@ -83,6 +83,7 @@ def controller_step(
         For a scheme that does not sample, an actuator with a motion of its own, or a step that is not positive or not
         that of the sensor.
     """
+    scheme, step = own_way(controller, scheme, step)
     period = fault.sampling_time if step is None else step
     require_positive(step=period)
     chosen = _software(simulation_scheme(scheme) if isinstance(scheme, str) else scheme)
@@ -99,7 +100,7 @@ def export_controller(
     folder: str | Path,
     *,
     step: float | None = None,
-    scheme: str | Scheme = "explicit",
+    scheme: str | Scheme | None = None,
     force: bool = False,
 ) -> ControllerStep:
     """Write a controller's sampled step as ``controller.c`` and ``controller.h`` into a folder that appears whole.

@@ -3,7 +3,7 @@
 from typing import Any
 
 from quakedesign.controllers import Controller
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.simulation.closed_loop import ClosedLoop, integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.symbolic import plant
@@ -23,9 +23,16 @@ def to_casadi(fault: Fault, controller: Controller | None = None) -> Any:
     casadi.Function
         Without a controller: (t [s], x = [x1 m, x2 m/s], p [Pa]) → dx. With one:
         (t, x = [x1, x2, ξ…]) → dx, p, h [unit of ν], reference = [r m, r' m/s, r'' m/s²].
+
+    Raises
+    ------
+    UnsupportedError
+        For a law of samples.
     """
     import casadi as ca
 
+    if controller is not None and controller.sampling_time is not None:
+        raise UnsupportedError("a law of samples has no loop in continuous time. Use simulate, or export it.")
     loop = ClosedLoop(fault, controller)
     if controller is None:
         return loop.plant
@@ -62,6 +69,10 @@ def to_iosystem(subject: Fault | Controller) -> Any:
     ------
     ParameterError
         For anything else.
+
+    Notes
+    -----
+    The system of a law of samples is one in discrete time, with ``dt`` its T_s.
     """
     if isinstance(subject, Fault):
         return _fault_system(subject)
@@ -111,9 +122,14 @@ def _controller_system(controller: Controller) -> Any:
         given = dict(zip((*inputs.values(), *symbols), (*u, *x), strict=True))
         return np.array([float(value) for value in to_numpy(expressions, given)])
 
+    def later(x: Any, u: Any) -> Any:
+        found = values(rates, x, u)
+        return found if controller.sampling_time is None else x + controller.sampling_time * found
+
     return control.NonlinearIOSystem(
-        lambda t, x, u, _: values(rates, x, u),
+        lambda t, x, u, _: later(x, u),
         lambda t, x, u, _: values([pressure], x, u),
+        dt=controller.sampling_time or 0,
         name=controller.name,
         inputs=list(inputs),
         outputs=["p"],

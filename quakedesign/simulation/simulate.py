@@ -13,7 +13,7 @@ from quakedesign.simulation.measurement import Measurement
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import loop_class, run, run_adaptive, sampled_scheme
-from quakedesign.simulation.schemes import Scheme
+from quakedesign.simulation.schemes import Scheme, own_way
 from quakedesign.simulation.sensing import Sensor
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.trajectory import Trajectory
@@ -25,7 +25,7 @@ def simulate(
     controller: Controller | None = None,
     *,
     step: float | None = None,
-    scheme: str | Scheme = "continuous",
+    scheme: str | Scheme | None = None,
     method: str = "dormand-prince",
     duration: float | None = None,
     samples: int = 2000,
@@ -49,10 +49,11 @@ def simulate(
     controller : Controller, optional
         None: no fluid is injected.
     step : float, optional
-        Length of one step [s]; the fault's sampling time unless given.
-    scheme : str or Scheme
+        Length of one step [s]; that of a law of samples, or the fault's sampling time, unless given.
+    scheme : str or Scheme, optional
         How the law is carried out over a step, by name, or set as wanted; see `quakedesign.simulation.schemes`. All but
-        ``"continuous"`` measure and decide once per step and hold the pressure in between.
+        ``"continuous"`` measure and decide once per step and hold the pressure in between. Unless given, ``"explicit"``
+        for a law of samples, which has no other, and ``"continuous"`` for others.
     method : str
         Integrator with a fixed step, or, for smooth loops, ``"cvodes"`` or ``"idas"`` with a step of its own choice;
         see `quakedesign.simulation.integrators`. The latter answer at every multiple of `step`, where the run is
@@ -105,6 +106,7 @@ def simulate(
         cannot go on, or when the checkpoint is that of another run.
     """
     require_fault(fault).require_memoryless("a controlled run")
+    scheme, step = own_way(controller, scheme, step, "continuous")
     setting = Setting.of(fault, step, duration, samples, settled_from)
     if variation:
         variation.require_within(fault)

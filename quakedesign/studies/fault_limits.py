@@ -1,12 +1,11 @@
 """What no controller can do with a fault, beside what a designed one is proved to do."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from quakedesign.bounds import Bound, LowerBound, UpperBound
-from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task, task_of
+from quakedesign.certificates.guarantee import Guarantee, Task, task_of
 from quakedesign.certificates.impossibility import (
     farthest_well,
     longest_diffusion,
@@ -17,11 +16,9 @@ from quakedesign.certificates.impossibility import (
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.synthesis.guaranteed import design_held
+from quakedesign.synthesis.guaranteed import design_held, longest_delay, reached
 
-Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
 _ATTEMPTS = 6  # designs for one time
-_MOST_DELAY = 8  # periods; more is not analysed
 _POINTS = 24  # of the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
@@ -195,40 +192,9 @@ def _limit(title: str, unit: str, beyond: Bound | None, proved: Bound | None) ->
 
 
 def _proved_steps(task: Task, step: Fraction) -> tuple[Guarantee, ...]:
-    return _tried(lambda held: design_held(task, held, objective="peak"), step)
+    return reached(lambda held: design_held(task, held, objective="peak"), step, attempts=_ATTEMPTS)
 
 
 def _proved_delay(task: Task, step: Fraction) -> LowerBound | None:
-    found = _tried(lambda late: design_held(task, step, objective="peak", delay=late), step / 2, _MOST_DELAY * step)
-    return LowerBound(found[-1].held.delay) if found else None
-
-
-def _tried(attempt: Attempt, first: Fraction, most: Fraction | None = None) -> tuple[Guarantee, ...]:
-    """Guarantees at a time and at longer ones, or at a shorter one where it has none; the longest last."""
-    return _lengthened(attempt, first, most) or _shortened(attempt, first)
-
-
-def _lengthened(attempt: Attempt, first: Fraction, most: Fraction | None) -> tuple[Guarantee, ...]:
-    """Guarantees at a time, twice that and so on while they last, then by bisection."""
-    found: list[Guarantee] = []
-    good, failed = first, None
-    for power in range(_ATTEMPTS):
-        time = first * 2**power if failed is None else (good + failed) / 2
-        answer = attempt(time)
-        if isinstance(answer, Guarantee):
-            found.append(answer)
-            good = time
-        else:
-            failed = time
-        if not found or good == most:
-            break
-    return tuple(found)
-
-
-def _shortened(attempt: Attempt, first: Fraction) -> tuple[Guarantee, ...]:
-    """A guarantee at the longest of half a time, a quarter and so on."""
-    for power in range(1, _ATTEMPTS + 1):
-        answer = attempt(first / 2**power)
-        if isinstance(answer, Guarantee):
-            return (answer,)
-    return ()
+    found = longest_delay(task, step)
+    return LowerBound(found.held.delay) if found else None

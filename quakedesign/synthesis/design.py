@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
+from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.linear_premises import linear_premises, sectors
 from quakedesign.certificates.premises import (
     Errors,
@@ -18,10 +19,11 @@ from quakedesign.controllers import Controller, SlidingMode, control_law, family
 from quakedesign.controllers.feed_forward import NONE, FeedForward, feed_forward
 from quakedesign.errors import CertificateError, KinkError, ParameterError, UnknownNameError
 from quakedesign.fault import Fault, require_fault
+from quakedesign.rationals import rational
 from quakedesign.synthesis.designed import Design
+from quakedesign.synthesis.guaranteed import OBJECTIVES, sampled_design
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability
 from quakedesign.synthesis.linear.analysis.robust_stability import unstable_vertex, why_undecided
-from quakedesign.synthesis.linear.design.discrete_riccati import sampled_design
 from quakedesign.synthesis.linear.design.riccati import RiccatiDesign, riccati_design
 from quakedesign.synthesis.linear.plant.polytope import error_loop
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix
@@ -34,12 +36,22 @@ _HEADROOM = Fraction(11, 10)
 _SHARES = (Fraction(99, 100), Fraction(9, 10), Fraction(1, 2))
 
 
-def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none", held: bool = False) -> Design:
+def design(
+    fault: Fault,
+    controller: str = "cta",
+    *,
+    feedforward: str = "none",
+    objective: str = "tracking",
+    continuous: bool = False,
+) -> Design:
     """Find gains with a proof for a fault.
 
     2-CTA, 2-DIA: base gains (families.toml) are proved for the fault's range of β and scaled by λ = ρ⁶ (ρ rational,
     so that every scaled gain is rational) until L̄ exceeds by a tenth what the reference and the disturbance need.
-    e-LQR: Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
+    e-LQR: feedback with an estimate of the disturbance for the loop as it runs, measured and held over the fault's T_s,
+    or over the longest T_s with a guarantee where the fault's own has none; see `Design.guarantee`. With `continuous`
+    that of the paper: Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant
+    reference in continuous time.
 
     Parameters
     ----------
@@ -49,8 +61,11 @@ def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none", 
     feedforward : str
         What a sliding mode adds to ν from what is known of the plant: ``"none"``, ``"nominal"`` or ``"centred"``, see
         `quakedesign.controllers.feed_forward`. It enlarges the certified domain; the e-LQR takes none.
-    held : bool
-        For the e-LQR: gains that are proved with p held over the fault's sampling time as well, slower than the others.
+    objective : str
+        Of the e-LQR: ``"tracking"`` for small errors under slow disturbances, ``"peak"`` for the smallest guaranteed
+        slip-rate error.
+    continuous : bool
+        For the e-LQR: the paper's design in continuous time.
 
     Returns
     -------
@@ -62,7 +77,7 @@ def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none", 
     UnknownNameError
         For a controller that cannot be designed, or an unknown feed-forward.
     ParameterError
-        For a feed-forward with a law that takes none, or a sliding mode that shall be designed for a held pressure.
+        For a feed-forward with a law that takes none, options of the e-LQR with another law, or an unknown objective.
     """
     require_fault(fault)
     if controller not in DESIGNABLE:
@@ -70,14 +85,16 @@ def design(fault: Fault, controller: str = "cta", *, feedforward: str = "none", 
     fault.require_memoryless("design")
     added = feed_forward(feedforward, fault, least_authority(fault))
     if issubclass(control_law(controller), SlidingMode):
-        if held:
-            raise ParameterError(f"held is for the e-LQR. Received it with {controller}. Leave it out.")
+        if continuous or objective != OBJECTIVES[0]:
+            raise ParameterError(
+                f"continuous and objective are for the e-LQR. Received them with {controller}. Leave them out."
+            )
         return _design_sliding_mode(fault, controller, added)
     if added != NONE:
         raise ParameterError(
             f"a feed-forward is part of sliding-mode laws. Received {feedforward!r} with {controller}. Leave it out."
         )
-    return _design_held(fault) if held else _design_linear(fault)
+    return _design_linear(fault) if continuous else _design_sampled(fault, objective)
 
 
 def _design_sliding_mode(fault: Fault, name: str, added: FeedForward) -> Design:
@@ -181,14 +198,20 @@ def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certifi
     return found or (finished_exactly(loop, theta) if theta is not None else None)
 
 
-def _design_held(fault: Fault) -> Design:
-    try:
-        found = sampled_design(fault)
-    except ParameterError as error:
-        return _without_gains(fault, str(error))
-    certificate = quadratic_certificate(linear_loop(fault, found.controller), theta=found.theta)
-    details = {"method": found.method, "held_for": str(found.step), "held": str(found.varying.verdict)}
-    return _judged_linear(fault, found.controller, certificate, details)
+def _design_sampled(fault: Fault, objective: str) -> Design:
+    found = sampled_design(task_of(fault), rational(fault.sampling_time), objective)
+    if found.runs is None:
+        return _without_gains(fault, found.reason)
+    held = found.runs.held
+    return Design(
+        fault=fault,
+        name="elqr",
+        verdict=found.runs.check(),
+        controller=held.controller,
+        certificate=None,
+        premises=found.premises(),
+        details={"objective": objective, "step": str(held.step), "reason": found.reason or None},
+    )
 
 
 def _without_gains(fault: Fault, reason: str) -> Design:

@@ -12,7 +12,7 @@ from quakedesign.controllers import Controller, SlidingMode, control_law
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.controllers.feed_forward import NONE
 from quakedesign.fault import Fault
-from quakedesign.loop import summed_integrals
+from quakedesign.loop import SampledController, summed_integrals
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed.continuous import certified_peaks
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
@@ -32,7 +32,8 @@ class Design:
     controller : Controller or None
         None only when no gains with a proof were found.
     certificate : Certificate or None
-        Proof for the base gains (λ = 1), or the counterexample.
+        Proof in continuous time for the base gains (λ = 1), or the counterexample; None for a law of samples, whose
+        proof is its `guarantee`.
     premises : tuple of Premise
     domain : Domain or None
         Certified domain of the self-consistent premise on |h'|.
@@ -98,11 +99,14 @@ class Design:
 
     @property
     def guarantee(self) -> Guarantee | NoGuarantee:
-        """What is proved of the law as it runs, once per T_s of the fault, integrals summed, p held; or why nothing.
+        """What is proved of the law as it runs, once per T_s, p held; or why nothing.
 
-        Computed when asked for, in about a second.
+        A law of samples has its own T_s; the integrals of an e-LQR in continuous time are summed over that of the
+        fault. Computed when asked for, in about a second.
         """
         law = self.controller
+        if isinstance(law, SampledController):
+            return guarantee(task_of(self.fault), Held(law=law.law, step=law.step))
         summed = isinstance(law, ExtendedLQR) and law.feedback == "error" and law.limits is None and not law.offset
         if law is None or not summed:
             return NoGuarantee(
@@ -114,10 +118,15 @@ class Design:
 
     def held_loop(self) -> HeldLoop | None:
         """What is decided of an e-LQR when p is held over the fault's sampling time; None for another law."""
-        if self.controller is None or isinstance(self.controller, SlidingMode):
+        if self.controller is None or not self._linear_in_continuous_time:
             return None
         gains = tuple(self.controller.gains.values())
         return held_loop(LinearProblem.of(self.fault), gains, self.fault.sampling_time)
+
+    @property
+    def _linear_in_continuous_time(self) -> bool:
+        law = self.controller
+        return law is not None and law.sampling_time is None and not isinstance(law, SlidingMode)
 
     def __repr__(self) -> str:
         gains = ", ".join(f"{name} = {value}" for name, value in self.gains.items()) or "none"

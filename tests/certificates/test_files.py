@@ -32,7 +32,7 @@ def sliding_mode():
 
 
 def linear():
-    return qd.design(qd.load_fault("lab-fault"), "elqr").certificate
+    return qd.design(qd.load_fault("lab-fault"), "elqr", continuous=True).certificate
 
 
 def refutation():

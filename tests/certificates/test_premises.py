@@ -184,7 +184,7 @@ def test_the_ten_percent_box_widens_every_sector(real):
 
 
 def test_the_linear_certificate_does_not_claim_the_moving_reference_or_the_sine(real):
-    design = qd.design(real, "elqr")
+    design = qd.design(real, "elqr", continuous=True)
     by_name = {p.name: p for p in design.premises}
     assert by_name["friction_slope"].holds
     assert not by_name["constant_reference"].holds
@@ -194,7 +194,7 @@ def test_the_linear_certificate_does_not_claim_the_moving_reference_or_the_sine(
 
 
 def test_a_linear_certificate_of_another_fault_is_refused(real):
-    design = qd.design(real, "elqr")
+    design = qd.design(real, "elqr", continuous=True)
     with pytest.raises(CertificateError, match="another fault"):
         linear_premises(replace(real, density=2600.0), design.controller, design.certificate)
 

@@ -2,7 +2,10 @@
 
 import importlib.resources
 import json
+import subprocess
+import sys
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 
@@ -68,25 +71,54 @@ def test_wrong_combinations_are_one_line(case, capsys):
     assert reason in err
 
 
-def test_held_is_for_the_elqr(capsys, tmp_path):
-    code, _, err = run(capsys, "design", "lab-fault", "--controller", "cta", "--held", "--out", str(tmp_path / "o"))
+@pytest.mark.parametrize("option", [("--continuous",), ("--objective", "peak")])
+def test_options_of_the_elqr_are_refused_without_it(capsys, tmp_path, option):
+    code, _, err = run(capsys, "design", "lab-fault", "--controller", "cta", *option, "--out", str(tmp_path / "o"))
     assert code == 2
-    assert "--held is for the e-LQR" in err
+    assert "--continuous and --objective are for the e-LQR" in err
 
 
-def test_a_held_design_is_reported_with_its_peaks(capsys, tmp_path):
+def short(folder):
+    """The laboratory fault with a task of a minute."""
     text = (importlib.resources.files("quakedesign.fault") / "presets" / "lab-fault.toml").read_text()
-    path, out = tmp_path / "short.toml", tmp_path / "o"
+    path = folder / "short.toml"
     path.write_text(text.replace('"lab-fault"', '"short"').replace("1 hour", "1 minute"))
-    arguments = ("design", str(path), "--controller", "elqr", "--held", "--out", str(out), "--json")
+    return str(path)
+
+
+def test_a_design_in_continuous_time_is_reported_with_its_peaks_and_without_a_guarantee(capsys, tmp_path):
+    out = tmp_path / "o"
+    arguments = ("design", short(tmp_path), "--controller", "elqr", "--continuous", "--out", str(out), "--json")
     code, said, _ = run(capsys, *arguments)
     found = json.loads(said)["controllers"]["elqr"]
     assert code == 0
-    assert (found["held"]["verdict"], found["held"]["varying"]) == ("proved", "proved")
-    assert found["held"]["largest_step"] > found["held"]["step"] == 0.001
+    assert found["guarantee"].startswith("none: ")
+    assert found["guaranteed"]["verdict"] == "undecided"
+    assert set(found["gains"]) == {"k1", "k2", "k3", "k4"}
     peaks = found["peaks"]
     assert set(peaks) == {"amplitude", "rate"}
     for entry in peaks.values():
         assert found["metrics"]["peak_slip_rate"] < float(Fraction(entry["peak_slip_rate"]))
         assert (out / entry["certificate"]).is_file()
-    assert "stable if p is held over T_s = 0.001 s, proved for any course" in found["headline"]
+
+
+def test_a_design_is_reported_with_the_guarantee_of_the_loop_that_ran(capsys, tmp_path):
+    out = tmp_path / "o"
+    code, said, _ = run(capsys, "design", short(tmp_path), "--controller", "elqr", "--out", str(out), "--json")
+    found = json.loads(said)["controllers"]["elqr"]
+    assert code == 0
+    assert next(iter(found)) == "guarantee"
+    assert found["guarantee"].startswith("from rest, held over 0.001 s")
+    told, metrics = found["guaranteed"], found["metrics"]
+    assert metrics["peak_slip_rate"] <= Fraction(told["peak_slip_rate"])
+    assert Fraction(told["pressure"][0]) <= metrics["min_pressure"] < metrics["max_pressure"]
+    assert metrics["max_pressure"] <= Fraction(told["pressure"][1])
+    assert told["worst_found"]["slip_error"] <= Fraction(told["slip_error"])
+    assert (found["run"]["scheme"], found["run"]["step"], found["peaks"]) == ("explicit", 0.001, None)
+    assert found["certificate"] == told["certificate"] == "certificates/elqr-guarantee.json"
+    page = (out / "report.html").read_text()
+    assert page.index("guarantee: from rest") < page.index("tracked: peak slip rate")
+    checker = Path(__file__).parents[2] / "proofs" / "check.py"
+    command = [sys.executable, str(checker), str(out / found["certificate"])]
+    assert "proved" in subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+    assert run(capsys, "check", str(out / found["certificate"]), "--fault", short(tmp_path))[0] == 0

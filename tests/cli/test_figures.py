@@ -39,8 +39,15 @@ def test_compare_prints_the_keys_of_design_and_writes_nothing(short, capsys, tmp
     assert [p.name for p in tmp_path.iterdir()] == ["short.toml"]
 
 
-def test_designs_are_compared_in_the_scheme_asked_for(short, capsys):
+def test_a_law_of_samples_is_compared_as_it_was_designed(short, capsys):
     code, out, _ = run(capsys, "compare", str(short), "--controller", "elqr", "--scheme", "compensated", "--json")
+    found = json.loads(out)["controllers"]["elqr"]
+    assert (code, found["run"]["scheme"], found["held"]) == (0, "explicit", None)
+
+
+def test_designs_are_compared_in_the_scheme_asked_for(short, capsys):
+    asked = ("--continuous", "--scheme", "compensated")
+    code, out, _ = run(capsys, "compare", str(short), "--controller", "elqr", *asked, "--json")
     found = json.loads(out)["controllers"]["elqr"]
     assert code == 0
     assert found["run"]["scheme"] == "compensated"

@@ -121,7 +121,9 @@ def test_a_design_whose_run_opens_the_fault_is_no_positive_answer(capsys, tmp_pa
     )
     path = tmp_path / "hasty.toml"
     path.write_text(text)
-    code, out, _ = run(capsys, "design", path, "--controller", "elqr", "--out", tmp_path / "out", "--json")
+    code, out, _ = run(
+        capsys, "design", path, "--controller", "elqr", "--continuous", "--out", tmp_path / "out", "--json"
+    )
     (found,) = json.loads(out)["controllers"].values()
     assert found["verdict"] == "proved"
     assert {"opening", "diverged"} & set(found["events"])

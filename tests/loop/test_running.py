@@ -1,15 +1,23 @@
 """The law that simulations run is the law of the proof."""
 
+import json
+import pickle
+from dataclasses import replace
 from fractions import Fraction as F
 
+import control
 import numpy as np
 import pytest
 
 from quakedesign import simulate
 from quakedesign.certificates.guarantee import Guarantee, Held, guarantee, task_of
-from quakedesign.errors import UnsupportedError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop import Prediction, SampledController, disturbance_estimate
+from quakedesign.simulation import Variation, export_controller, to_casadi, to_iosystem
+from quakedesign.simulation.campaign import campaign_problem
+from quakedesign.simulation.campaign.space import Sample
+from quakedesign.simulation.campaign.worker import advance
 
 STEP = F("0.184")
 LAW = disturbance_estimate(
@@ -23,7 +31,7 @@ HELD = Held(law=LAW, step=STEP)
 
 def test_a_run_asks_for_the_pressure_of_the_matrices():
     """Pressures of 100 samples from the recorded errors, by the recursion p = Cz + Dy, z ← Fz + Gy."""
-    run = simulate(load_fault("real-fault"), HELD.controller, scheme="explicit", duration=18.4, samples=101).to_pandas()
+    run = simulate(load_fault("real-fault"), HELD.controller, duration=18.4, samples=101).to_pandas()
     as_floats = lambda rows: np.array(rows, dtype=float)  # noqa: E731
     z, errors = np.zeros(2), []
     for _, row in run.iloc[:-1].iterrows():
@@ -38,12 +46,79 @@ def test_the_whole_task_stays_far_inside_the_guarantee():
     fault = load_fault("real-fault")
     claim = guarantee(task_of(fault), HELD)
     assert isinstance(claim, Guarantee)
-    found = simulate(fault, HELD.controller, scheme="explicit").metrics
+    found = simulate(fault, HELD.controller).metrics
     assert found.max_slip_error <= 6e-6 < claim.claims.slip_error
     assert found.max_slip_rate_error <= 4.5e-6 < claim.claims.slip_rate_error
     assert found.peak_slip_rate <= claim.claims.peak_slip_rate
     assert claim.claims.least_pressure <= found.min_pressure
     assert found.max_pressure <= claim.claims.largest_pressure
+
+
+REAL = load_fault("real-fault")
+
+
+def recursion(run, law):
+    """Pressures [Pa] that the matrices ask for, told slips and slip rates of consecutive samples."""
+    f, g, c, d = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output, law.feedback))
+    z, asked = np.zeros(len(c)), []
+    for slip, rate, r, r_rate in zip(run.slip, run.slip_rate, run.reference, run.reference_rate, strict=True):
+        y = np.array([slip - r, rate - r_rate])
+        asked.append(c @ z + d @ y)
+        z = f @ z + g @ y
+    return np.array(asked)
+
+
+def test_it_runs_by_its_own_scheme_and_step_on_a_fault_of_another():
+    other = replace(REAL, sampling_time=1.0)
+    run = simulate(other, HELD.controller, duration=18.4, samples=101)
+    assert (run.provenance["scheme"], run.provenance["step"]) == ("explicit", 0.184)
+    assert np.allclose(run.pressure, recursion(run, LAW), rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize("wrong", [{"scheme": "continuous"}, {"scheme": "implicit"}, {"step": 0.1}])
+def test_to_run_it_otherwise_is_refused_everywhere(wrong, tmp_path):
+    calls = [
+        lambda: simulate(REAL, HELD.controller, duration=1.0, **wrong),
+        lambda: campaign_problem(REAL, HELD.controller, duration=1.0, **wrong),
+        lambda: export_controller(REAL, HELD.controller, tmp_path / "c", **wrong),
+    ]
+    for call in calls:
+        with pytest.raises(ParameterError, match=r"runs with the scheme explicit and the step 0\.184 s"):
+            call()
+    assert not (tmp_path / "c").exists()
+
+
+def test_a_campaign_runs_it_as_simulate_does():
+    """The undisturbed sample, by the program that all samples share."""
+    problem = campaign_problem(REAL, HELD.controller, duration=18.4, initial_slip=1e-6)
+    json.dumps(problem.inputs, allow_nan=False)
+    start = Sample(variation=Variation(), initial_slip=1e-6, initial_slip_rate=0.0, noise_seed=0)
+    (end,) = advance(problem.program, [problem.start(start)], problem.setting.steps)
+    run = problem.trajectory(start, 101)
+    assert np.allclose(run.pressure, recursion(run, LAW), rtol=1e-9, atol=1e-6)
+    assert end[2] == pytest.approx(run.slip[-1], rel=1e-12)
+
+
+def test_python_control_runs_it_in_discrete_time():
+    run = simulate(REAL, HELD.controller, duration=18.4, samples=101)
+    system = to_iosystem(HELD.controller)
+    assert system.dt == 0.184
+    told = np.vstack([run.slip, run.slip_rate, run.reference, run.reference_rate])
+    response = control.input_output_response(system, 0.184 * np.arange(len(run.time)), told)
+    assert np.allclose(response.outputs, run.pressure, rtol=1e-9, atol=1e-6)
+
+
+def test_it_has_no_function_of_a_loop_in_continuous_time():
+    with pytest.raises(UnsupportedError, match="law of samples"):
+        to_casadi(REAL, HELD.controller)
+
+
+def test_its_gains_are_those_of_the_law():
+    """p = −Σ gain·signal, read off the matrices."""
+    law = HELD.controller
+    assert list(law.gains) == ["k1", "k2", "predicted_rate", "disturbance"] == list(law.gain_units)
+    assert tuple(law.gains.values()) == tuple(-v for v in (*LAW.feedback, *LAW.output))
+    assert pickle.loads(pickle.dumps(law)) == law
 
 
 def test_it_has_no_loop_in_continuous_time():

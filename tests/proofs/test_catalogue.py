@@ -10,13 +10,18 @@ import pytest
 
 from quakedesign.certificates import certificate_text, load_certificate, loop_of
 from quakedesign.certificates.command import check_files
+from quakedesign.certificates.guarantee import task_of
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
 from quakedesign.controllers import law
+from quakedesign.fault import load_fault
 from quakedesign.sos.exact import files as polynomial_files
+from quakedesign.synthesis.guaranteed import design_held
 
 ROOT = Path(__file__).parents[2] / "proofs"
 FILES = sorted((ROOT / "certificates").glob("*.json"))
 POLYNOMIALS = [p for p in FILES if p.stem.startswith("motzkin")]
-LOOPS = [p for p in FILES if p not in POLYNOMIALS]
+GUARANTEES = [p for p in FILES if p.stem.startswith("guarantee")]
+LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES)]
 each = pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 each_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda p: p.stem)
 
@@ -44,6 +49,7 @@ SPECIFICATION.loader.exec_module(checker)
 
 def test_the_catalogue_is_complete():
     assert {p.stem for p in LOOPS} == {*STATEMENTS, "elqr_real-fault", "elqr_lab-fault"}
+    assert {p.stem for p in GUARANTEES} == {"guarantee_real-fault", "guarantee_lab-fault"}
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
 
 
@@ -60,6 +66,8 @@ def test_the_library_writes_the_same_bytes(path):
     text = path.read_text()
     if path in POLYNOMIALS:
         assert polynomial_files.text(*polynomial_files.load(text)) == text
+    elif path in GUARANTEES:
+        assert guarantee_text(parse_guarantee(text)) == text
     else:
         assert certificate_text(load_certificate(path)) == text
 
@@ -90,6 +98,30 @@ def test_linear_certificates_cover_their_faults(fault):
     ((verdict, lines),) = check_files([path], fault).values()
     assert verdict == "proved"
     assert any(fault in line for line in lines)
+
+
+@pytest.mark.parametrize("path", GUARANTEES, ids=lambda p: p.stem)
+def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
+    stored, fault = parse_guarantee(path.read_text()), load_fault(path.stem.removeprefix("guarantee_"))
+    assert check_files([path], fault.name)[str(path)][0] == "proved"
+    assert stored.task == task_of(fault)
+    assert stored.held.step == F(str(fault.sampling_time))
+    again = design_held(stored.task, stored.held.step)
+    assert float(again.claims.slip_rate_error) == pytest.approx(float(stored.claims.slip_rate_error), rel=0.02)
+    assert float(again.claims.slip_error) == pytest.approx(float(stored.claims.slip_error), rel=0.02)
+
+
+@pytest.mark.parametrize("path", GUARANTEES, ids=lambda p: p.stem)
+@pytest.mark.parametrize("key", ["slip_error", "slip_rate_error", "peak_slip_rate", "largest_pressure"])
+def test_a_smaller_claim_of_a_guarantee_is_refused_by_both(path, key, tmp_path):
+    raw = json.loads(path.read_text())
+    raw["claims"][key] = str(F(raw["claims"][key]) * F(99, 100))
+    changed = tmp_path / "changed.json"
+    changed.write_text(json.dumps(raw))
+    ((verdict, _),) = check_files([changed]).values()
+    assert verdict != "proved"
+    with pytest.raises(checker.Refused):
+        checker.check(changed.read_text())
 
 
 def test_the_polynomial_is_that_of_motzkin():

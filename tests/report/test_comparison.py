@@ -41,7 +41,7 @@ def test_every_row_of_the_table_fits_its_columns(comparison):
     assert {len(row) for row in outcomes} == {len(OUTCOMES)}
     assert outcomes[0] == ("uncontrolled", "earthquake", "1.24e-01", "100 %", "")
     (graded,) = (row[-1] for row in outcomes if row[0] == "e-LQR (designed)")
-    assert graded.startswith("proved for this loop and task")
+    assert graded.startswith("guaranteed: slip rate <= ")
 
 
 def test_every_axis_of_every_figure_has_a_label_with_a_unit(comparison):

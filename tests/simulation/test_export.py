@@ -4,6 +4,7 @@ import ctypes
 import json
 import os
 import subprocess
+from fractions import Fraction as F
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from quakedesign.controllers import published
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.loop import Prediction, SampledController, disturbance_estimate
 from quakedesign.simulation import simulate
 from quakedesign.simulation.actuators.chain import Actuator
 from quakedesign.simulation.actuators.delay import Delay
@@ -31,7 +33,17 @@ SENSED = OutputFeedback(
     stages=(Transducer(deviation=1e-6), Averaging(samples=2)),
     differentiator=Differentiator(bound=100.0, step=1e-3, filter_order=1),
 )
+SAMPLED = SampledController(
+    law=disturbance_estimate(
+        (F(149400000), F(460800)),
+        F("0.4"),
+        Prediction(of_slip=F("0.6"), of_rate=F("0.99"), of_pushes=(F("0.000995"),)),
+        F("0.002"),
+    ),
+    step=F(1, 1000),
+)
 CASES = {
+    "sampled": (SAMPLED, "explicit", {}),
     "cta": (PUBLISHED["cta"], "explicit", {}),
     "dia": (PUBLISHED["dia"], "explicit", {}),
     "elqr": (PUBLISHED["elqr"], "explicit", {}),
@@ -102,7 +114,9 @@ def test_c_and_python_agree_bit_for_bit_over_random_steps(case, tmp_path):
     assert abs(answer[0]) > 0
 
 
-@pytest.mark.parametrize("case", ["elqr", "cta", "cta implicit", "dia compensated", "cta sensed", "cta limited"])
+@pytest.mark.parametrize(
+    "case", ["sampled", "elqr", "cta", "cta implicit", "dia compensated", "cta sensed", "cta limited"]
+)
 def test_the_exported_step_decides_as_the_controller_of_the_simulated_loop(case):
     """Told the slips and slip rates of a run, it asks for the pressures of that run."""
     controller, scheme, settings = CASES[case]

@@ -16,6 +16,7 @@ from quakedesign.loop import summed_integrals
 from quakedesign.report.facts import beyond_control
 from quakedesign.report.limits import limits_figure, limits_lines
 from quakedesign.studies import limits as study
+from quakedesign.synthesis.guaranteed import reached
 
 REAL = qd.load_fault("real-fault")
 LAW = summed_integrals((F(1), F(1), F(1), F(1)), F(1))
@@ -46,6 +47,12 @@ def designs(monkeypatch):
         return Guarantee(task=task, held=Held(law=LAW, step=step, delay=delay), claims=CLAIMS)
 
     monkeypatch.setattr("quakedesign.studies.fault_limits.design_held", designed)
+
+    def late(task, step):
+        found = reached(lambda delay: designed(task, step, objective="peak", delay=delay), step / 2, most=7 * step)
+        return found[-1] if found else None
+
+    monkeypatch.setattr("quakedesign.studies.fault_limits.longest_delay", late)
     return asked, longest
 
 
@@ -68,7 +75,7 @@ def test_the_search_doubles_and_then_bisects(designs):
     asked, _ = designs
     found = study(REAL)
     steps = [step for step, delay in asked if not delay]
-    assert steps == [F(184, 1000) * times for times in (1, 2, 4, 8, 6, 5)]
+    assert steps == [F(n, 1000) for n in (184, 368, 736, 1472, 1100, 918)]
     assert found.largest_step.proved_up_to == F(736, 1000)
     assert found.largest_delay.proved_up_to == F(92, 1000)
     assert [g.held.step for g in found.proved] == [F(184, 1000) * times for times in (1, 2, 4)]
@@ -78,8 +85,8 @@ def test_a_fault_that_is_sampled_too_slowly_gets_a_shorter_step(designs):
     asked, longest = designs
     longest["step"] = F(3, 100)
     found = study(REAL)
-    assert [step for step, _ in asked] == [F(184, 1000) / 2**n for n in range(4)]
-    assert found.largest_step.proved_up_to == F(23, 1000)
+    assert [step for step, _ in asked] == [F(n, 10000) for n in (1840, 920, 460, 230, 345, 288)]
+    assert found.largest_step.proved_up_to == F(288, 10000)
     assert found.largest_delay.proved_up_to is None
     assert found.peak_slip_rate_error.proved_up_to is None
 

@@ -154,6 +154,7 @@ def test_every_proof_asks_for_confirmed_bounds():
         lambda: sectors(fault),
         lambda: feed_forward("centred", fault, F(1)),
         *(lambda name=name: design(fault, name) for name in ("cta", "dia", "elqr")),
+        lambda: design(fault, "elqr", continuous=True),
     ):
         with pytest.raises(ParameterError, match="slip_slope of own-law"):
             prove()

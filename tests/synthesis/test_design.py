@@ -64,8 +64,8 @@ def test_a_sliding_mode_is_proved_with_its_premise_along_the_reference(variants,
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_the_elqr_is_proved_about_constant_references(variants, variant):
-    design = qd.design(variants[variant], "elqr")
+def test_the_elqr_in_continuous_time_is_proved_about_constant_references(variants, variant):
+    design = qd.design(variants[variant], "elqr", continuous=True)
     assert design.verdict is Verdict.PROVED
     assert {p.name: p for p in design.premises}["friction_slope"].holds
 
@@ -84,7 +84,7 @@ def test_riccati_residual_and_gain_by_independent_algebra(name):
 
 
 def test_every_vertex_is_stable_and_the_step_is_short_enough(real):
-    design = qd.design(real, "elqr")
+    design = qd.design(real, "elqr", continuous=True)
     poles = vertex_poles(sectors(real), list(design.controller.gains.values()))
     assert max(z.real for z in poles) < 0
     assert max(abs(z) for z in poles) * real.sampling_time == pytest.approx(1.5, rel=1e-3)
@@ -116,6 +116,9 @@ def test_the_root_is_rational_and_just_large_enough(scale):
 
 def test_the_same_input_gives_the_same_digits(real):
     first, second = (qd.design(real, "elqr") for _ in range(2))
+    assert first.controller == second.controller
+    assert first.premises == second.premises
+    first, second = (qd.design(real, "elqr", continuous=True) for _ in range(2))
     assert first.gains == second.gains
     assert first.certificate == second.certificate
     assert qd.design(real, "cta").certificate == qd.design(real, "cta").certificate
@@ -126,37 +129,22 @@ def test_an_unknown_controller_is_one_clear_message(real):
         qd.design(real, "pid")
 
 
-def test_a_design_for_a_held_pressure_is_proved_as_such_and_slower(real):
-    held, free = qd.design(real, "elqr", held=True), qd.design(real, "elqr")
-    assert held.verdict is free.verdict is Verdict.PROVED
-    assert (held.details["method"], held.details["held_for"]) == ("continuous", "23/125")
-    facts, other = held.held_loop().to_dict(), free.held_loop().to_dict()
-    assert (facts["verdict"], facts["varying"], other["verdict"]) == ("proved", "proved", "refuted")
-    # the sampled loop itself, at the vertices (ERRATA 22)
-    assert facts["radius"] < 1 < other["radius"]
-    assert other["largest_step"] < 0.184 < facts["largest_step"]
-    assert all(held.gains[k] < free.gains[k] for k in held.gains)
-
-
-def test_a_period_that_nothing_holds_is_undecided_with_a_reason(real):
-    slow = qd.design(replace(real, sampling_time=100.0), "elqr", held=True)
-    assert slow.verdict is Verdict.UNDECIDED
-    assert slow.controller is None
-    assert "Sample faster" in slow.details["reason"]
-    assert slow.certified_peaks().check() is Verdict.UNDECIDED
-    assert slow.held_loop() is None
-
-
-def test_a_sliding_mode_has_no_held_design_and_no_peaks(real):
-    with pytest.raises(ParameterError, match="held is for the e-LQR"):
-        qd.design(real, "cta", held=True)
+def test_options_of_the_elqr_are_refused_elsewhere(real):
+    for options in ({"continuous": True}, {"objective": "peak"}):
+        with pytest.raises(ParameterError, match="are for the e-LQR"):
+            qd.design(real, "cta", **options)
     assert "no bound of peaks of 2-CTA" in assess(real, published("real-fault")["cta"]).certified_peaks().reason
 
 
-def test_a_simulation_that_holds_the_pressure_agrees_with_both_verdicts(real):
-    short = {"scheme": "explicit", "duration": 400.0}
-    held = qd.simulate(real, qd.design(real, "elqr", held=True).controller, **short)
-    free = qd.simulate(real, qd.design(real, "elqr").controller, **short)
+def test_a_simulation_that_holds_the_pressure_agrees_with_both_guarantees(real):
+    sampled, free = qd.design(real, "elqr"), qd.design(real, "elqr", continuous=True)
+    assert sampled.guarantee.check() is Verdict.PROVED
+    assert free.guarantee.sentence().startswith("none: held over 0.184 s even the nominal loop is not stable")
+    assert free.held_loop().to_dict()["verdict"] == "refuted"
+    assert sampled.held_loop() is None
+    assert "no bound of peaks" in sampled.certified_peaks().reason
+    held = qd.simulate(real, sampled.controller, duration=400.0)
+    unstable = qd.simulate(real, free.controller, scheme="explicit", duration=400.0)
     assert "diverged" not in held.events
     assert held.metrics.max_slip_error < 1e-4
-    assert "diverged" in free.events
+    assert "diverged" in unstable.events

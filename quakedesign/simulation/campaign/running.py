@@ -24,7 +24,7 @@ from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.metrics import ActuatorMetrics
 from quakedesign.simulation.run import Setting
-from quakedesign.simulation.schemes import Scheme, simulation_scheme
+from quakedesign.simulation.schemes import Scheme, own_way, simulation_scheme
 from quakedesign.temporary import temporary_folder
 from quakedesign.workers import Crew, Processes
 
@@ -43,7 +43,7 @@ def campaign_problem(
     fault: Fault,
     controller: Controller | None = None,
     *,
-    scheme: str | Scheme = "explicit",
+    scheme: str | Scheme | None = None,
     step: float | None = None,
     method: str = "dormand-prince",
     duration: float | None = None,
@@ -76,6 +76,7 @@ def campaign_problem(
         When a value is out of range, or a scheme or integrator is unknown.
     """
     require_seed(seed)
+    scheme, step = own_way(controller, scheme, step)
     return Problem(
         fault=fault,
         controller=controller,

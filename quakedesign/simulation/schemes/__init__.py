@@ -7,10 +7,11 @@ from pkgutil import iter_modules
 from typing import Any
 
 from quakedesign.arguments import check_arguments
+from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.simulation.schemes.base import Scheme
 
-__all__ = ["Scheme", "schemes", "simulation_scheme"]
+__all__ = ["Scheme", "own_way", "schemes", "simulation_scheme"]
 
 
 @cache
@@ -43,6 +44,29 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
             f"Received {name}. Use one of them, or leave the settings out."
         )
     return kind(**settings)
+
+
+def own_way(
+    controller: Controller | None, scheme: str | Scheme | None, step: float | None, usual: str = "explicit"
+) -> tuple[str | Scheme, float | None]:
+    """Scheme and step of a run: those that are asked for, else the usual scheme; a law of samples has its own.
+
+    Raises
+    ------
+    ParameterError
+        When a law of samples is asked to run otherwise.
+    """
+    own = controller.sampling_time if controller else None
+    if own is None:
+        return usual if scheme is None else scheme, step
+    chosen = "explicit" if scheme is None else scheme
+    name = chosen if isinstance(chosen, str) else chosen.name
+    if name != "explicit" or step not in (None, own):
+        raise ParameterError(
+            f"a law of samples runs with the scheme explicit and the step {own!r} s it was designed for. Received "
+            f"{name} and {own if step is None else step!r} s. Leave scheme and step out."
+        )
+    return chosen, own
 
 
 check_arguments(__name__)

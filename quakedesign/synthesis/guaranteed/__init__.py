@@ -2,22 +2,29 @@
 
 from quakedesign.arguments import check_arguments
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
-from quakedesign.synthesis.guaranteed.answer import Answer, answer
+from quakedesign.synthesis.guaranteed.answer import Answer, answer, attacked
 from quakedesign.synthesis.guaranteed.compensated import Compensation, compensated, design_compensated
 from quakedesign.synthesis.guaranteed.continuous import CLASSES, certified_peaks
+from quakedesign.synthesis.guaranteed.default_design import SampledDesign, sampled_design
 from quakedesign.synthesis.guaranteed.design import OBJECTIVES, design_held
+from quakedesign.synthesis.guaranteed.reach import longest_delay, reached
 
 __all__ = [
     "CLASSES",
     "OBJECTIVES",
     "Answer",
     "Compensation",
+    "SampledDesign",
     "WorstFound",
     "answer",
+    "attacked",
     "certified_peaks",
     "compensated",
     "design_compensated",
     "design_held",
+    "longest_delay",
+    "reached",
+    "sampled_design",
     "worst_found",
 ]
 

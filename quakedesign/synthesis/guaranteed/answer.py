@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, Task, guarantee, task_of
+from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, guarantee, task_of
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.controllers import SlidingMode, control_law
 from quakedesign.errors import ParameterError
@@ -15,10 +15,8 @@ from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
 from quakedesign.synthesis.guaranteed.continuous import CLASSES
 from quakedesign.synthesis.guaranteed.design import design_held
+from quakedesign.synthesis.guaranteed.reach import design_at, longest_step
 from quakedesign.synthesis.guaranteed.sliding import GUARANTEED, sliding_mode
-
-_SHORTER = Fraction(4, 5)
-_TRIALS = 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,38 +162,24 @@ def answer(
         )
         if isinstance(made, NoGuarantee):
             return Answer(fault=fault, found=made)
-        return replace(_with_worst(fault, made.found), compensation=made)
+        return replace(attacked(fault, made.found), compensation=made)
     if scheme not in (None, "explicit"):
         raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {scheme!r}. Leave it out.")
     if gains:
         summed = summed_integrals(_four(gains), period)
-        return _with_worst(fault, guarantee(task, Held(law=summed, step=period, delay=delay, lag=lag)))
+        return attacked(fault, guarantee(task, Held(law=summed, step=period, delay=delay, lag=lag)))
     found = design_held(task, period, objective=objective, delay=delay, lag=lag)
     if isinstance(found, Guarantee):
-        return _with_worst(fault, found)
-    return Answer(fault=fault, found=found, shorter=_shorter(task, period, objective, delay, lag))
+        return attacked(fault, found)
+    longest = longest_step(task, period, delay=delay, lag=lag)
+    return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest, objective))
 
 
-def _with_worst(fault: Fault, found: Guarantee | NoGuarantee) -> Answer:
+def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> Answer:
+    """A guarantee beside the worst that a search finds on its loop; about a second."""
     if isinstance(found, NoGuarantee):
         return Answer(fault=fault, found=found)
     return Answer(fault=fault, found=found, worst=worst_found(found), worst_with_stick=worst_found(found, sticks=True))
-
-
-def _shorter(task: Task, step: Fraction, objective: str, delay: Fraction, lag: Fraction) -> Guarantee | None:
-    """Guarantee at the longest of steps that shrink by a fifth, delay and lag as they are."""
-    for _ in range(_TRIALS):
-        step = _two_digits(step * _SHORTER)
-        if delay > 7 * step:
-            return None
-        if isinstance(design_held(task, step, objective="peak", delay=delay, lag=lag), Guarantee):
-            found = design_held(task, step, objective=objective, delay=delay, lag=lag)
-            return found if isinstance(found, Guarantee) else None
-    return None
-
-
-def _two_digits(value: Fraction) -> Fraction:
-    return Fraction(f"{float(value):.1e}")
 
 
 def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:

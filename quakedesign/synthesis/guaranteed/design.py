@@ -1,13 +1,13 @@
 """A law with a disturbance estimate for the loop as it runs, chosen by what can be guaranteed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from math import floor, log10
+from math import floor, inf, log10
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.errors import ParameterError
@@ -17,11 +17,41 @@ from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated
 OBJECTIVES = ("tracking", "peak")
 _STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
 _EVALUATIONS = 150
+_FEW = 50  # evaluations near a law that has a guarantee at another time
 _CREEPING = 0.1  # what the slip error over T_s counts beside the slip-rate error, so that the loop does not creep
 _ROOM = 1.6  # share of the smallest peak that `tracking` may spend
 _DIGITS = 4
-_MOST_PERIODS = 7  # of delay: law and loop then have 20 states, the most of a file
+MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
 _FAILED = 1e6
+_HOPELESS = 1.2  # small gain of a whole search after which `first_held` tries no other start
+
+
+def first_held(
+    task: Task,
+    step: Fraction,
+    *,
+    delay: Fraction = Fraction(0),
+    lag: Fraction = Fraction(0),
+    near: np.ndarray | None = None,
+) -> tuple[Guarantee | NoGuarantee, np.ndarray | None]:
+    """The first law with a guarantee that a search finds, sooner than `design_held` does, and its numbers.
+
+    The search is a short one near the numbers of another law, if there is one.
+    """
+    if delay > MOST_DELAY * step:
+        return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None), near
+    law = _laws(task.model, step, delay)
+    template = Held(law=law(np.array(_STARTS[0])), step=step, delay=delay, lag=lag)
+
+    def cost(x: np.ndarray) -> float:
+        found = estimated(task, replace(template, law=law(x))) if 0 < x[2] < 1 else None
+        return _peak_cost(found, step)
+
+    for start in _STARTS if near is None else (near,):
+        reached, x = _search(cost, start, enough=_FAILED / 2, evaluations=_EVALUATIONS if near is None else _FEW)
+        if reached < _FAILED / 2 or _HOPELESS * _FAILED < reached < 9 * _FAILED:
+            break
+    return guarantee(task, replace(template, law=law(x))), x
 
 
 def design_held(
@@ -53,9 +83,9 @@ def design_held(
     """
     if objective not in OBJECTIVES:
         raise ParameterError(f"objective must be one of {', '.join(OBJECTIVES)}. Received {objective!r}.")
-    if step <= 0 or not 0 <= delay <= _MOST_PERIODS * step or lag < 0:
+    if step <= 0 or not 0 <= delay <= MOST_DELAY * step or lag < 0:
         raise ParameterError(
-            f"a design needs a positive step, a delay of 0 to {_MOST_PERIODS} steps and a lag of 0 or more. Received "
+            f"a design needs a positive step, a delay of 0 to {MOST_DELAY} steps and a lag of 0 or more. Received "
             f"{float(step):.4g} s, {float(delay):.4g} s, {float(lag):.4g} s. Shorten the delay."
         )
     law = _laws(task.model, step, delay)
@@ -111,9 +141,21 @@ def _prediction(model: Model, step: Fraction, delay: Fraction) -> Prediction:
     )
 
 
-def _search(cost: Callable[[np.ndarray], float], start) -> tuple[float, np.ndarray]:
-    options = {"maxfev": _EVALUATIONS, "xatol": 2e-3, "fatol": 1e-3}
-    found = minimize(cost, np.array(start), method="Nelder-Mead", options=options)
+def _search(
+    cost: Callable[[np.ndarray], float],
+    start: Sequence[float] | np.ndarray,
+    *,
+    enough: float = -inf,
+    evaluations: int = _EVALUATIONS,
+) -> tuple[float, np.ndarray]:
+    """Smallest cost found and where; the search ends below `enough`."""
+
+    def stop(intermediate_result: OptimizeResult) -> None:
+        if intermediate_result.fun < enough:
+            raise StopIteration
+
+    options = {"maxfev": evaluations, "xatol": 2e-3, "fatol": 1e-3}
+    found = minimize(cost, np.array(start), method="Nelder-Mead", options=options, callback=stop)
     return float(found.fun), found.x
 
 

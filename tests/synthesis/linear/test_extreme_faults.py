@@ -10,7 +10,6 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.controllers.elqr import ExtendedLQR
-from quakedesign.synthesis.design import assess
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
 from quakedesign.synthesis.linear.analysis.verdict import judge
 from quakedesign.synthesis.linear.design.riccati import riccati_design
@@ -35,7 +34,7 @@ def variants():
 def test_the_riccati_design_is_proved(name):
     # the theorem proves every Riccati design with the sound bound: only rounding can stand in the way
     fault = variants()[name]
-    design = qd.design(fault, "elqr")
+    design = qd.design(fault, "elqr", continuous=True)
     assert design.verdict is Verdict.PROVED
     assert design.certificate.check() is Verdict.PROVED
     problem, rng = LinearProblem.of(fault), np.random.default_rng(3)
@@ -47,13 +46,6 @@ def test_the_riccati_design_is_proved(name):
         loop = np.array([[float(v) for v in row] for row in problem.loop(point, gains)])
         poles = np.linalg.eigvals(loop * units[None, :] / units[:, None])
         assert poles.real.max() < 1e-9 * np.abs(poles).max()
-
-
-@pytest.mark.parametrize("name", ["hardly damped", "overdamped", "sampled fast"])
-def test_a_held_design_is_proved_wherever_its_gains_are(name):
-    design = qd.design(variants()[name], "elqr", held=True)
-    assert design.verdict is Verdict.PROVED
-    assert assess(variants()[name], design.controller).verdict is Verdict.PROVED
 
 
 def test_gains_that_are_optimal_for_a_covering_weight_are_proved_by_their_riccati_equation():
@@ -76,9 +68,8 @@ def test_a_form_that_does_not_decrease_is_no_certificate():
     assert finished_exactly(loop, diagonal((F(1),) * 4)) is None
 
 
-@pytest.mark.parametrize("held", [False, True])
-def test_time_scales_out_of_reach_are_undecided_with_a_reason(held):
-    design = qd.design(replace(REAL, length=1e-6), "elqr", held=held)
+def test_time_scales_out_of_reach_are_undecided_with_a_reason():
+    design = qd.design(replace(REAL, length=1e-6), "elqr", continuous=True)
     assert design.verdict is Verdict.UNDECIDED
     assert "Riccati equation" in design.details["reason"]
 

@@ -60,7 +60,7 @@ def judged(seed, count):
         problem = LinearProblem.of(fault)
         unstable += problem.sectors.slip[1] > 0 or problem.sectors.rate[0] < 0
         try:
-            design = qd.design(fault, "elqr")
+            design = qd.design(fault, "elqr", continuous=True)
         except ParameterError as error:
             reasons.append(str(error))
             continue

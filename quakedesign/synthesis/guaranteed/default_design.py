@@ -1,0 +1,80 @@
+"""The default e-LQR of a fault: for its own T_s, else for the longest T_s that has a guarantee."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
+from quakedesign.certificates.premise import Premise
+from quakedesign.synthesis.guaranteed.design import design_held
+from quakedesign.synthesis.guaranteed.reach import design_at, longest_delay, longest_step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledDesign:
+    """A law of samples for a fault, and how far laws like it reach.
+
+    Attributes
+    ----------
+    step : Fraction
+        T_s of the fault [s].
+    runs : Guarantee or None
+        Of the loop that runs, at the fault's T_s or a shorter one; None where none was found.
+    reason : str
+        Why there is no guarantee at the fault's T_s; empty if there is.
+    longest_step : Fraction
+        Longest T_s found for which a design has a guarantee [s].
+    longest_delay : Fraction
+        Longest delay found at the T_s that runs [s].
+    """
+
+    step: Fraction
+    runs: Guarantee | None
+    reason: str
+    longest_step: Fraction = Fraction(0)
+    longest_delay: Fraction = Fraction(0)
+
+    def premises(self) -> tuple[Premise, ...]:
+        """What the guarantee asks for of the hardware, and how far other designs would go."""
+        return (
+            Premise(
+                name="sampling_time",
+                required=self.step,
+                certified=self.longest_step,
+                unit="s",
+                note="T_s of the fault, and the longest for which a design with a guarantee was found",
+            ),
+            Premise(
+                name="delay",
+                required=Fraction(0),
+                certified=self.longest_delay,
+                unit="s",
+                note="from the measurement to the pressure: none, and the longest for which a design that knows it "
+                "has a guarantee",
+            ),
+        )
+
+
+def sampled_design(task: Task, step: Fraction, objective: str = "tracking") -> SampledDesign:
+    """Design for a T_s [s], or for the longest shorter one that has a guarantee.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown objective.
+    """
+    found = design_held(task, step, objective=objective)
+    fails = isinstance(found, NoGuarantee)
+    longest = longest_step(task, step, most=step if fails else None)
+    reason = found.reason if isinstance(found, NoGuarantee) else ""
+    if isinstance(found, NoGuarantee) and longest is not None:
+        found = design_at(task, longest, objective)
+    if isinstance(found, NoGuarantee):
+        return SampledDesign(step=step, runs=None, reason=reason)
+    delayed = longest_delay(task, found.held.step)
+    return SampledDesign(
+        step=step,
+        runs=found,
+        reason=reason if found.held.step < step else "",
+        longest_step=max(found.held.step, longest.held.step if longest else found.held.step),
+        longest_delay=delayed.held.delay if delayed else Fraction(0),
+    )

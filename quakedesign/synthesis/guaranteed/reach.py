@@ -1,0 +1,119 @@
+"""How long a sampling time and a delay may be for a designed loop to have a guarantee."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from math import sqrt
+
+import numpy as np
+
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
+from quakedesign.synthesis.guaranteed.design import MOST_DELAY, design_held, first_held
+
+Search = Callable[[Fraction, np.ndarray | None], tuple[Guarantee | NoGuarantee, np.ndarray | None]]
+Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
+_ATTEMPTS = 12
+_SHARE = 0.5  # of the time in which the fastest unstable pole grows e-fold, near which the longest T_s was seen
+_NEAR = Fraction(1, 16)  # share of the longest time by which the end of the reach is left open
+
+
+def longest_step(
+    task: Task,
+    step: Fraction,
+    *,
+    delay: Fraction = Fraction(0),
+    lag: Fraction = Fraction(0),
+    most: Fraction | None = None,
+) -> Guarantee | None:
+    """A guarantee at nearly the longest T_s that has one; None where none is found.
+
+    Parameters
+    ----------
+    task : Task
+    step : Fraction
+        T_s of the fault [s], tried first where the fault is stable.
+    delay, lag : Fraction
+        [s].
+    most : Fraction, optional
+        Longest T_s to try [s].
+    """
+    pole = _fastest_pole(task)
+    first = Fraction(f"{_SHARE / pole:.3g}") if pole > 0 else step
+    attempt = _attempt(lambda held, near: first_held(task, held, delay=delay, lag=lag, near=near))
+    return _last(reached(attempt, first if most is None else min(first, most), most=most))
+
+
+def _fastest_pole(task: Task) -> float:
+    """Fastest unstable pole over the box [1/s]; at most 0 for a stable fault."""
+    slip, rate = float(task.slip_chord[1]), float(task.rate_chord[0])
+    return (sqrt(max(rate**2 + 4 * slip, 0.0)) - rate) / 2 if slip > 0 or rate < 0 else 0.0
+
+
+def design_at(task: Task, longest: Guarantee, objective: str) -> Guarantee:
+    """Design for an objective at the T_s, delay and lag of a guarantee, which stays where there is none."""
+    held = longest.held
+    found = design_held(task, held.step, objective=objective, delay=held.delay, lag=held.lag)
+    return found if isinstance(found, Guarantee) else longest
+
+
+def longest_delay(task: Task, step: Fraction) -> Guarantee | None:
+    """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
+    most = MOST_DELAY * step
+    _, near = first_held(task, step)
+    attempt = _attempt(lambda delay, near: first_held(task, step, delay=delay, near=near), near)
+    return _last(reached(attempt, step / 2, most=most))
+
+
+def _attempt(search: Search, near: np.ndarray | None = None) -> Attempt:
+    """Attempt that begins near a law, then where the one before it was good."""
+
+    def attempt(time: Fraction) -> Guarantee | NoGuarantee:
+        nonlocal near
+        found, numbers = search(time, near)
+        near = numbers if isinstance(found, Guarantee) else near
+        return found
+
+    return attempt
+
+
+def _last(found: tuple[Guarantee, ...]) -> Guarantee | None:
+    return found[-1] if found else None
+
+
+def reached(
+    attempt: Attempt, first: Fraction, *, most: Fraction | None = None, attempts: int = _ATTEMPTS
+) -> tuple[Guarantee, ...]:
+    """Guarantees at growing times: twice the first and so on or half of it, then by bisection.
+
+    Parameters
+    ----------
+    attempt : callable
+    first : Fraction
+        Time to try first [s].
+    most : Fraction, optional
+        Longest time to try [s].
+    attempts : int
+        Number of times at most.
+    """
+    found: list[Guarantee] = []
+    time, good, bad = first, None, None
+    for _ in range(attempts):
+        answer = attempt(time)
+        if isinstance(answer, Guarantee):
+            found.append(answer)
+            good = time
+        else:
+            bad = time
+        if good is not None and (good == most or (bad is not None and bad - good <= _NEAR * bad)):
+            break
+        time = _next(good, bad, most)
+    return tuple(found)
+
+
+def _next(good: Fraction | None, bad: Fraction | None, most: Fraction | None) -> Fraction:
+    """Time to try, in three digits between two others."""
+    if good is not None and bad is not None:
+        return Fraction(f"{float(good + bad) / 2:.3g}")
+    if good is None:
+        assert bad is not None
+        return bad / 2
+    return 2 * good if most is None else min(2 * good, most)

@@ -1,0 +1,149 @@
+"""The default e-LQR: for the fault's own T_s, for a shorter one where that is too long, and how far designs reach."""
+
+import importlib.util
+from dataclasses import replace
+from fractions import Fraction as F
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import quakedesign as qd
+from quakedesign.certificates import Verdict
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Disturbance, load_fault
+from quakedesign.synthesis.guaranteed import design_held, reached
+
+REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
+SLOW = load_fault(Path(__file__).parents[2] / "data" / "undersampled_fault.toml")
+
+SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
+attacker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(attacker)
+
+
+@cache
+def designed(name):
+    fault = {"real": REAL, "slow": SLOW, "slow 10 ms": replace(SLOW, sampling_time=0.01)}[name]
+    return qd.design(fault, "elqr")
+
+
+def premises(design):
+    return {p.name: p for p in design.premises}
+
+
+def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
+    design = designed("real")
+    found = design.guarantee
+    assert (design.verdict, found.check()) == (Verdict.PROVED, Verdict.PROVED)
+    assert design.certificate is None
+    assert design.controller.step == found.held.step == F("0.184")
+    assert found.claims.slip_rate_error < F(3, 10**4)
+    assert all(p.holds for p in design.premises)
+    assert premises(design)["sampling_time"].certified >= F("0.6")
+    assert premises(design)["delay"].certified >= F("0.4")
+
+
+def test_both_objectives_are_what_they_are_called():
+    peak = qd.design(REAL, "elqr", objective="peak").guarantee.claims
+    tracking = designed("real").guarantee.claims
+    assert peak.slip_rate_error < tracking.slip_rate_error
+    assert peak.slip_rate_error <= F(2, 10**4)
+    with pytest.raises(ParameterError, match="tracking, peak"):
+        qd.design(REAL, "elqr", objective="speed")
+
+
+def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works():
+    design = designed("slow")
+    assert not isinstance(design_held(task_of(SLOW), F(1, 10)), Guarantee)
+    step = design.controller.step
+    assert F(2, 100) < step < F(1, 10)
+    assert design.guarantee.check() is Verdict.PROVED
+    assert "even the nominal loop is not stable" in design.details["reason"]
+    found = premises(design)["sampling_time"]
+    assert (found.holds, found.certified) == (False, step)
+    # the same law held over the fault's own T_s has none
+    assert guarantee(task_of(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize("step", ["0.01", "0.02"])
+def test_sampled_faster_that_fault_is_guaranteed(step):
+    claim = design_held(task_of(SLOW), F(step))
+    assert claim.check() is Verdict.PROVED
+    assert claim.claims.peak_slip_rate < 1e-5  # its natural earthquake: 0.31 m/s
+
+
+def test_an_independent_simulator_does_not_leave_the_guarantee_of_the_shorter_step():
+    claim = designed("slow").guarantee
+    law, task = claim.held.law, claim.task
+    numbers = lambda m: np.array(m, dtype=float)  # noqa: E731
+    held = attacker.Held(
+        F=numbers(law.update),
+        G=numbers(law.measured),
+        C=numbers(law.output),
+        D=numbers(law.feedback),
+        b=float(task.authority),
+        s=tuple(map(float, task.slip_chord)),
+        w=tuple(map(float, task.rate_chord)),
+        beta=tuple(map(float, task.beta)),
+        step=float(claim.held.step),
+        delay=0.0,
+        force=float(task.amplitude + task.reference_force),
+    )
+    largest, _ = attacker.run(held, 40, 6, attacker.switching(held, 2_000, 240, seed=8), 2_000)
+    assert 0 < largest[0].max() <= claim.claims.slip_error
+    assert 0 < largest[1].max() <= claim.claims.slip_rate_error
+
+
+def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
+    fails = NoGuarantee(reason="small gain 1.2", small_gain=None)
+    monkeypatch.setattr("quakedesign.synthesis.guaranteed.default_design.design_held", lambda *_, **__: fails)
+    monkeypatch.setattr("quakedesign.synthesis.guaranteed.default_design.longest_step", lambda *_, **__: None)
+    design = qd.design(REAL, "elqr")
+    assert (design.verdict, design.controller) == (Verdict.UNDECIDED, None)
+    assert design.details["reason"] == "small gain 1.2"
+    assert design.guarantee.sentence().startswith("none: ")
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [REAL.with_disturbance(Disturbance()), replace(REAL, sampling_time=1e-9), replace(REAL, damping=5e16)],
+    ids=["quiet", "sampled fast", "overdamped"],
+)
+def test_unusual_faults_are_designed_or_refused_with_a_reason(fault):
+    found = design_held(task_of(fault), F(repr(fault.sampling_time)))
+    if isinstance(found, Guarantee):
+        assert found.check() is Verdict.PROVED
+    else:
+        assert found.reason
+
+
+def searched(longest, first, most=None):
+    """Times that are tried where a design has a guarantee up to a longest one, and the last that has."""
+    asked = []
+    claim = designed("real").guarantee
+
+    def attempt(time):
+        asked.append(time)
+        if time > longest:
+            return NoGuarantee(reason="too long", small_gain=None)
+        return replace(claim, held=replace(claim.held, step=time))
+
+    found = reached(attempt, first, most=most)
+    return asked, found[-1].held.step if found else None
+
+
+@pytest.mark.parametrize("first", ["1/10", "1", "40"])
+def test_the_longest_time_is_found_within_a_sixteenth(first):
+    asked, found = searched(F(3), F(first))
+    assert F(15, 16) * 3 <= found <= 3
+    assert len(asked) <= 12
+
+
+def test_no_longer_time_than_allowed_is_tried():
+    asked, found = searched(F(100), F(1), most=F(7))
+    assert asked == [1, 2, 4, 7]
+    assert found == 7
+    assert searched(F(0), F(1)) == ([F(1, 2**n) for n in range(12)], None)
