@@ -1,0 +1,330 @@
+"""Numbers in both checkers of a guarantee: gains, integers with errors and roots, against closed forms."""
+
+import importlib.util
+from fractions import Fraction as F
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+from flint import ctx
+from mpmath import mp
+from scipy.linalg import expm
+
+from quakedesign.certificates.guarantee import ball_matrices, sector
+from quakedesign.certificates.guarantee.flow_norms import flow_norms
+from quakedesign.certificates.guarantee.norms import norms
+from quakedesign.loop import ImplicitRoot, PeriodicLoop, Power, Segment
+
+PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
+SPECIFICATION = importlib.util.spec_from_file_location("guarantee_numbers", PATH)
+checker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(checker)
+
+
+def some(random, low, high, parts):
+    return F(random.randint(low, high), parts)
+
+
+# ---------------------------------------------------------------- gains
+
+
+def rationals(rows):
+    return tuple(tuple(map(F, line)) for line in rows)
+
+
+def gains_of_both(flow, jumps, durations, entry, row, *, sudden=False):
+    """The three outputs of the standalone checker are the same one."""
+    named = {"w": tuple(map(F, entry))}
+    jumps, flow = list(map(rationals, jumps)), rationals(flow)
+    ours = norms(
+        PeriodicLoop(
+            states=tuple(f"x{i}" for i in range(len(flow))),
+            flow=flow,
+            segments=tuple(Segment(jump=j, duration=F(d)) for j, d in zip(jumps, durations, strict=True)),
+            inputs={} if sudden else named,
+            outputs={"other": (F(0),) * len(flow), "y": tuple(map(F, row))},
+            sampled=named if sudden else {},
+        )
+    )["y", "w"]
+    lists = lambda rows: [list(line) for line in rows]  # noqa: E731
+    events = [(lists(j), F(d)) for j, d in zip(jumps, durations, strict=True)]
+    outputs = [[F(0)] * len(flow), list(map(F, row)), [2 * F(v) for v in row]]
+    loop = checker.Loop(lists(flow), events, outputs, [], None, sum(map(F, durations)))
+    zeros, theirs, twice = checker.gains(loop, list(named["w"]), sudden)
+    assert max(zeros) < F(1, 10**30)
+    assert all(abs(b - 2 * a) < F(1, 10**30) for a, b in zip(theirs, twice, strict=True))
+    return ours, theirs
+
+
+def both_are(found, exact, share=F(1, 10**20)):
+    for gains in found:
+        assert len(gains) == len(exact)
+        for v, e in zip(gains, exact, strict=True):
+            assert e <= v <= e + (abs(e) + 1) * share
+
+
+def chain(size):
+    return [[int(j == i + 1) for j in range(size)] for i in range(size)]
+
+
+def test_the_area_of_a_parabola_between_ends_of_pieces_is_exact():
+    """Reset at every sample; the response 8σ − σ²/2 is concave and its curvature 1 what is known of it."""
+    flow, nothing = chain(3), [[0] * 3] * 3
+    found = gains_of_both(flow, [nothing], [8], [0, 8, -1], [1, 0, 0])
+    area = lambda t: F(4 * t**2) - F(t**3, 6)  # noqa: E731
+    falls = [8 - i + 1 for i in range(8)]  # |c|·e^{Mh}·|Ab|, with e^{M} = 1 + M + M²/2
+    both_are(found, [area(i + 1) + F(falls[i], 8) for i in range(8)])
+
+
+def test_what_enters_with_the_sample_peaks_between_the_ends_of_a_piece():
+    """9θ − θ² has its peak at 4.5, in the middle of the fifth piece, h²/8·2 above both ends."""
+    found = gains_of_both(chain(3), [[[0] * 3] * 3], [8], [0, 9, -2], [1, 0, 0], sudden=True)
+    ends = [9 * t - t**2 for t in range(9)]
+    both_are(found, [max(ends[i : i + 2]) + F(1, 4) for i in range(8)])
+
+
+def test_what_is_earlier_peaks_between_the_ends_of_a_piece():
+    """An input of the last period, T·v in all, comes with the jump and makes (9θ − θ²)·T."""
+    jump = [[0, 0, 0, 0], [0, 0, 0, 9], [0, 0, 0, -2], [0, 0, 0, 0]]
+    flow = [[*line, 0] for line in chain(3)] + [[0] * 4]
+    found = gains_of_both(flow, [jump], [8], [0, 0, 0, 1], [1, 0, 0, 0])
+    ends = [9 * t - t**2 for t in range(9)]
+    both_are(found, [8 * (max(ends[i : i + 2]) + F(1, 4)) for i in range(8)])
+
+
+def test_what_is_earlier_falls_while_what_is_new_rises():
+    """7·8(1 − θ/16) + 8θ − θ²/2 has its peak at 4.5 as well."""
+    jump = [[0, 0, 7], [0, 0, F(-7, 16)], [0, 0, 0]]
+    found = gains_of_both([[0, 1, 0], [0, 0, 0], [0, 0, 0]], [jump], [8], [8, -1, 1], [1, 0, 0])
+    ends = [56 * (1 - F(t, 16)) + 8 * t - F(t**2, 2) for t in range(9)]
+    both_are(found, [max(ends[i : i + 2]) + F(1, 8) for i in range(8)])
+
+
+@pytest.mark.parametrize("sudden", [False, True])
+@pytest.mark.parametrize("share", ["624/10000", "249/1000", "1/3", "-1/3"])
+def test_the_tail_of_the_past_is_the_rest_of_a_geometric_series(share, sudden):
+    """x → q·x at every sample: what is left of 1 + |q| + q² … is bounded by the sums so far."""
+    q, size = abs(F(share)), F(1) if sudden else F(8)
+    found = gains_of_both([[0]], [[[share]]], [8], [1], [1], sudden=sudden)
+    whole = size * q / (1 - q)
+    exact = [whole + (1 if sudden else i + 1) for i in range(8)]
+    both_are(found, exact, F(1, 10**4))
+
+
+@pytest.mark.parametrize("sudden", [False, True])
+def test_two_flows_of_a_period_follow_each_other(sudden):
+    """x → x/2, 8 s, x → x/3, 16 s: parts of both, those before in the same period, and all earlier ones."""
+    found = gains_of_both([[0]], [[["1/2"]], [["1/3"]]], [8, 16], [1], [1], sudden=sudden)
+    if sudden:
+        first = F(1) / (1 - F(1, 6))
+        exact = [first] * 8 + [first / 3] * 8
+    else:
+        before = (16 + F(8, 3)) / (1 - F(1, 6))
+        second = (before / 2 + 8) / 3
+        exact = [before / 2 + i + 1 for i in range(8)] + [second + 2 * (i + 1) for i in range(8)]
+    both_are(found, exact, F(1, 10**4))
+
+
+def test_three_flows_of_a_period_with_bends_count_in_every_one():
+    """The area of 8σ − σ²/2 over 8, 4 and 2 s is kept by the jumps, times q once a period, and all else reset."""
+    keep, q = [[1, 0, 0], [0, 0, 0], [0, 0, 0]], F(624, 10000)
+    times = [8, 4, 2]
+    found = gains_of_both(chain(3), [[[q, 0, 0], [0] * 3, [0] * 3], keep, keep], times, [0, 8, -1], [1, 0, 0])
+    area = lambda t: 4 * t**2 - F(t**3, 6)  # noqa: E731
+    before, exact = q * sum(map(area, times)) / (1 - q), []
+    for time in times:
+        h = F(time, 8)
+        exact += [before + area((i + 1) * h) + (8 - i * h + h) * h**2 / 8 for i in range(8)]
+        before += area(time)
+    both_are(found, exact, F(1, 10**5))
+
+
+def upper_sum(flow, entry, row, piece):
+    """The sums of FORMAT.md in floats: stretches of 64 pieces, twice as long each time, and what is left."""
+    size = len(flow)
+    a, state = np.array(flow, float), np.column_stack([np.eye(size), np.array(entry, float)])
+    c, major = np.array(row, float), np.abs(a) - np.diag(np.abs(np.diag(a)))
+    major += np.diag(np.maximum(np.diag(a), 0))
+    near, sums = expm(major * piece), np.zeros(size + 1)
+    while True:
+        step = expm(a * piece)
+        for _ in range(64):
+            after = step @ state
+            sums += piece / 2 * (np.abs(c @ state) + np.abs(c @ after))
+            sums += piece**3 / 12 * (np.abs(c) @ near @ np.abs(a @ a @ state))
+            state = after
+        late = sums[:size] @ np.abs(state)
+        if (late[:size] <= sums[:size] / 4096).all():
+            return sums[size] + late[size] * 4096 / 4095
+        near = np.maximum(near, np.abs(step) @ near)
+        piece *= 2
+
+
+SCALE = 2**20
+FLOWING = [
+    ([[-1]], [1], [1]),
+    ([[-3, 1], [1, -2]], [1, -2], [2, 1]),
+    ([[-1, 2], [-2, F(-1, 2)]], [1, 1], [1, -3]),
+    ([[F(1, 2), 2, 0], [-2, -3, 1], [0, -1, -1]], [0, 1, 0], [1, 0, 1]),
+]
+
+
+@pytest.mark.parametrize(("flow", "entry", "row"), FLOWING)
+def test_gains_in_continuous_time_are_the_sums_that_are_written_down(flow, entry, row):
+    largest, first = max(sum(map(abs, line)) for line in flow), F(1)
+    pieces = {}
+    for name, share in (("package", F(1, 4096)), ("standalone", F(1, 64))):
+        while first * largest > share or (name == "package" and first * largest == share):
+            first /= 2
+        pieces[name], first = float(first), F(1)
+    named = tuple(map(F, entry))
+    ours = PeriodicLoop(
+        states=tuple(f"x{i}" for i in range(len(flow))), flow=rationals(flow), segments=(),
+        inputs={"first": named[::-1], "w": named}, outputs={"z": tuple(map(F, row[::-1])), "y": tuple(map(F, row))},
+    )  # fmt: skip
+    found = flow_norms(ours)
+    assert found.keys() == {(y, w) for y in "zy" for w in ("first", "w")}
+    assert float(found["y", "w"][0]) == pytest.approx(upper_sum(flow, entry, row, pieces["package"]), rel=1e-9)
+    for scale in (1, F(SCALE), F(1, SCALE)):  # of the first state: another unit
+        units = [scale if i == 0 else 1 for i in range(len(flow))]
+        other = [[F(v) * units[j] / units[i] for j, v in enumerate(line)] for i, line in enumerate(flow)]
+        outputs = [[F(v) * u for v, u in zip(line, units, strict=True)] for line in (row, row[::-1])]
+        loop = checker.Loop(other, [], outputs, [], None, F(0))
+        given = [F(v) / u for v, u in zip(entry, units, strict=True)]
+        (theirs,), (turned,) = checker.gains(loop, given, False)
+        assert float(theirs) == pytest.approx(upper_sum(flow, entry, row, pieces["standalone"]), rel=1e-9)
+        assert float(turned) == pytest.approx(upper_sum(flow, entry, row[::-1], pieces["standalone"]), rel=1e-9)
+
+
+def test_the_majorant_has_no_negative_entry():
+    flow = rationals([[-2, -3], [4, 5]])
+    assert checker.majorant(list(map(list, flow))) == [[0, 3], [4, 5]]
+    assert ball_matrices.majorant(ball_matrices.matrix(flow)).tolist() == [[0, 3], [4, 5]]
+
+
+# ---------------------------------------------------------------- integers with bounds of their errors
+
+UNIT = 1 << checker.BITS
+FIXED = [
+    (([[1]], 0), ([[UNIT - 1]], UNIT - 1)),
+    (([[UNIT - 1]], UNIT - 1), ([[1]], 0)),
+    (([[3, -5]], 2), ([[UNIT - 1], [7 - UNIT]], 3)),
+    (([[UNIT, 1], [-UNIT, UNIT]], 1), ([[1, -1], [UNIT - 1, 1 - UNIT]], UNIT // 3)),
+]
+
+
+@pytest.mark.parametrize(("one", "other"), FIXED)
+def test_products_enclose_what_the_factors_enclose(one, other):
+    """Worst of all corners: |Σ (a ± e)(b ± f)/2^BITS − entry| ≤ error, and not much less."""
+    found = checker.Fixed(*one) * checker.Fixed(*other)
+    room = []
+    for i, line in enumerate(one[0]):
+        for j, entry in enumerate(found.rows[i]):
+            column = [row[j] for row in other[0]]
+            corners = [[(a + s * one[1]) * (b + t * other[1]) for s in (-1, 1) for t in (-1, 1)]
+                       for a, b in zip(line, column, strict=True)]  # fmt: skip
+            ends = sum(map(min, corners)), sum(map(max, corners))
+            room.append(min(found.error - abs(F(end, UNIT) - entry) for end in ends))
+    assert 0 <= min(room) <= 3 + max(one[1], other[1]) // UNIT
+
+
+def test_sums_scales_and_sizes_enclose_what_their_parts_enclose():
+    a, b = checker.Fixed([[2, -7]], 2), checker.Fixed([[5, 1]], 3)
+    assert (a + b) == checker.Fixed([[7, -6]], 5)
+    assert a.scaled(F(1, 3)) == checker.Fixed([[0, -3]], 2)  # 4/3 and −3 at the ends
+    assert a.scaled(F(2)) == checker.Fixed([[4, -14]], 6)
+    assert a.size() == checker.Fixed([[4, 9]], 0)
+    assert a.sums() == [13]
+    assert a.beside(b) == checker.Fixed([[2, -7, 5, 1]], 3)
+    assert b.above(a, a) == checker.Fixed([[5, 1], [2, -7], [2, -7]], 3)
+    assert checker.fixed([[F(1, 3), F(-1, 3)]]) == checker.Fixed([[UNIT // 3, -UNIT // 3]], 1)
+    assert checker.column([F(1), F(2)]).rows == [[UNIT], [2 * UNIT]]
+
+
+@pytest.mark.parametrize("rows", [[[checker.LARGEST + 1]], [[0, -checker.LARGEST - 1]]])
+def test_numbers_of_an_absurd_size_are_refused(rows):
+    with pytest.raises(checker.Refused, match="ordinary size"):
+        checker.bounded(checker.Fixed(rows, 0))
+    with pytest.raises(checker.Refused, match="ordinary size"):
+        checker.bounded(checker.Fixed([[0]], checker.LARGEST + 1))
+    assert checker.bounded(checker.Fixed([[checker.LARGEST]], checker.LARGEST)).error == checker.LARGEST
+
+
+@pytest.mark.parametrize("time", ["1/2", "1", "3", "40"])
+def test_exponentials_of_matrices_enclose_their_closed_forms(time):
+    """e^{−t}, a rotation by 2t, and the chain 1, t, t²/2."""
+    with mp.workdps(150):
+        t = mp.mpf(F(time).numerator) / F(time).denominator
+        cases = [
+            ([[-1]], [[mp.exp(-t)]]),
+            ([[0, 2], [-2, 0]], [[mp.cos(2 * t), mp.sin(2 * t)], [-mp.sin(2 * t), mp.cos(2 * t)]]),
+            (chain(3), [[1, t, t**2 / 2], [0, 1, t], [0, 0, 1]]),
+        ]
+        for flow, exact in cases:
+            found = checker.exponential([list(map(F, line)) for line in flow], F(time))
+            assert found.error < 2**60
+            for line, expected in zip(found.rows, exact, strict=True):
+                assert all(abs(e * UNIT - v) <= found.error for v, e in zip(line, expected, strict=True))
+
+
+def test_a_flow_that_changes_by_an_absurd_factor_is_refused():
+    with pytest.raises(checker.Refused, match="ordinary size"):
+        checker.exponential([[F(1)]], F(4097))
+    assert checker.exponential([[F(-1)]], F(4096)).rows[0][0] <= checker.exponential([[F(-1)]], F(4096)).error
+
+
+@pytest.mark.parametrize("q", range(1, 7))
+def test_roots_of_integers_are_floors(q):
+    for base in (1, 2, 3, 10, 2**30 - 1, 3**20):
+        assert [checker.whole_root(base**q + d, q) for d in (-1, 0, 1)] == [base - 1, base, base + (q == 1)]
+    assert checker.whole_root(0, q) == 0
+
+
+# ---------------------------------------------------------------- an implicit step
+
+
+def plain(terms):
+    return [(list(t.factor), t.exponent, t.argument if isinstance(t.argument, str) else plain(t.argument))
+            for t in terms]  # fmt: skip
+
+
+def lower_end(terms, slip, rate):
+    """In 100 digits."""
+    total = mp.mpf(0)
+    for t in terms:
+        plain = {"slip": slip, "rate": rate}
+        x = plain[t.argument] if isinstance(t.argument, str) else lower_end(t.argument, slip, rate)
+        c, a = t.factor[x < 0], mp.mpf(t.exponent.numerator) / t.exponent.denominator
+        size = abs(x) ** a if x or not a else mp.mpf(a == 0)
+        total += (-size if x < 0 else size) * c.numerator / c.denominator
+    return total
+
+
+def test_both_bound_a_sum_of_powers_from_below():
+    random = Random(7)
+    powers = [F(0), F(1, 3), F(1, 2), F(2, 3), F(1), F(3, 2), F(6)]
+
+    def term(of):
+        return Power(factor=(some(random, 1, 4, 3), some(random, 5, 9, 3)), exponent=random.choice(powers), argument=of)
+
+    for _ in range(60):
+        pull = (term("slip"), term("rate"), term((term("slip"), term("rate"))))
+        slip, rate = some(random, -5, 5, 7), some(random, -5, 5, 11)
+        with mp.workdps(100), ctx.workprec(128):
+            exact = lower_end(pull, *(mp.mpf(v.numerator) / v.denominator for v in (slip, rate)))
+            theirs = checker.least(plain(pull), slip, rate)
+            ours = sector._least(pull, *(ball_matrices.ball(v).lower() for v in (slip, rate)))
+            for found in (theirs, F(int(ours.fmpq().p), int(ours.fmpq().q))):
+                assert -1e-30 < mp.mpf(found.numerator) / found.denominator - exact <= 1e-80
+
+
+@pytest.mark.parametrize(("room", "shown"), [(F(1, 2**11), True), (F(1, 2**11) - F(1, 2**40), False)])
+def test_lines_are_shown_after_ten_halvings_or_not_at_all(room, shown):
+    """q = e1 + T·w, one slope 1/2, T = 1: on a part of width δ 2ε − R − δ/2 is left, which 2^−10 just allows."""
+    pull = (Power(factor=(F(1), F(1)), exponent=F(1), argument="slip"),)
+    for slopes in ((F(1, 2), F(1)), (F(0), F(1, 2))):
+        root = ImplicitRoot(pull=pull, slopes=slopes, remainder=F(1))
+        other = checker.Root(plain(pull), list(slopes), F(1))
+        assert sector.holds(root, F(1), F(1), 2 - room) == shown
+        assert checker.root_within(other, F(1), F(1), 2 - room) == shown

@@ -1,0 +1,255 @@
+"""Both checkers of a guarantee part by part: against each other on random data, and against closed forms."""
+
+import importlib.util
+import json
+from contextlib import nullcontext
+from dataclasses import replace
+from fractions import Fraction as F
+from functools import cache
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.guarantee import (
+    Bounds,
+    Claims,
+    ContinuousPeaks,
+    Guarantee,
+    Held,
+    Task,
+    theorem,
+)
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.guarantee.task import Friction
+from quakedesign.certificates.guarantee.theorem import bounds_from, certified_bounds, channels_of
+from quakedesign.errors import ParameterError
+from quakedesign.loop import (
+    ContinuousLaw,
+    ImplicitRoot,
+    LinearLaw,
+    PeriodicLoop,
+    Power,
+    Segment,
+)
+
+PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
+SPECIFICATION = importlib.util.spec_from_file_location("guarantee_parts", PATH)
+checker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(checker)
+
+SHAPES = [(0, 0, 3, -2), (0, 0, 0, 10, -15, 6), (0, 0, 0, 4, -3), (0, 0, 6, -8, 3)]
+OUTPUTS = ("slip_error", "slip_rate_error", "push")
+
+
+def some(random, low, high, parts=1):
+    return F(random.randint(low, high), parts)
+
+
+def some_task(random):
+    least = some(random, 1, 4, 10)
+    static = least + some(random, 0, 3, 10)
+    tenths = lambda high: some(random, 0, high, 10)  # noqa: E731
+    return Task(
+        name="fault",
+        density=some(random, 1, 9),
+        shear_modulus=some(random, 1, 50),
+        length=some(random, 2, 5, 2),
+        damping=some(random, 0, 9),
+        normal_stress=some(random, 1, 9),
+        spreads=(tenths(4), tenths(4), tenths(4)),
+        friction=Friction(
+            static=static,
+            least=least,
+            largest=static + tenths(3),
+            weakening=tenths(5),
+            strengthening=tenths(5),
+            rate_slope=random.choice([F(0), tenths(3)]),
+        ),
+        shape=tuple(map(F, random.choice(SHAPES))),
+        target_slip=some(random, 1, 20, 10),
+        operation_time=some(random, 1, 9, 2),
+        amplitude=some(random, 0, 5),
+        change=random.choice([None, some(random, 0, 5)]),
+        growths=(some(random, -9, 9, 4), some(random, -9, 9, 4)),
+    )
+
+
+def some_rows(random, height, width):
+    return tuple(tuple(some(random, -9, 9, 4) for _ in range(width)) for _ in range(height))
+
+
+def singular(random, size):
+    """Rows of which the last follows from the others, some of them and some columns zero."""
+    rows = [[v * random.randint(0, 3) for v in line] for line in some_rows(random, size - 1, size)]
+    gone = random.randint(0, 2 * size)
+    rows = [[F(0) if j == gone else v for j, v in enumerate(line)] for line in rows]
+    rows.append([sum((line[j] for line in rows), F(0)) for j in range(size)])
+    random.shuffle(rows)
+    return rows
+
+
+def some_root(random):
+    low, high = sorted(some(random, 0, 4, 4) for _ in range(2))
+    inner = Power(factor=(F(1), F(2)), exponent=F(3, 2), argument="rate")
+    pull = (Power(factor=(F(1, 2), F(1)), exponent=F(1, 3), argument=(inner,)),)
+    return ImplicitRoot(pull=pull, slopes=(low, high), remainder=some(random, 0, 3))
+
+
+def some_claims(random):
+    size = [some(random, 1, 9, 4) for _ in range(4)]
+    return Claims(
+        slip_error=UpperBound(size[0]),
+        slip_rate_error=UpperBound(size[1]),
+        peak_slip_rate=UpperBound(size[2]),
+        least_pressure=LowerBound(-size[3]),
+        largest_pressure=UpperBound(size[0]),
+    )
+
+
+def some_held(random):
+    n, step = random.randint(1, 3), some(random, 1, 9, 4)
+    root = random.choice([None, some_root(random)])
+    seen = 2 + (root is not None)
+    still = singular(random, n)
+    law = LinearLaw(
+        states=tuple(f"z{i}" for i in range(n)),
+        update=tuple(tuple(v + (i == j) for j, v in enumerate(line)) for i, line in enumerate(still)),
+        measured=some_rows(random, n, seen),
+        output=some_rows(random, 1, n)[0],
+        feedback=some_rows(random, 1, seen)[0],
+        root=root,
+    )
+    delay = step * random.choice([F(0), F(0), F(1, 3), F(1), F(5, 2), F(8)])
+    return Held(law=law, step=step, delay=delay, lag=random.choice([F(0), F(1, 3)]))
+
+
+def some_continuous(random):
+    n = random.randint(1, 3)
+    return ContinuousLaw(
+        states=tuple(f"z{i}" for i in range(n)),
+        rates=tuple(map(tuple, singular(random, n))),
+        measured=some_rows(random, n, 2),
+        output=some_rows(random, 1, n)[0],
+        feedback=some_rows(random, 1, 2)[0],
+        of_reference=random.choice([(F(0), F(0)), some_rows(random, 1, 2)[0]]),
+    )
+
+
+def document_of(claim):
+    return json.loads(guarantee_text(claim))
+
+
+@cache
+def some_tasks():
+    """Four tasks, each as both read it."""
+    random = Random(5)
+    found = [replace(some_task(random), shape=tuple(map(F, shape))) for shape in SHAPES]
+    held = some_held(random)
+    raws = [document_of(Guarantee(task=task, held=held, claims=some_claims(random))) for task in found]
+    return [(task, checker.read_task(raw)) for task, raw in zip(found, raws, strict=True)]
+
+
+def test_both_derive_the_same_ranges_and_inputs_from_a_fault():
+    random, held = Random(1), some_held(Random(6))
+    for _ in range(16):
+        task = some_task(random)
+        found = checker.read_task(document_of(Guarantee(task=task, held=held, claims=some_claims(random))))
+        assert (found.name, found.b, found.s, found.w) == ("fault", task.authority, task.slip_chord, task.rate_chord)
+        assert (found.beta, found.rest) == (task.beta, task.rest_pressure)
+        assert (found.reference_rate, found.reference_force) == (task.reference_rates[0], task.reference_force)
+        assert (found.drift, found.amplitude, found.change) == (task.drift, task.amplitude, task.change)
+        assert found.reference_acceleration == task.reference_rates[1]
+        smooth = task.shape == SHAPES[1]
+        assert found.reference_jerk == (task.reference_jerk if smooth else None)
+        with nullcontext() if smooth else pytest.raises(ParameterError, match="without acceleration"):
+            task.require_smooth_reference()
+        half = task.half_ranges
+        force, drift, coupling, shifted = checker.inputs(found, half["push"])
+        ours = channels_of(task, None, held.step)
+        assert [c.own for c in ours] == [force, drift]
+        assert [c.shares for c in ours] == [half, {"slip_rate_error": coupling}]
+        zero = {(y, k): (F(0),) for y in OUTPUTS for k in ("acceleration", "drift")}
+        assert bounds_from(task, zero, None, held.step).push == shifted
+
+
+def unless(error, work, *arguments):
+    """None if it is refused."""
+    try:
+        return work(*arguments)
+    except error:
+        return None
+
+
+def test_both_build_the_same_loop_of_a_law_that_is_held():
+    random, built = Random(2), 0
+    for i in range(60):
+        (task, read), held = some_tasks()[i % 4], some_held(random)
+        raw = document_of(Guarantee(task=task, held=held, claims=some_claims(random)))
+        ours = unless(ParameterError, held.loop, task)
+        theirs = unless(checker.Refused, checker.read_loop, raw["loop"], read)
+        assert (ours is None) == (theirs is None)
+        if ours:
+            built += 1
+            assert theirs.flow == [list(line) for line in ours.flow]
+            jumps = [([list(line) for line in s.jump], s.duration) for s in ours.segments]
+            assert theirs.events == jumps
+            assert theirs.outputs == [list(ours.outputs[y]) for y in OUTPUTS]
+            entries = [ours.inputs["acceleration"], ours.inputs["drift"], *ours.sampled.values()]
+            assert theirs.inputs == list(map(list, entries))
+            assert (theirs.step, theirs.root is None) == (ours.period, held.law.root is None)
+            assert len(ours.states) == len(set(ours.states)) == len(ours.flow)
+            claim = Guarantee(task=task, held=held, claims=some_claims(random))
+            assert parse_guarantee(guarantee_text(claim)) == claim
+    assert built > 25
+
+
+def test_both_build_the_same_loop_in_continuous_time():
+    random, built = Random(3), 0
+    for i in range(30):
+        (task, read), law = some_tasks()[i % 4], some_continuous(random)
+        claim = ContinuousPeaks(task=task, law=law, claims=some_claims(random))
+        raw = document_of(claim)
+        ours = unless(ParameterError, getattr, claim, "loop")
+        theirs = unless(checker.Refused, checker.read_loop, raw["loop"], read)
+        assert (ours is None) == (theirs is None)
+        if ours:
+            built += 1
+            assert theirs.flow == [list(line) for line in ours.flow]
+            assert theirs.outputs == [list(ours.outputs[y]) for y in OUTPUTS]
+            named = ("acceleration", "drift", *(FORWARD if any(law.of_reference) else ()))
+            nothing = (F(0),) * len(ours.flow)
+            assert theirs.inputs == [list(ours.inputs.get(name, nothing)) for name in named]
+            assert (theirs.events, theirs.root, ours.period) == ([], None, 0)
+            assert parse_guarantee(guarantee_text(claim)) == claim
+    assert built > 12
+
+
+FORWARD = ("reference_acceleration", "reference_jerk")
+
+
+@pytest.mark.parametrize("more", [(), ("root",), FORWARD])
+def test_both_draw_the_same_bounds_from_the_same_gains(more, monkeypatch):
+    """Three parts of a period, of which another one is the worst for every output; the better of both classes."""
+    random, proved = Random(4), 0
+    names, parts = ("acceleration", "drift", *more), 1 if more == FORWARD else 3
+    for i in range(32):
+        (task, read), step = some_tasks()[1 if more == FORWARD else i % 4], some(random, 1, 9, 4)
+        root = some_root(random) if more == ("root",) else None
+        table = {(y, k): tuple(some(random, 0, 9, 900 >> i % 8) for _ in range(parts)) for y in OUTPUTS for k in names}
+        answers = iter([[list(table[y, k]) for y in OUTPUTS] for k in names])
+        events = [] if more == FORWARD else [([], step)]
+        monkeypatch.setattr(checker, "gains", lambda *_, queue=answers: next(queue))
+        monkeypatch.setattr(theorem, "flow_norms" if more == FORWARD else "norms", lambda _, known=table: known)
+        given = checker.Root([], list(root.slopes), root.remainder) if root else None
+        loop = checker.Loop([], events, [], [[] for _ in names], given, step)
+        segments = tuple(Segment(jump=(), duration=step) for _ in events)
+        found = certified_bounds(task, PeriodicLoop(states=(), flow=(), segments=segments, inputs={}, outputs={}), root)
+        theirs = unless(checker.Refused, checker.bounds, read, loop)
+        assert (theirs is None) == (not isinstance(found, Bounds))
+        if theirs:
+            proved += 1
+            assert theirs[0] == [found.slip_error, found.slip_rate_error, found.push]
+            assert abs(theirs[1] - found.small_gain) <= found.small_gain / 2**19
+    assert 10 < proved < 32
