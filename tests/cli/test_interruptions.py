@@ -146,8 +146,8 @@ def _length(run, tmp_path, command):
 
 
 def test_an_interruption_ends_with_one_line(start):
-    process = start("-m", "quakedesign", "synthesise", "cta", "--objective", "decay", "--workers", "1")
-    at_work(process, 1)
+    process = start("-m", "quakedesign", *GAINS.split())
+    at_work(process, 2)
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -156,8 +156,8 @@ def test_an_interruption_ends_with_one_line(start):
 
 def test_a_job_in_the_background_is_not_interrupted(start):
     """A shell lets such jobs ignore SIGINT, and nohup SIGHUP; SIGTERM ends them."""
-    process = start("-m", "quakedesign", "synthesise", "cta", ignored=("SIGINT", "SIGHUP"))
-    at_work(process, 1)
+    process = start("-m", "quakedesign", *GAINS.split(), ignored=("SIGINT", "SIGHUP"))
+    at_work(process, 2)
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGINT):
         process.send_signal(number)
     with pytest.raises(subprocess.TimeoutExpired):
