@@ -6,7 +6,7 @@ import select
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from threading import Thread, current_thread, main_thread
 from time import monotonic
 from types import FrameType
@@ -37,6 +37,7 @@ class _Ending:
         self._last = last
         self._number: int | None = None
         self._said = False
+        self._held = self._waits = False
         self._before = number_placed()
         self.remedy: str | None = None
         self.reported = sys.unraisablehook
@@ -44,8 +45,20 @@ class _Ending:
     def receive(self, number: int, _frame: FrameType | None) -> None:
         """Handle the first signal; further ones do not disturb the end."""
         if self._number is None:
-            self._number = number
-            raise Interruption
+            self._number, self._waits = number, self._held
+            if not self._held:
+                raise Interruption
+
+    @contextmanager
+    def held_back(self) -> Iterator[None]:
+        """Raise what arrives in the block at its end; Python handles signals that any of its threads has received."""
+        self._held = True
+        try:
+            yield
+        finally:
+            self._held, waits, self._waits = False, self._waits, False
+            if waits:
+                raise Interruption
 
     def watch(self, reader: int) -> None:
         """End the process where it has not ended by itself some time after a signal."""
@@ -99,6 +112,19 @@ def remedy(text: str) -> None:
     """Say this, instead of whether anything was written, if the command is interrupted from now on."""
     if _ending is not None:
         _ending.remedy = text
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Signals wait until the block has ended; the processes that it starts inherit that."""
+    blocks = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS) if blocks else ()
+    try:
+        with nullcontext() if _ending is None else _ending.held_back():
+            yield
+    finally:
+        if blocks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

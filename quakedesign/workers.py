@@ -8,7 +8,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from multiprocessing import parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
 from threading import Thread
@@ -16,7 +15,7 @@ from types import TracebackType
 from typing import Any, Self, cast
 
 from quakedesign.errors import ParameterError, SimulationError
-from quakedesign.interruption import SIGNALS
+from quakedesign.interruption import SIGNALS, undisturbed
 
 _LIVES = 3
 _PR_SET_PDEATHSIG = 1
@@ -114,7 +113,7 @@ class Processes(Crew):
 
     def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Crew.submit`."""
-        with _undisturbed():
+        with undisturbed():  # no process starts that is not known
             try:
                 return self._pool.submit(task, *arguments)
             except (OSError, ValueError) as error:  # a death closed the pipes of the process that was to start
@@ -173,19 +172,6 @@ def require_workers(count: int) -> int:
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise ParameterError(f"workers must be a whole number of at least 1. Received {count!r}.")
     return count
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Signals wait while processes start, so that none is started and not known; the processes inherit that."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _enlist(begin: Callable[..., object] | None, arguments: tuple) -> None:

@@ -4,11 +4,12 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
-from quakedesign.interruption import SIGNALS, ending, remedy
+from quakedesign.interruption import SIGNALS, ending, remedy, undisturbed
 from quakedesign.output import write_whole
 
 
@@ -62,6 +63,26 @@ def test_further_signals_do_not_disturb_the_end(capsys):
 
     assert ended(block, capsys)[0] == 143
     assert done == ["in order"]
+
+
+def test_a_signal_waits_for_the_block_even_if_another_thread_receives_it(capsys):
+    """As the thread that watches over the end does: a process that starts meanwhile would not be known."""
+    done, over = [], threading.Event()
+    other = threading.Thread(target=over.wait)
+    other.start()
+
+    def block():
+        with undisturbed():
+            signal.pthread_kill(other.ident, signal.SIGTERM)
+            for _ in range(20):  # bytecode, between which Python calls its handlers
+                time.sleep(0.01)
+            done.append("the block")
+        done.append("what follows")
+
+    code, said = ended(block, capsys)
+    over.set()
+    other.join()
+    assert (code, done, said) == (143, ["the block"], "quakedesign: terminated; nothing was written.\n")
 
 
 def test_an_ignored_signal_stays_ignored(capsys):
