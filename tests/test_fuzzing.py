@@ -346,7 +346,7 @@ MINUTES = {"design", "compare", "certify", "assess", "natural_earthquake", "run_
 MINUTES |= {"decide", "largest", "accuracy", "gain_sensitivity", "noise_sensitivity", "weight_study", "velocity_step"}
 
 
-MINUTES |= {"limits", "answer", "design_held", "worst_found", "certified_peaks"}
+MINUTES |= {"limits", "answer", "design_held", "worst_found"}
 
 
 @cache

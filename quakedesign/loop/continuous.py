@@ -46,7 +46,7 @@ class ContinuousLaw:
 
 
 def exact_integrals(gains: tuple[Fraction, ...], *, of_state: bool = False) -> ContinuousLaw:
-    """The e-LQR in continuous time: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1′ = e1, ξ2′ = ξ1.
+    """The e-LQR in continuous time: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1′ = e1, ξ2′ = ξ1, without unused integrals.
 
     Parameters
     ----------
@@ -64,11 +64,12 @@ def exact_integrals(gains: tuple[Fraction, ...], *, of_state: bool = False) -> C
         raise ParameterError(f"gains of exact_integrals must be four. Received {len(gains)}. Give k1 to k4.")
     k1, k2, k3, k4 = gains
     zero, one = Fraction(0), Fraction(1)
+    used = 2 if k4 else 1 if k3 else 0
     return ContinuousLaw(
-        states=("xi1", "xi2"),
-        rates=((zero, zero), (one, zero)),
-        measured=((one, zero), (zero, zero)),
-        output=(-k3, -k4),
+        states=("xi1", "xi2")[:used],
+        rates=tuple(row[:used] for row in ((zero, zero), (one, zero))[:used]),
+        measured=((one, zero), (zero, zero))[:used],
+        output=(-k3, -k4)[:used],
         feedback=(-k1, -k2),
         of_reference=(-k1, -k2) if of_state else (zero, zero),
     )

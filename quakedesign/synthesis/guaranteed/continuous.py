@@ -37,6 +37,10 @@ def certified_peaks(
     if controller.offset:
         raise ParameterError("a certified peak needs a law that starts with p = 0. Received one with an offset.")
     law = exact_integrals(tuple(controller.gains.values()), of_state=controller.feedback == "state")
+    needed = 1 + any(law.of_reference)
+    if len(law.states) < needed:
+        few = f"too few integrals for feedback of the {controller.feedback}: {needed} needed, {len(law.states)} in use"
+        return NoGuarantee(reason=few, small_gain=None)
     found, limits = continuous_peaks(task_of(fault, rate_limited=disturbance_class == "rate"), law), controller.limits
     if limits is None or isinstance(found, NoGuarantee):
         return found

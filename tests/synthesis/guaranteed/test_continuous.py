@@ -165,6 +165,17 @@ def test_what_is_not_covered_is_refused(real, designed):
         certified_peaks(real, replace(designed, offset=F(10)))
 
 
+def test_a_law_may_have_one_integral_and_says_so_if_it_has_too_few(real):
+    """k4 = 0: the same theorem with one state less; feedback of the state lets one integral drift along a reference."""
+    one = certified_peaks(real, ExtendedLQR.from_values((*GAINS["real-fault"][:3], "0")))
+    assert one.check() is Verdict.PROVED
+    assert worst_found(one).slip_rate_error < one.claims.slip_rate_error < 2 * worst_found(one).slip_rate_error
+    none = certified_peaks(real, ExtendedLQR.from_values((*GAINS["real-fault"][:2], "0", "0")))
+    assert none.reason == "too few integrals for feedback of the error: 1 needed, 0 in use"
+    drifting = certified_peaks(real, ExtendedLQR.from_values((*GAINS["real-fault"][:3], "0"), feedback="state"))
+    assert drifting.reason == "too few integrals for feedback of the state: 2 needed, 1 in use"
+
+
 def test_an_unstable_loop_and_a_large_gain_say_why(real, designed):
     bad = certified_peaks(real, replace(designed, gains={n: -k for n, k in designed.gains.items()}))
     assert "for a pressure that acts at once (continuous time) even the nominal loop is not stable" in bad.reason
