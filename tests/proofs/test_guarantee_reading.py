@@ -1,0 +1,213 @@
+"""What both checkers of a guarantee take from a file: every limit just reached and just passed, and the last steps."""
+
+import copy
+import importlib.util
+import json
+from fractions import Fraction as F
+from pathlib import Path
+
+import pytest
+
+from quakedesign.certificates.guarantee.files import parse_guarantee
+from quakedesign.errors import CertificateError
+
+PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
+SPECIFICATION = importlib.util.spec_from_file_location("guarantee_reading", PATH)
+checker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(checker)
+
+CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
+HELD = {
+    "format": 1,
+    "kind": "guarantee",
+    "fault": {
+        "name": "a fault",
+        "density": "2",
+        "shear_modulus": "3",
+        "length": "2",
+        "damping": "1",
+        "normal_stress": "9",
+        "spreads": {"stiffness": "0", "damping": "1/10", "authority": "1/5"},
+        "friction": {"static": "2/5", "least": "1/5", "largest": "3/5",
+                     "weakening": "1/10", "strengthening": "1/20", "rate_slope": "1/100"},
+    },
+    "reference": {"shape": ["0", "0", "3", "-2"], "target_slip": "2", "operation_time": "5"},
+    "disturbance": {"amplitude": "1/3", "change": "1/7", "growths": {"slip": "1/9", "rate": "-1/9"}},
+    "loop": {"step": "1", "delay": "0", "lag": "0", "states": ["z"], "update": [["1"]],
+             "measured": [["1", "1"]], "output": ["1"], "feedback": ["1", "1"]},
+    "claims": dict(zip(CLAIMS, ("1", "2", "3", "-4", "5"), strict=True)),
+}  # fmt: skip
+
+
+def changed(raw, *changes):
+    raw = copy.deepcopy(raw)
+    for path, new in changes:
+        holder = raw
+        for key in path[:-1]:
+            holder = holder[key]
+        holder[path[-1]] = new
+    return raw
+
+
+TERM = {"factor": ["1/2", "1"], "power": "1/3", "of": "slip"}
+ROOT = {"pull": [TERM, {"factor": ["1", "1"], "power": "1", "of": [TERM]}], "slopes": ["1/2", "1"], "remainder": "1/9"}
+ROOTED = changed(HELD, (("loop", "root"), ROOT), (("loop", "measured"), [["1"] * 3]), (("loop", "feedback"), ["1"] * 3))
+CONTINUOUS = changed(
+    HELD,
+    (("loop",), {"rates": [["0"]], **{key: HELD["loop"][key] for key in ("states", "measured", "output", "feedback")}}),
+)
+
+
+def many(states, delay, lag):
+    """A law of so many states, all integrals."""
+    rows = [[str(int(i == j)) for j in range(states)] for i in range(states)]
+    loop = HELD["loop"] | {"delay": delay, "lag": lag, "states": [f"z{i}" for i in range(states)], "update": rows}
+    return changed(HELD, (("loop",), loop | {"measured": [["1", "0"]] * states, "output": ["1"] * states}))
+
+
+def wide(count):
+    return [TERM] * count
+
+
+LIMITS = [
+    (HELD, ("fault", "name"), ["x" * 60, "a-b.c+d e_f"], ["", "x" * 61, "a\n", "-a", 5, None]),
+    *[(HELD, ("fault", key), ["1/9"], ["0", "-1"]) for key in ("density", "shear_modulus", "length", "normal_stress")],
+    (HELD, ("fault", "damping"), ["0", "1/2"], ["-1/2"]),
+    *[(HELD, ("fault", "spreads", key), ["0", "99/100"], ["1", "-1/10"]) for key in HELD["fault"]["spreads"]],
+    (HELD, ("fault", "friction", "least"), ["2/5", "1/100"], ["0", "-1", "41/100"]),
+    (HELD, ("fault", "friction", "largest"), ["2/5"], ["39/100"]),
+    *[(HELD, ("fault", "friction", key), ["0", "1/2"], ["-1/2"])
+      for key in ("weakening", "strengthening", "rate_slope")],
+    (HELD, ("reference", "shape"),
+     [["0", "0", "3", "-2", *["0"] * 9], ["0", "0", "0", "4", "-3"], ["0", "0", "6", "-8", "3"]],
+     [["0", "1"], ["0", "0", "3", "-2", *["0"] * 10], "x", ["1", "0", "0"], ["0", "0", "6", "-4"],
+      ["0", "1", "1", "-1"], ["0", "0", "1"], ["0", "0", "33", "-62", "30"], ["1", "0", "-3", "2"], ["0", "0", "3", -2]]),
+    *[(HELD, ("reference", key), ["1/2"], ["0", "-1"]) for key in ("target_slip", "operation_time")],
+    (HELD, ("disturbance", "amplitude"), ["0", "1" * 400, "1/" + "3" * 400],
+     ["-1/2", "1" * 401, "1/0", "2/4", "-0", "01", "1/01", 1, True, None, ["1"], "", "1/", "1 ", "+1"]),
+    (HELD, ("disturbance", "change"), ["0", "1/2"], ["-1/2"]),
+    (HELD, ("disturbance",), [{"amplitude": "1", "growths": {"slip": "0", "rate": "0"}}],
+     [5, "change", [], {"amplitude": "1"}, {"amplitude": "1", "growths": {"slip": "0", "rate": "0", "more": "0"}}]),
+    (HELD, ("loop", "step"), ["1/2"], ["0", "-1"]),
+    (HELD, ("loop", "delay"), ["8", "1/3"], ["801/100", "-1/100"]),
+    (HELD, ("loop", "lag"), ["1/3"], ["-1/100"]),
+    (HELD, ("loop", "states"), [["a" * 40], ["Z_9"]], [["a" * 41], ["1a"], [""], [5], ["a b"], ["z", "z"], [], "z", 5]),
+    (HELD, ("loop", "update"), [[["1"]]], [[["1", "0"]], [["1"], ["1"]], [], [5], "1", ["1"]]),
+    (HELD, ("loop", "measured"), [[["0", "-1"]]], [[["1"]], [["1", "1", "1"]], [["1", "1"]] * 2, []]),
+    (HELD, ("loop", "output"), [["-1"]], [["0"], ["1", "1"], []]),
+    (HELD, ("loop", "feedback"), [["0", "0"]], [["1"], ["1", "1", "1"]]),
+    (HELD, ("loop",), [many(9, "8", "0")["loop"], many(8, "8", "1")["loop"], many(12, "5", "0")["loop"]],
+     [5, [], many(9, "8", "1")["loop"], many(10, "8", "0")["loop"], many(13, "0", "0")["loop"],
+      HELD["loop"] | {"root": ROOT}, HELD["loop"] | {"more": "1"}]),
+    (ROOTED, ("loop", "root", "slopes"), [["0", "0"], ["1", "1"], ["0", "1"]],
+     [["1/2", "1/4"], ["-1/2", "1"], ["0", "3/2"], ["0", "1", "1"], ["0"], "0"]),
+    (ROOTED, ("loop", "root", "remainder"), ["0"], ["-1/2"]),
+    (ROOTED, ("loop", "root", "pull"), [wide(1), wide(16), [TERM | {"of": wide(15)}]],
+     [[], wide(17), [TERM | {"of": wide(16)}], "slip", 5, [5], [{"factor": ["1", "1"], "power": "1"}]]),
+    (ROOTED, ("loop", "root", "pull", 0, "factor"), [["0", "0"], ["0", "3"]],
+     [["1", "0"], ["-1", "0"], ["1"], ["1"] * 3]),
+    (ROOTED, ("loop", "root", "pull", 0, "power"), ["0", "6", "1/6", "6/5"], ["7", "1/7", "-1", "-1/2"]),
+    (ROOTED, ("loop", "root", "pull", 0, "of"), ["rate", wide(2)], ["time", [], 5, None]),
+    (ROOTED, ("loop", "feedback"), [["0"] * 3], [["0"] * 2]),
+    (ROOTED, ("loop", "measured"), [[["0"] * 3]], [[["0"] * 2]]),
+    (CONTINUOUS, ("loop", "rates"), [[["0"]]], [[["1"]], [["0", "0"]], []]),
+    (CONTINUOUS, ("loop", "measured"), [[["1", "2"]]], [[["1"]], [["1"] * 3]]),
+    (CONTINUOUS, ("loop", "feedback"), [["1", "2"]], [["1"], ["1"] * 3]),
+    (CONTINUOUS, ("loop", "output"), [["2"]], [["0"], []]),
+    (CONTINUOUS, ("loop", "states"), [["other"]], [["1a"], [], ["z", "y"]]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("raw", "path", "taken", "refused"), LIMITS, ids=lambda v: str(v) if type(v) is tuple else "")
+def test_both_take_what_is_just_allowed_and_refuse_what_is_just_beyond(raw, path, taken, refused):
+    for expected, values in ((True, taken), (False, refused)):
+        for value in values:
+            given = changed(raw, (path, value))
+            try:
+                checker.read_loop(given["loop"], checker.read_task(given))
+                standalone = True
+            except checker.Refused:
+                standalone = False
+            try:
+                parse_guarantee(json.dumps(given))
+                package = True
+            except CertificateError:
+                package = False
+            assert (standalone, package) == (expected, expected), value
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_every_claim_may_be_what_follows_and_no_less(name, monkeypatch):
+    """Bounds 1 m, 2 m/s and, of the push, 3 m/s², with b = 1/25 m²/kg; the rest by the task."""
+    task = checker.read_task(HELD)
+    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(1), F(2), F(3)], F(1, 3)))
+    assert task.b == F(1, 25)
+    tight = (F(1), F(2), 2 + task.reference_rate, task.rest[0] - 75, task.rest[1] + 75)
+    claims = dict(zip(CLAIMS, map(str, tight), strict=True))
+    assert len(checker.verify(HELD | {"claims": claims})) == 7
+    inward = F(claims[name]) + F(1 if name == "least_pressure" else -1, 10**12)
+    with pytest.raises(checker.Refused, match=f"claim {name} must follow"):
+        checker.verify(HELD | {"claims": claims | {name: str(inward)}})
+    outward = F(claims[name]) - F(1 if name == "least_pressure" else -1, 10**12)
+    assert checker.verify(HELD | {"claims": claims | {name: str(outward)}})
+
+
+@pytest.mark.parametrize(
+    ("path", "value"), [(("format",), None), (("claims", "more"), "1"), (("claims", "slip_error"), 1)]
+)
+def test_files_with_other_keys_or_claims_are_refused(path, value):
+    raw = changed(HELD, (path, value))
+    if value is None:
+        del raw["format"]
+    with pytest.raises(checker.Refused):
+        checker.verify(raw)
+
+
+@pytest.mark.parametrize(("slip_rate", "holds"), [("1/4", True), ("1/2", False)])
+def test_the_root_must_lie_between_its_lines_for_the_errors_that_are_claimed(slip_rate, holds, monkeypatch):
+    """w = e2 − sign(e1 + w)/3 is 0 where |e2| ≤ 1/3."""
+    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(0), F(0), F(0)], F(1, 3)))
+    sign = {"pull": [{"factor": ["1/3", "1/3"], "power": "0", "of": "slip"}], "slopes": ["0", "0"], "remainder": "0"}
+    task = checker.read_task(HELD)
+    tight = ("0", slip_rate, "9", str(task.rest[0]), str(task.rest[1]))
+    raw = changed(ROOTED, (("loop", "root"), sign), (("claims",), dict(zip(CLAIMS, tight, strict=True))))
+    if holds:
+        assert "law with 1 states and an implicit step, every 1 s, 0 s late, lag 0 s" in checker.verify(raw)
+    else:
+        with pytest.raises(checker.Refused, match="root of the implicit step"):
+            checker.verify(raw)
+
+
+def test_the_statement_has_every_number_on_its_outer_side():
+    task = checker.read_task(HELD)
+    task.s, task.w, task.beta, task.b = (F(-1, 3), F(2, 3)), (F(-2, 3), F(1, 3)), (F(1), F(1, 3)), F(2, 3)
+    claims = dict(zip(CLAIMS, (F(1, 3), F(2, 3), F(1, 7), F(-1, 3), F(2, 3)), strict=True))
+    raw = changed(HELD, (("loop", "delay"), "1/3"), (("loop", "lag"), "2/3"))
+    assert checker.statement(raw, task, claims, F(1, 3)) == [
+        "fault a fault (a name; the data in the file are what counts), friction anything within its bounds and slopes, "
+        "continued to negative slip rates",
+        "s in [-0.3334, 0.6667] 1/s^2, w in [-0.6667, 0.3334] 1/s, beta in [1, 0.3334], b = 0.6667 m^2/kg, derived",
+        "law with 1 states, every 1 s, 1/3 s late, lag 2/3 s",
+        "disturbance: |phi| <= 0.3334 m/s^2, |phi'| <= 0.1429 m/s^3, phi(0) = 0; from rest, along the reference, "
+        "for ever; small gain 0.3334",
+        "the slip rate of this fault never exceeds 0.1429 m/s",
+        "|slip - reference| <= 0.3334 m, |slip rate - reference's| <= 0.6667 m/s",
+        "pressure from -0.3334 Pa to 0.6667 Pa",
+    ]
+    task.change, task.name = None, "größe"
+    lines = checker.statement(changed(CONTINUOUS), task, claims, F(1, 3))
+    assert lines[0].startswith("fault gr\\xf6\\xdfe (a name")
+    at_once = "for a pressure that acts at once (continuous time), which no sampled controller has"
+    assert lines[2] == f"law with 1 states, {at_once}"
+    assert lines[3].startswith("disturbance: |phi| <= 0.3334 m/s^2; from rest")
+
+
+@pytest.mark.parametrize("value", ["1/3", "2/3", "99999", "100001", "10000", "1/99999", "123456789", "3/10000000", "0"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_four_digits_are_the_nearest_on_the_outer_side(value, sign):
+    value = sign * F(value)
+    up, down = (F(repr(float(text))) for text in (checker.upper(value), checker.lower(value)))
+    assert down <= value <= up
+    assert up - value <= abs(value) / 1000
+    assert value - down <= abs(value) / 1000
+    assert (checker.upper(F(12345)), checker.lower(F(12345))) == ("1.235e+04", "1.234e+04")
