@@ -119,6 +119,7 @@ def test_existing_results_need_force(main_job, capsys, monkeypatch):
     assert "--force" in err
 
 
+@pytest.mark.slow
 def test_a_stable_fault_is_designed_for(tmp_path, capsys):
     import importlib.resources
 
