@@ -14,6 +14,7 @@ from quakedesign.controllers.feed_forward import NONE
 from quakedesign.fault import Fault
 from quakedesign.loop import SampledController, summed_integrals
 from quakedesign.rationals import rational
+from quakedesign.synthesis.guaranteed import Compensation, compensated, design_compensated
 from quakedesign.synthesis.guaranteed.continuous import certified_peaks
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
@@ -102,11 +103,14 @@ class Design:
         """What is proved of the law as it runs, once per T_s, p held; or why nothing.
 
         A law of samples has its own T_s; the integrals of an e-LQR in continuous time are summed over that of the
-        fault. Computed when asked for, in about a second.
+        fault. A sliding mode runs in the scheme ``compensated``: its scale in continuous time is too small for that,
+        see `compensation`. Computed when asked for, in a second or two.
         """
         law = self.controller
         if isinstance(law, SampledController):
             return guarantee(task_of(self.fault), Held(law=law.law, step=law.step))
+        if isinstance(law, SlidingMode):
+            return self._guarantee_of_sliding_mode(law)
         summed = isinstance(law, ExtendedLQR) and law.feedback == "error" and law.limits is None and not law.offset
         if law is None or not summed:
             return NoGuarantee(
@@ -115,6 +119,44 @@ class Design:
         step = rational(self.fault.sampling_time)
         held = Held(law=summed_integrals(tuple(law.gains.values()), step), step=step)
         return guarantee(task_of(self.fault), held)
+
+    def compensation(self, objective: str = "tracking") -> Compensation | None:
+        """The base gains of a sliding mode as they run with a guarantee, held over T_s; None for another law.
+
+        Scale, weight and authority for the scheme ``compensated`` are chosen by what is certified, in about a second;
+        a feed-forward is left out.
+
+        Parameters
+        ----------
+        objective : str
+            ``"tracking"``, or ``"peak"`` for the smallest certified slip-rate error.
+
+        Raises
+        ------
+        ParameterError
+            For another objective.
+        """
+        if not isinstance(self.controller, SlidingMode):
+            return None
+        task = task_of(self.fault)
+        law = replace(self.controller.with_feedforward(NONE), gains=dict(self.controller.gains), divisor=task.authority)
+        return design_compensated(task, law, rational(self.fault.sampling_time), objective=objective)
+
+    def _guarantee_of_sliding_mode(self, law: SlidingMode) -> Guarantee | NoGuarantee:
+        """Of the scale that it has, in the scheme ``compensated``; a reason says which scale has one."""
+        other, step = self.compensation(), rational(self.fault.sampling_time)
+        assert other is not None
+        found = compensated(task_of(self.fault), law, other.weight, other.authority, step)
+        if isinstance(found, Guarantee):
+            return found
+        reason = f"run in the scheme compensated, {found.reason}"
+        if isinstance(other.found, Guarantee):
+            claims, scales = other.found.claims, (float(other.controller.scale), float(law.scale))
+            reason += (
+                f"; with λ = {scales[0]:.3g} in place of {scales[1]:.3g} the slip rate never exceeds "
+                f"{claims.peak_slip_rate:.3g} m/s, the slip stays within {claims.slip_error:.3g} m"
+            )
+        return NoGuarantee(reason=reason, small_gain=found.small_gain)
 
     def held_loop(self) -> HeldLoop | None:
         """What is decided of an e-LQR when p is held over the fault's sampling time; None for another law."""

@@ -1,6 +1,7 @@
 """Sliding modes that run: what is guaranteed of them, against a simulator that shares nothing with the package."""
 
 import importlib.util
+from dataclasses import replace
 from fractions import Fraction as F
 from functools import cache
 from pathlib import Path
@@ -12,11 +13,13 @@ from quakedesign import simulate
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, task_of
 from quakedesign.controllers import control_law, published
+from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop import Power
 from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.synthesis import Design
 from quakedesign.synthesis.guaranteed import compensated, design_compensated, worst_found
 from quakedesign.synthesis.guaranteed.implicit_pull import implicit_pull
 
@@ -223,3 +226,30 @@ def test_published_gains_are_too_weak_for_a_deadbeat_step():
     found = compensated(TASK, published("real-fault")["cta"], *SETTINGS, STEP)
     assert isinstance(found, NoGuarantee)
     assert found.reason.startswith("the root of the implicit step leaves its range")
+
+
+def test_designs_in_continuous_time_say_which_scale_has_a_guarantee_when_it_runs():
+    fault = load_fault("real-fault")
+    small, large = (
+        Design(
+            fault=fault, name="cta", verdict=Verdict.UNDECIDED, controller=law("cta", CTA, scale), certificate=None,
+            premises=(),
+        )
+        for scale in ("1/4000", "1")
+    )  # fmt: skip
+    assert small.guarantee.check() is Verdict.UNDECIDED
+    assert small.guarantee.sentence().startswith("none: run in the scheme compensated, the root of the implicit step")
+    assert small.guarantee.sentence().endswith("never exceeds 0.000299 m/s, the slip stays within 4.12e-05 m")
+    assert large.guarantee == replace(designed("cta").found, held=large.guarantee.held)
+    for design in (small, large):
+        assert design.compensation() == designed("cta")
+
+
+def test_laws_without_a_sliding_mode_are_not_compensated():
+    gains = dict(zip(("k1", "k2", "k3", "k4"), map(F, ("6.96e8", "2.53e8", "6.02e8", "2.16e8")), strict=True))
+    linear = ExtendedLQR(gains=gains)
+    made = Design(
+        fault=load_fault("real-fault"), name="elqr", verdict=Verdict.UNDECIDED, controller=linear, certificate=None,
+        premises=(),
+    )  # fmt: skip
+    assert made.compensation() is None
