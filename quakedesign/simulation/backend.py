@@ -17,6 +17,8 @@ FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
 RADIX = 64
 LEVELS = 3
 _LONGEST_COMPILATION = 120
+_WORTH = 100_000_000
+"""Instructions of a whole run from which on a compiler, which takes some 0.3 s, saves time."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Backend:
     reason: str
 
 
-def prepare(step: Any, compiled: bool | None) -> Backend:
+def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
     """Backend of a step function; both kinds give the same digits.
 
     Parameters
@@ -46,7 +48,9 @@ def prepare(step: Any, compiled: bool | None) -> Backend:
     step : casadi.Function
         One vector in, one vector of the same length out.
     compiled : bool or None
-        Whether to compile; None: if a compiler is found and works.
+        Whether to compile; None: if the run is long enough to be worth it, and a compiler is found and works.
+    steps : int
+        Number of steps of the run.
 
     Raises
     ------
@@ -56,6 +60,8 @@ def prepare(step: Any, compiled: bool | None) -> Backend:
     functions = ladder(step)
     if compiled is False:
         return Backend(functions, "virtual-machine", "asked for")
+    if compiled is None and steps * step.n_instructions() < _WORTH:
+        return Backend(functions, "virtual-machine", "the run is shorter than a compilation")
     try:
         command = compiler()
         return Backend(_compile(_source(functions), command), "compiled", " ".join((*command, *FLAGS)))

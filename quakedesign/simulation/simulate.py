@@ -67,8 +67,8 @@ def simulate(
     progress : callable, optional
         Called with the fraction done [-].
     compiled : bool, optional
-        True: machine code or an error. False: CasADi's virtual machine. None: machine code if a C compiler
-        works. The digits are the same.
+        True: machine code or an error. False: CasADi's virtual machine. None: machine code if the run
+        is long enough to be worth it and a C compiler works. The digits are the same.
     plant : str
         ``"smooth"``: eq. shift, which holds for slip rates that are not negative. ``"coulomb"``: friction opposes slip
         in both directions and holds the fault at rest (ERRATA 14).

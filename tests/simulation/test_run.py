@@ -97,6 +97,7 @@ def test_a_fault_without_weakening_is_a_forced_oscillator():
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("fault", [REAL, LAB], ids=["real", "lab"])
 def test_both_backends_give_the_same_digits(fault, law, monkeypatch):
+    monkeypatch.setattr("quakedesign.simulation.backend._WORTH", 0)
     setting = {"duration": 5003 * fault.sampling_time, "samples": 40}
     fast = simulate(fault, published(fault.name)[law], **setting)
     if fast.provenance["backend"] != "compiled":
@@ -113,7 +114,17 @@ def test_both_backends_give_the_same_digits(fault, law, monkeypatch):
     assert fast.events == slow.events
 
 
+def test_a_run_that_is_shorter_than_a_compilation_is_not_compiled():
+    short, long = (simulate(LAB, published("lab-fault")["cta"], duration=d, samples=2) for d in (0.1, 2000.0))
+    assert (short.provenance["backend"], short.provenance["backend_reason"]) == (
+        "virtual-machine",
+        "the run is shorter than a compilation",
+    )
+    assert "shorter" not in long.provenance["backend_reason"]
+
+
 def test_a_broken_compiler_falls_back_or_is_reported(monkeypatch):
+    monkeypatch.setattr("quakedesign.simulation.backend._WORTH", 0)
     monkeypatch.setenv("CC", "false")
     run = simulate(LAB, published("lab-fault")["cta"], duration=0.1)
     assert run.provenance["backend"] == "virtual-machine"
