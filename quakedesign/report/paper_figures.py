@@ -15,6 +15,7 @@ from quakedesign.report.drawing import (
     SMALL,
     bar_look,
     clock,
+    colour,
     figure,
     finish,
     length,
@@ -55,7 +56,36 @@ def paper_figures(study: "PaperStudy") -> dict[str, Any]:
         drawn["friction-coefficient"] = friction_coefficient(comparison)
     if baseline(comparison) is not None:
         drawn["errors-and-power"] = errors_and_power(comparison)
+    if study.front:
+        drawn["peak-against-tracking"] = peak_against_tracking(study)
     return drawn
+
+
+def peak_against_tracking(study: "PaperStudy") -> Any:
+    """Errors that were seen over the slip-rate error that is guaranteed, one point a design.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    claims = [point.guarantee.claims for point in study.front]
+    drawing, axes = figure(1, 3.2, 2)
+    largest = max(float(claim.slip_rate_error) for claim in claims)
+    size, unit = scaled(largest, "m/s")
+    for axis, metric, base in zip(axes[0], ("max_slip_error", "max_slip_rate_error"), ("m", "m/s"), strict=True):
+        seen = [getattr(point.run.metrics, metric) for point in study.front]
+        divisor, name = scaled(max(seen), base)
+        across = [float(claim.slip_rate_error) / size for claim in claims]
+        axis.plot(across, [value / divisor for value in seen], "o-", color=colour("elqr"), linewidth=1)
+        for x, value, point in zip(across, seen, study.front, strict=True):
+            short = point.objective.removeprefix("tracking, ").removesuffix(" times the peak")
+            axis.annotate(short, (x, value / divisor), textcoords="offset points", xytext=(4, 4), fontsize=SMALL - 1)
+        axis.set(xlabel=f"guaranteed slip-rate error [{unit}]", ylim=(0, 1.15 * max(seen) / divisor))
+        axis.set_ylabel(f"{'slip' if base == 'm' else 'slip-rate'} error seen [{name}]")
+        axis.margins(x=0.12)
+    note = "peak: smallest guaranteed slip-rate error; numbers: how many times that tracking may spend"
+    title = f"{study.comparison.fault.name}: peak against tracking of the e-LQR"
+    return finish(drawing, title, [point.run for point in study.front], note)
 
 
 def friction_law(comparison: "Comparison") -> Any:

@@ -6,8 +6,10 @@ from functools import cached_property
 from math import pi
 from typing import Any
 
+from quakedesign.loop import SampledController
 from quakedesign.report.comparison import Comparison
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
+from quakedesign.studies import FrontPoint, objective_front
 
 INDUCING_SHARE = 0.1
 """Constant pressure over σ'_n of the induced earthquake: 5 MPa on the paper's fault at 50 MPa."""
@@ -26,11 +28,14 @@ class PaperStudy:
         Without control, under a constant pressure of a tenth of the effective normal stress.
     close_ups : mapping of str to Trajectory
         By label of the entry: its first `PERIODS` natural periods with every step kept.
+    front : tuple of FrontPoint
+        Peak against tracking, where a law of samples was designed.
     """
 
     comparison: Comparison
     induced: Trajectory
     close_ups: Mapping[str, Trajectory]
+    front: tuple[FrontPoint, ...] = ()
 
     def figures(self) -> dict[str, Any]:
         """Matplotlib figures by name, drawn once."""
@@ -73,4 +78,8 @@ def paper_study(comparison: Comparison, *, progress: Callable[[str, float], None
                 step=step,
                 samples=int(length / step) + 1,
             )
-    return PaperStudy(comparison=comparison, induced=induced, close_ups=close_ups)
+    laws = [entry.design.controller for entry in comparison.of("designed")]
+    tell("peak against tracking", 0.0)
+    steps = [law.step for law in laws if isinstance(law, SampledController)]
+    front = objective_front(fault, steps[0]) if steps else ()
+    return PaperStudy(comparison=comparison, induced=induced, close_ups=close_ups, front=front)

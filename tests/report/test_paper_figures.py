@@ -4,11 +4,13 @@ import csv
 import itertools
 import re
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import quakedesign as qd
+from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.errors import OutputError
 from quakedesign.fault import Reference
@@ -47,6 +49,26 @@ def study():
     entries = [entry(fault, laws[name], "published") for name in ("cta", "elqr")]
     entries.append(entry(fault, laws["cta"], "designed"))
     return paper_study(Comparison(fault=fault, uncontrolled=natural_earthquake(fault), entries=tuple(entries)))
+
+
+def test_the_front_shows_what_was_seen_over_what_is_guaranteed(study):
+    """Two made up designs, whose guaranteed slip-rate errors are 200 and 300 µm/s."""
+    runs = [e.run for e in study.comparison.entries[:2]]
+    front = tuple(
+        SimpleNamespace(
+            objective=name, run=run, guarantee=SimpleNamespace(claims=SimpleNamespace(slip_rate_error=UpperBound(rate)))
+        )
+        for name, run, rate in zip(("peak", "tracking, 1.6 times the peak"), runs, ("2e-4", "3e-4"), strict=True)
+    )
+    drawing = paper_figures(replace(study, front=front))["peak-against-tracking"]
+    assert "peak-against-tracking" not in study.figures()
+    for axis, metric in zip(drawing.axes, ("max_slip_error", "max_slip_rate_error"), strict=True):
+        across, up = axis.lines[0].get_data()
+        assert list(across) == pytest.approx([200, 300])
+        seen = [getattr(run.metrics, metric) for run in runs]
+        assert np.asarray(up) / up[0] == pytest.approx(np.array(seen) / seen[0])
+        assert "µm/s]" in axis.get_xlabel()
+        assert [text.get_text() for text in axis.texts] == ["peak", "1.6"]
 
 
 def caption(drawing):

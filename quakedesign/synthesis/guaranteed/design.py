@@ -19,7 +19,6 @@ _STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T²,
 _EVALUATIONS = 150
 _FEW = 50  # evaluations near a law that has a guarantee at another time
 _CREEPING = 0.1  # what the slip error over T_s counts beside the slip-rate error, so that the loop does not creep
-_ROOM = 1.6  # share of the smallest peak that `tracking` may spend
 _DIGITS = 4
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
 _FAILED = 1e6
@@ -61,11 +60,12 @@ def design_held(
     objective: str = "tracking",
     delay: Fraction = Fraction(0),
     lag: Fraction = Fraction(0),
+    room: float = 1.6,
 ) -> Guarantee | NoGuarantee:
     """Feedback with a disturbance estimate, its two gains and its weight chosen over certified bounds.
 
     ``peak``: the smallest certified slip-rate error. ``tracking``: the smallest slip error under a disturbance that
-    drifts, among laws whose certified slip-rate error is at most 1.6 times the smallest.
+    drifts, among laws whose certified slip-rate error is at most `room` times the smallest.
 
     Parameters
     ----------
@@ -75,6 +75,8 @@ def design_held(
     objective : str
     delay, lag : Fraction
         [s].
+    room : float
+        What ``tracking`` may spend of the smallest certified slip-rate error [-].
 
     Raises
     ------
@@ -98,7 +100,7 @@ def design_held(
     best = min((_search(lambda x: _peak_cost(seen(x), step), start) for start in _STARTS), key=lambda f: f[0])
     found = seen(best[1])
     if objective == "tracking" and found is not None and isinstance(found.bounds, Bounds):
-        limit = _ROOM * float(found.bounds.slip_rate_error)
+        limit = room * float(found.bounds.slip_rate_error)
         starts = (best[1], _STARTS[1])
         best = min((_search(lambda x: _drift_cost(seen(x), limit), start) for start in starts), key=lambda f: f[0])
     return guarantee(task, replace(template, law=law(best[1])))
