@@ -95,6 +95,8 @@ WRONG = {
     "a number as a box": (lambda: LAB.with_box(3), "name of Fault.with_box must be a text. Received 3"),
     "a text as slip": (lambda: LAB.moment_of("x"), "slip of Fault.moment_of must be a number. Received 'x'"),
     "no premise": (lambda: DESIGN.with_premise(3), "premise of Design.with_premise must be a Premise. Received 3"),
+    "no factors": (lambda: qd.Scales(factors=None), "factors of Scales must be .* Received None"),
+    "no fault to scale": (lambda: qd.scaled_fault(3, None), "of scaled_fault must be .* Received 3"),
     "a number as a class": (
         lambda: DESIGN.certified_peaks(3),
         "disturbance_class of Design.certified_peaks must be a text. Received 3",

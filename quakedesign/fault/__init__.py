@@ -5,6 +5,8 @@ from quakedesign.fault.disturbance import Disturbance
 from quakedesign.fault.friction import FrictionLaw, friction_law, friction_laws
 from quakedesign.fault.parameters import Fault, require_fault
 from quakedesign.fault.reference import Reference
+from quakedesign.fault.scales import Scales
+from quakedesign.fault.scaling import scaled_fault
 from quakedesign.fault.scenario import load_fault, parse_fault, presets
 from quakedesign.fault.uncertainty import BOXES, UncertaintyBox, uncertainty_box
 
@@ -14,6 +16,7 @@ __all__ = [
     "Fault",
     "FrictionLaw",
     "Reference",
+    "Scales",
     "UncertaintyBox",
     "friction_law",
     "friction_laws",
@@ -21,6 +24,7 @@ __all__ = [
     "parse_fault",
     "presets",
     "require_fault",
+    "scaled_fault",
     "uncertainty_box",
 ]
 

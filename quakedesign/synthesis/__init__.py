@@ -3,7 +3,8 @@
 from quakedesign.arguments import check_arguments
 from quakedesign.synthesis.analysis.certify import certify
 from quakedesign.synthesis.design import DESIGNABLE, Design, assess, design
+from quakedesign.synthesis.gains.synthesise import synthesise
 
-__all__ = ["DESIGNABLE", "Design", "assess", "certify", "design"]
+__all__ = ["DESIGNABLE", "Design", "assess", "certify", "design", "synthesise"]
 
 check_arguments(__name__)
