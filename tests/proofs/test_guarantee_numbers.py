@@ -102,14 +102,15 @@ def test_what_is_earlier_falls_while_what_is_new_rises():
 
 
 @pytest.mark.parametrize("sudden", [False, True])
-@pytest.mark.parametrize("share", ["624/10000", "249/1000", "1/3", "-1/3"])
-def test_the_tail_of_the_past_is_the_rest_of_a_geometric_series(share, sudden):
-    """x → q·x at every sample: what is left of 1 + |q| + q² … is bounded by the sums so far."""
-    q, size = abs(F(share)), F(1) if sudden else F(8)
-    found = gains_of_both([[0]], [[[share]]], [8], [1], [1], sudden=sudden)
-    whole = size * q / (1 - q)
-    exact = [whole + (1 if sudden else i + 1) for i in range(8)]
-    both_are(found, exact, F(1, 10**4))
+@pytest.mark.parametrize("time", [8, F(1, 64)])
+@pytest.mark.parametrize("share", ["624/10000", "249/1000", "1/3", "-1/3", "9/10"])
+def test_the_tail_of_the_past_is_the_rest_of_a_geometric_series(share, time, sudden):
+    """x → q·x at every sample: what is left of 1 + |q| + q² … is bounded by the sums so far, of whatever size."""
+    q, entry = abs(F(share)), F(time, 8) if sudden else 1
+    found = gains_of_both([[0]], [[[share]]], [time], [entry], [1], sudden=sudden)
+    whole = (entry if sudden else time) * q / (1 - q)
+    exact = [whole + (entry if sudden else F(time, 8) * (i + 1)) for i in range(8)]
+    assert all(e <= v <= e * (1 + F(1, 10**4)) for gains in found for v, e in zip(gains, exact, strict=True))
 
 
 @pytest.mark.parametrize("sudden", [False, True])

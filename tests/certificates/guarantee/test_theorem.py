@@ -33,6 +33,7 @@ def test_the_spectral_radius_is_an_eigenvalue_from_above(size):
         ([["1/2", 1000], [0, 0]], "1/2"),
         ([["1/2", 0], ["1/3", "1/4"]], "1/2"),
         ([[0, 4], ["1/16", 0]], "1/2"),
+        ([["1/2", "1/2"], [0, 0]], "1/2"),
         ([["1/4", 10**12], [F(1, 16 * 10**12), "1/4"]], "1/2"),
     ],
 )
@@ -81,3 +82,22 @@ def test_a_loop_through_the_implicit_step_can_fail_by_itself():
     assert found.small_gain >= 1
     assert found.reason.startswith("small gain")
     assert found.reason.endswith("the range of the implicit step's slope alone needs 1.1")
+
+
+def test_a_small_gain_of_one_proves_nothing():
+    """Only the slip error's share of the acceleration, exactly 1."""
+    one = gains(acceleration=(1 / TASK.half_ranges["slip_error"], 0, 0), drift=(0, 0, 0))
+    found = bounds_from(TASK, one, None, STEP)
+    assert isinstance(found, NoGuarantee)
+    assert found.small_gain == 1
+
+
+def test_the_reason_is_the_largest_share_in_the_worst_part_of_the_period():
+    share = TASK.half_ranges["slip_error"]
+    parts = gains(acceleration=(0, 0, 0), drift=(0, 0, 0)) | {("push", "acceleration"): (F(1), F(2))}
+    parts = {key: v if len(v) == 2 else v * 2 for key, v in parts.items()}
+    parts["slip_error", "acceleration"] = (F(0), 3 / share)
+    found = bounds_from(TASK, parts, None, STEP)
+    assert isinstance(found, NoGuarantee)
+    assert found.reason.endswith("the range of friction's slope in slip alone needs 3")
+    assert 3 + 2 * TASK.half_ranges["push"] <= found.small_gain <= F(1001, 1000) * (3 + 2 * TASK.half_ranges["push"])
