@@ -36,6 +36,8 @@ def simulate(
     step: Seconds | None = None,
     duration: Seconds | None = None,
     scheme: str | None = None,
+    weight: float | None = None,
+    authority: float | None = None,
     substeps: Whole = 1,
     method: str = "dormand-prince",
     plant: str = "smooth",
@@ -71,6 +73,10 @@ def simulate(
     scheme
         continuous (unless given; the law in every stage of the integrator), or sampled and held: explicit, implicit,
         semi-implicit, compensated. The designed e-LQR is sampled and has its own.
+    weight
+        Of the estimate of the disturbance in the scheme compensated, above 0, at most 1.
+    authority
+        B0 of a sampled scheme in m^2/kg; guarantee says weight and authority of the sliding modes that it proves.
     substeps
         Steps of the integrator per sample.
     method
@@ -117,6 +123,7 @@ def simulate(
             substeps=substeps,
             actuator=chain,
             noise=told,
+            tuning={name: v for name, v in {"weight": weight, "authority": authority}.items() if v is not None},
         )
     if out is not None:
         trajectory.save(out)

@@ -1,6 +1,6 @@
 """One run of one controller, as the command line asks for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -16,6 +16,7 @@ from quakedesign.simulation import Actuator, Load, Trajectory, natural_earthquak
 from quakedesign.simulation import simulate as run_loop
 from quakedesign.simulation.actuators import DIRECT
 from quakedesign.simulation.measurement import EXACT, Measurement
+from quakedesign.simulation.schemes import simulation_scheme
 from quakedesign.simulation.sensing import OutputFeedback, Sensor
 from quakedesign.synthesis import design
 
@@ -129,6 +130,7 @@ def run_single(
     load: Load | None = None,
     noise: Measurement | Sensor = EXACT,
     actuator: Actuator = DIRECT,
+    tuning: Mapping[str, float] | None = None,
     **settings: Any,
 ) -> tuple[Trajectory, list[Premise]]:
     """Run a loop, and say which premises hold that a run decides.
@@ -148,6 +150,8 @@ def run_single(
         What the law is told.
     actuator : Actuator
         What lies between law and fault.
+    tuning : mapping of str to float, optional
+        Settings of the scheme itself, such as ``weight`` and ``authority`` of ``compensated``.
     **settings
         ``step, scheme, method, plant, substeps`` of `quakedesign.simulation.simulate`.
 
@@ -164,13 +168,18 @@ def run_single(
     around: dict[str, Any] = {"measurement": noise} if noise.noisy else {}
     around |= {"actuator": actuator} if actuator.stages else {}
     if law is None and duration is None:
-        return _natural(fault, settings, around | ({"load": load} if load else {})), []
+        return _natural(fault, settings, around | dict(tuning or {}) | ({"load": load} if load else {})), []
+    name = settings["scheme"]
+    if tuning:
+        substeps = settings.pop("substeps")
+        around |= {"substeps": substeps} if substeps != 1 else {}
+        settings, around = settings | {"scheme": simulation_scheme(name, **tuning, **around)}, {}
     known = law if isinstance(law, Choice) or law is None else Choice(controller=law)
     own = known.controller if known else None
     run = run_loop(fault, own, duration=duration, load=load, progress=tell, **settings, **around)
     if known is None:
         return run, []
-    return run, _premises(fault, known, run, noise, settings["scheme"])
+    return run, _premises(fault, known, run, noise, name)
 
 
 def _premises(fault: Fault, known: Choice, run: Trajectory, seen: Measurement | Sensor, scheme: str) -> list[Premise]:

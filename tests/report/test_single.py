@@ -4,12 +4,13 @@ from fractions import Fraction
 
 import pytest
 
+from quakedesign.controllers import published
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import load_fault
 from quakedesign.report.estimation import sensor
 from quakedesign.report.single import Choice, choice, chosen_controller, run_single
-from quakedesign.simulation import Actuator, Lag, Load, Measurement
+from quakedesign.simulation import Actuator, Lag, Load, Measurement, simulate, simulation_scheme
 
 LAB = load_fault("lab-fault")
 USUAL = {"step": None, "scheme": "continuous", "method": "dormand-prince", "plant": "smooth", "substeps": 1}
@@ -125,3 +126,19 @@ def test_the_bound_of_a_proved_design_is_that_of_its_certificate():
     assert certified_bound(design) is None
     assert certified_bound(None) is None
     assert certified_bound(SimpleNamespace(controller=law, certificate="any", verdict=Verdict.UNDECIDED)) is None
+
+
+def test_a_scheme_is_tuned_as_its_guarantee_says():
+    """Weight and B0 change the run as they do in a scheme that is set by hand."""
+    law = published("lab-fault")["cta"]
+    tuning, small = {"weight": 0.35, "authority": 0.0035}, {"duration": 0.5, "scheme": "compensated"}
+    run, _ = run_single(LAB, law, tell=lambda _: None, tuning=tuning, **(USUAL | small))
+    by_hand = simulate(LAB, law, duration=0.5, scheme=simulation_scheme("compensated", **tuning))
+    assert run.pressure.tolist() == by_hand.pressure.tolist()
+    plain, _ = run_single(LAB, law, tell=lambda _: None, **(USUAL | small))
+    assert run.pressure.tolist() != plain.pressure.tolist()
+    for scheme in ("explicit", "continuous"):
+        with pytest.raises(ParameterError, match="settings of weight are for the schemes compensated"):
+            run_single(LAB, law, tell=lambda _: None, tuning={"weight": 0.35}, **(USUAL | {"scheme": scheme}))
+    with pytest.raises(ParameterError, match="Received weight"):
+        run_single(LAB, None, tell=lambda _: None, tuning={"weight": 0.35}, **USUAL)
