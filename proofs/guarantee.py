@@ -276,7 +276,7 @@ def least(terms: Sum, slip: Fraction, rate: Fraction) -> Fraction:
     for (low, high), power, inner in terms:
         value = least(inner, slip, rate) if type(inner) is not str else slip if inner == "slip" else rate
         factor, shift = (low, 0) if value >= 0 else (-high, 1)
-        size = power_below(abs(value), power) + (shift if value else 0)
+        size = power_below(abs(value), power) + shift
         total += factor.numerator * size // factor.denominator
     return Fraction(total, 1 << BITS)
 
@@ -435,13 +435,12 @@ def steady_states(own: list[Row], output: Row, rates: Row, asked: Fraction) -> R
         chosen = next((line for line in table if line[column]), None)
         if chosen is None:
             continue
-        table.remove(chosen)
         chosen = [v / chosen[column] for v in chosen]
         table = [[a - line[column] * c for a, c in zip(line, chosen, strict=True)] for line in table]
         pivots.append((column, chosen))
     need(not any(line[n] for line in table), "the law must be able to ask for a constant pressure without errors")
     for column, line in reversed(pivots):
-        found[column] = line[n] - sum(line[j] * found[j] for j in range(column + 1, n))
+        found[column] = line[n] - sum(v * f for v, f in zip(line, found, strict=False))
     return found
 
 
@@ -458,7 +457,7 @@ class Fixed:
     def __mul__(self, other: "Fixed") -> "Fixed":
         columns = list(zip(*other.rows, strict=True))
         rows = [[sum(map(int.__mul__, line, column)) >> BITS for column in columns] for line in self.rows]
-        widest = max(sum(map(abs, line)) for line in self.rows) + self.error * len(columns and columns[0])
+        widest = max(sum(map(abs, line)) for line in self.rows) + self.error * len(self.rows[0])
         tallest = max((sum(map(abs, column)) for column in columns), default=0)
         return bounded(Fixed(rows, (widest * other.error + tallest * self.error >> BITS) + 2))
 

@@ -94,7 +94,6 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
     for column in range(n):
         pivot = next((row for row in rows if row[column]), None)
         if pivot is not None:
-            rows.remove(pivot)
             pivot = [v / pivot[column] for v in pivot]
             rows = [[v - row[column] * p for v, p in zip(row, pivot, strict=True)] for row in rows]
             pivots.append((column, pivot))
@@ -105,7 +104,7 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
         )
     found = [Fraction(0)] * n
     for column, pivot in reversed(pivots):
-        found[column] = pivot[n] - sum((pivot[j] * found[j] for j in range(column + 1, n)), Fraction(0))
+        found[column] = pivot[n] - sum((v * f for v, f in zip(pivot, found, strict=False)), Fraction(0))
     return tuple(found)
 
 

@@ -82,3 +82,16 @@ def test_sizes_that_do_not_fit_and_missing_gains_are_refused():
         exact_integrals(GAINS[:3])
     with pytest.raises(ParameterError, match="2 entries"):
         ContinuousLaw(states=("a",), rates=((F(0),),), measured=((F(0),),), output=(F(1),), feedback=(F(0), F(0)))
+
+
+def test_integrals_that_are_not_used_are_left_out():
+    one, zero = F(1), F(0)
+    single = ContinuousLaw(
+        states=("xi1",), rates=((zero,),), measured=((one, zero),), output=(F(-4),), feedback=(F(-2), F(-3))
+    )
+    assert exact_integrals((F(2), F(3), F(4), zero)) == single
+    assert single.of_reference == (0, 0)
+    none = exact_integrals((F(2), F(3), zero, zero), of_state=True)
+    assert (none.states, none.rates, none.measured, none.output) == ((), (), (), ())
+    assert none.of_reference == none.feedback == (-2, -3)
+    assert exact_integrals((F(2), F(3), zero, F(5))).output == (0, -5)

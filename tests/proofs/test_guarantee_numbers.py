@@ -208,6 +208,7 @@ def test_the_majorant_has_no_negative_entry():
 
 UNIT = 1 << checker.BITS
 FIXED = [
+    (([[0]], UNIT - 1), ([[0]], UNIT - 1)),
     (([[1]], 0), ([[UNIT - 1]], UNIT - 1)),
     (([[UNIT - 1]], UNIT - 1), ([[1]], 0)),
     (([[3, -5]], 2), ([[UNIT - 1], [7 - UNIT]], 3)),
@@ -322,10 +323,34 @@ def test_both_bound_a_sum_of_powers_from_below():
 
 @pytest.mark.parametrize(("room", "shown"), [(F(1, 2**11), True), (F(1, 2**11) - F(1, 2**40), False)])
 def test_lines_are_shown_after_ten_halvings_or_not_at_all(room, shown):
-    """q = e1 + T·w, one slope 1/2, T = 1: on a part of width δ 2ε − R − δ/2 is left, which 2^−10 just allows."""
-    pull = (Power(factor=(F(1), F(1)), exponent=F(1), argument="slip"),)
+    """q = 2(e1 + T·w), one slope 1/2, T = 1/2: on a part of width δ 2ε − R − δ/2 is left, which 2^−10 just allows."""
+    pull = (Power(factor=(F(2), F(2)), exponent=F(1), argument="slip"),)
     for slopes in ((F(1, 2), F(1)), (F(0), F(1, 2))):
         root = ImplicitRoot(pull=pull, slopes=slopes, remainder=F(1))
         other = checker.Root(plain(pull), list(slopes), F(1))
-        assert sector.holds(root, F(1), F(1), 2 - room) == shown
-        assert checker.root_within(other, F(1), F(1), 2 - room) == shown
+        assert sector.holds(root, F(1, 2), F(1, 2), 2 - room) == shown
+        assert checker.root_within(other, F(1, 2), F(1, 2), 2 - room) == shown
+
+
+@pytest.mark.parametrize(
+    ("slopes", "factor", "room", "shown"),
+    [
+        ((F(1, 2), F(1)), 1, F(1, 8), False),
+        ((F(1, 2), F(1)), 1, F(1, 2), True),
+        ((F(1, 2), F(1)), 4, F(1, 2**12), False),  # near the reference
+        ((F(0), F(1, 4)), 2, F(1, 4), False),
+        ((F(0), F(1, 4)), 2, F(3, 4), True),
+    ],
+)
+def test_lines_that_the_root_leaves_at_one_end_are_not_shown(slopes, factor, room, shown):
+    """q = c(e1 + T·w), T = 1/2, u ≤ 1: the lines are (1 + c/2)ε − R − u/4 and, with the slope 1/4, − u/2 above."""
+    pull = (Power(factor=(F(factor), F(factor)), exponent=F(1), argument="slip"),)
+    rate, half = 1 + F(factor, 2) - room, F(1, 2)
+    assert sector.holds(ImplicitRoot(pull=pull, slopes=slopes, remainder=F(1)), half, half, rate) == shown
+    assert checker.root_within(checker.Root(plain(pull), list(slopes), F(1)), half, half, rate) == shown
+
+
+def test_a_state_that_is_not_seen_has_no_part_in_a_gain():
+    loop = checker.Loop([[F(-1), F(0)], [F(0), F(-2)]], [], [[F(1), F(0)]], [], None, F(0))
+    ((found,),) = checker.gains(loop, [F(1), F(1)], False)
+    assert 1 <= found <= F(1001, 1000)

@@ -33,6 +33,7 @@ from quakedesign.loop import (
     PeriodicLoop,
     Power,
     Segment,
+    exact_integrals,
 )
 
 PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
@@ -164,8 +165,10 @@ def coarse(monkeypatch):
 @pytest.mark.usefixtures("coarse")
 def test_both_derive_the_same_ranges_and_inputs_from_a_fault():
     random, held = Random(1), some_held(Random(6))
-    for _ in range(10):
+    for i in range(8):
         task = some_task(random)
+        friction = replace(task.friction, rate_slope=F(i % 2, 10))
+        task = replace(task, friction=friction, amplitude=F(i + 1), change=F(1, 3) if i & 2 else None)
         found = checker.read_task(document_of(Guarantee(task=task, held=held, claims=some_claims(random))))
         assert (found.name, found.b, found.s, found.w) == ("fault", task.authority, task.slip_chord, task.rate_chord)
         assert (found.beta, found.rest) == (task.beta, task.rest_pressure)
@@ -183,6 +186,12 @@ def test_both_derive_the_same_ranges_and_inputs_from_a_fault():
         assert [c.shares for c in ours] == [half, {"slip_rate_error": coupling}]
         zero = {(y, k): (F(0),) for y in OUTPUTS for k in ("acceleration", "drift")}
         assert bounds_from(task, zero, None, held.step).push == shifted
+
+
+def plain(terms):
+    return [
+        (list(t.factor), t.exponent, t.argument if isinstance(t.argument, str) else plain(t.argument)) for t in terms
+    ]
 
 
 def unless(error, work, *arguments):
@@ -212,6 +221,9 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             assert theirs.inputs == list(map(list, entries))
             assert (theirs.step, theirs.root is None) == (ours.period, held.law.root is None)
             assert len(ours.states) == len(set(ours.states)) == len(ours.flow)
+            if theirs.root:
+                given = plain(held.law.root.pull), list(held.law.root.slopes), held.law.root.remainder
+                assert (theirs.root.pull, theirs.root.slopes, theirs.root.remainder) == given
             claim = Guarantee(task=task, held=held, claims=some_claims(random))
             assert parse_guarantee(guarantee_text(claim)) == claim
     assert built > 25
@@ -234,7 +246,7 @@ def test_both_build_the_same_loop_in_continuous_time():
             named = ("acceleration", "drift", *(FORWARD if any(law.of_reference) else ()))
             nothing = (F(0),) * len(ours.flow)
             assert theirs.inputs == [list(ours.inputs.get(name, nothing)) for name in named]
-            assert (theirs.events, theirs.root, ours.period) == ([], None, 0)
+            assert (theirs.events, theirs.root, theirs.step, ours.period) == ([], None, 0, 0)
             assert parse_guarantee(guarantee_text(claim)) == claim
     assert built > 12
 
@@ -285,3 +297,35 @@ def test_both_enclose_a_polynomial_exactly_where_it_turns_at_the_end_of_a_part(s
     slope = [n * c for n, c in enumerate(shape) if n]
     assert checker.slope(shape) == list(package_task._derived(tuple(shape), 1)) == slope
     assert checker.hull(iter([F(2), F(3), F(1)])) == (1, 3)
+
+
+@pytest.mark.parametrize(
+    ("growth", "change", "rest"),
+    [
+        (F(0), {"weakening": F(1, 2), "strengthening": F(0)}, (9 - 15, 9 - F(3, 2))),  # largest where μ reaches 1/5
+        (F(3, 4), {"weakening": F(0), "strengthening": F(1, 2)}, (9 - F(33, 2), 9 - 7)),  # least where it reaches 3/5
+    ],
+)
+def test_the_stress_at_rest_turns_where_friction_reaches_a_bound(growth, change, rest):
+    """(2/5·9 ∓ 3/2·r)/μ at r = 0, 2/5 and 2, by hand."""
+    zero = F(0)
+    friction = Friction(static=F(2, 5), least=F(1, 5), largest=F(3, 5), rate_slope=zero, **change)
+    task = Task(
+        name="fault", density=F(2), shear_modulus=F(3), length=F(2), damping=zero, normal_stress=F(9),
+        spreads=(zero, zero, zero), friction=friction, shape=tuple(map(F, SHAPES[0])), target_slip=F(2),
+        operation_time=F(1), amplitude=zero, change=None, growths=(growth, zero),
+    )  # fmt: skip
+    raw = document_of(Guarantee(task=task, held=some_held(Random(6)), claims=some_claims(Random(1))))
+    assert checker.read_task(raw).rest == task.rest_pressure == rest
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_law_of_the_state_has_two_inputs_more():
+    """ζ = (0, −1/k4) and η = (−1/k4, k3/k4²), times −k1 and −k2."""
+    task, read = some_tasks()[1]
+    k1, k2, k3, k4 = gains = tuple(map(F, (2, 3, 5, 7)))
+    claim = ContinuousPeaks(task=task, law=exact_integrals(gains, of_state=True), claims=some_claims(Random(1)))
+    theirs, ours = checker.read_loop(document_of(claim)["loop"], read), claim.loop
+    expected = [[0, 0, k / k4, -k * k3 / k4**2] for k in (k1, k2)]
+    assert theirs.inputs[2:] == [list(ours.inputs[name]) for name in FORWARD] == expected
+    assert parse_guarantee(guarantee_text(claim)) == claim

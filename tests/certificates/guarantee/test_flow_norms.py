@@ -36,6 +36,7 @@ def just_above(found, exact, share=1e-3):
 def test_a_lag_has_the_gain_of_its_time_whatever_that_is(rate):
     """∫ e^{−λt} dt = 1/λ."""
     assert just_above(gain([[-F(rate)]], [1], [1]), 1 / float(F(rate)))
+    assert just_above(gain([[-F(rate), 0], [0, -2]], [1, 1], [1, 0]), 1 / float(F(rate)))
 
 
 def test_a_fast_and_a_slow_mode_that_oppose_each_other():
