@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import sympy as sp
 
@@ -67,6 +67,11 @@ class SampledController(Controller):
         rows = zip(self.law.update, self.law.measured, signals.integrals, strict=True)
         seen = _read(signals)
         return tuple((_combined((*own, *fed), seen) - z) / to_sympy(self.step) for own, fed, z in rows)
+
+    @classmethod
+    def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
+        """Refuse: gains in order do not make its matrices."""
+        raise UnsupportedError("a sampled law is made from its matrices, not from gains in order. Use LinearLaw.")
 
     @classmethod
     def loop_field(cls) -> LoopField:

@@ -124,3 +124,8 @@ def test_its_gains_are_those_of_the_law():
 def test_it_has_no_loop_in_continuous_time():
     with pytest.raises(UnsupportedError, match="guarantee"):
         SampledController.loop_field()
+
+
+def test_it_is_not_made_from_gains_in_order():
+    with pytest.raises(UnsupportedError, match="made from its matrices"):
+        SampledController.from_values(())

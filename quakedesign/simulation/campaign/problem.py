@@ -109,7 +109,15 @@ class Problem:
         self.fault.require_memoryless("a campaign")
 
     def point(self, index: int) -> "np.ndarray":
-        """Place of sample number `index` in the unit cube."""
+        """Place of sample number `index` in the unit cube.
+
+        Raises
+        ------
+        ParameterError
+            When it is no whole number, or too large.
+        """
+        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < MOST_SAMPLES:
+            raise ParameterError(f"index must be a whole number, 0 to {MOST_SAMPLES - 1}. Received {index!r}.")
         return point(self.seed, index, len(self.space.ranges))
 
     def sample(self, index: int) -> Sample:
@@ -120,8 +128,6 @@ class Problem:
         ParameterError
             When it is no whole number, or too large.
         """
-        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < MOST_SAMPLES:
-            raise ParameterError(f"index must be a whole number, 0 to {MOST_SAMPLES - 1}. Received {index!r}.")
         return self.space.sample(self.point(index), noise_seed(self.seed, index))
 
     def recorder(self, sample: Sample) -> ReleasedRecorder:

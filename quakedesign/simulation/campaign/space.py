@@ -90,7 +90,15 @@ class Space:
         return tuple(i for i, name in enumerate(self.ranges) if name in PERIODIC)
 
     def sample(self, point: "Sequence[float] | np.ndarray", noise_seed: int) -> Sample:
-        """Sample at a point of the unit cube."""
+        """Sample at a point of the unit cube.
+
+        Raises
+        ------
+        ParameterError
+            When the point has another dimension.
+        """
+        if len(point) != len(self.ranges):
+            raise ParameterError(f"point must hold {len(self.ranges)} numbers, one a range. Received {len(point)}.")
         values: dict[str, Any] = {
             name: min(high, low + float(share) * (high - low))
             for (name, (low, high)), share in zip(self.ranges.items(), point, strict=True)

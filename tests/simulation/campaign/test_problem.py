@@ -75,9 +75,10 @@ def spectral_radius(variation):
 
 def test_an_index_that_is_none():
     problem = campaign_problem(LAB, LAW)
-    for index in (-1, 1.0, True, 2**30):
-        with pytest.raises(ParameterError, match="index must be a whole number"):
-            problem.sample(index)
+    for index in (-1, 1.0, True, 2**30, 10**30):
+        for asked in (problem.sample, problem.point):
+            with pytest.raises(ParameterError, match=r"^index .*must be a whole number"):
+                asked(index)
 
 
 def test_what_a_campaign_cannot_do_is_refused():

@@ -48,3 +48,9 @@ def test_what_is_certain_is_not_varied():
 def test_a_start_that_slips_back_is_refused():
     with pytest.raises(ParameterError, match="initial_slip must be zero or positive"):
         Space.of(load_fault("lab-fault"), initial_slip=-1e-3)
+
+
+def test_a_point_of_another_dimension_is_refused():
+    space = Space.of(load_fault("lab-fault"))
+    with pytest.raises(ParameterError, match=f"point must hold {len(space.ranges)} numbers"):
+        space.sample([0.5], 1)

@@ -154,16 +154,18 @@ def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> l
 
 
 def solved(program: Any, margin: Any) -> bool:
-    """Whether a solver proposes something with a margin."""
+    """Whether a solver proposes something with a margin; where it breaks down, once more with firmer factorisations."""
     import cvxpy as cp
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # an inaccurate proposal is decided exactly like any other
-            program.solve(solver=cp.CLARABEL)
-    except cp.SolverError:
-        return False
-    return margin.value is not None and float(margin.value) > LEAST_MARGIN
+    for settings in ({}, {"static_regularization_constant": 1e-7}):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # an inaccurate proposal is decided exactly like any other
+                program.solve(solver=cp.CLARABEL, **settings)
+        except cp.SolverError:
+            continue
+        return margin.value is not None and float(margin.value) > LEAST_MARGIN
+    return False
 
 
 def scaled(matrix: Rows, rows: Iterable[Fraction], columns: Iterable[Fraction]) -> Any:
