@@ -107,7 +107,8 @@ def test_what_is_earlier_falls_while_what_is_new_rises():
 def test_the_tail_of_the_past_is_the_rest_of_a_geometric_series(share, time, sudden):
     """x → q·x at every sample: what is left of 1 + |q| + q² … is bounded by the sums so far, of whatever size."""
     q, entry = abs(F(share)), F(time, 8) if sudden else 1
-    found = gains_of_both([[0]], [[[share]]], [time], [entry], [1], sudden=sudden)
+    jump = [["1/100", 0], [0, share]]  # another state forgets sooner
+    found = gains_of_both([[0, 0], [0, 0]], [jump], [time], [1, entry], [0, 1], sudden=sudden)
     whole = (entry if sudden else time) * q / (1 - q)
     exact = [whole + (entry if sudden else F(time, 8) * (i + 1)) for i in range(8)]
     assert all(e <= v <= e * (1 + F(1, 10**4)) for gains in found for v, e in zip(gains, exact, strict=True))
@@ -209,6 +210,7 @@ def test_the_majorant_has_no_negative_entry():
 UNIT = 1 << checker.BITS
 FIXED = [
     (([[0]], UNIT - 1), ([[0]], UNIT - 1)),
+    (([[1]], UNIT - 1), ([[0, UNIT - 1]], 0)),
     (([[1]], 0), ([[UNIT - 1]], UNIT - 1)),
     (([[UNIT - 1]], UNIT - 1), ([[1]], 0)),
     (([[3, -5]], 2), ([[UNIT - 1], [7 - UNIT]], 3)),
@@ -244,7 +246,7 @@ def test_sums_scales_and_sizes_enclose_what_their_parts_enclose():
     assert checker.column([F(1), F(2)]).rows == [[UNIT], [2 * UNIT]]
 
 
-@pytest.mark.parametrize("rows", [[[checker.LARGEST + 1]], [[0, -checker.LARGEST - 1]]])
+@pytest.mark.parametrize("rows", [[[checker.LARGEST + 1], [0]], [[0, -checker.LARGEST - 1]]])
 def test_numbers_of_an_absurd_size_are_refused(rows):
     with pytest.raises(checker.Refused, match="ordinary size"):
         checker.bounded(checker.Fixed(rows, 0))
@@ -354,3 +356,34 @@ def test_a_state_that_is_not_seen_has_no_part_in_a_gain():
     loop = checker.Loop([[F(-1), F(0)], [F(0), F(-2)]], [], [[F(1), F(0)]], [], None, F(0))
     ((found,),) = checker.gains(loop, [F(1), F(1)], False)
     assert 1 <= found <= F(1001, 1000)
+
+
+def test_a_bend_that_changes_counts_in_every_piece():
+    """σ²/2 − σ³/96 over 8 s, kept by the jump and halved: trapezia, and h³/12 of 1 − i/16 + h/16 on every piece."""
+    keep = [["1/2", 0, 0, 0], *[[0] * 4] * 3]
+    found = gains_of_both(chain(4), [keep], [8], [0, 0, 1, F(-1, 16)], [1, 0, 0, 0])
+    y = [F(t**2, 2) - F(t**3, 96) for t in range(9)]
+    areas = [(y[i] + y[i + 1]) / 2 + (1 - F(i, 16) + F(1, 16)) / 12 for i in range(8)]
+    steep = F(7) - F(49, 32) + (1 - F(7, 16)) + F(1, 32)  # |c|·e^{Mh}·|A·e^{Aα}b| on the last piece
+    both_are([gains[-1:] for gains in found], [2 * sum(areas) + steep / 8], F(1, 10**2))
+    assert all(gains[-1] >= 2 * sum(areas) for gains in found)
+
+
+def test_what_enters_with_the_sample_fades_until_the_next():
+    """x → x/2 + v at every sample and x′ = −x, 1/2 s: 1 + q + q² …, q = e^{−1/2}/2, just after a sample."""
+    found = gains_of_both([[-1]], [[["1/2"]]], ["1/2"], [1], [1], sudden=True)
+    exact = 1 / (1 - np.exp(-0.5) / 2)
+    assert all(exact <= float(max(gains)) <= exact * 1.001 for gains in found)
+
+
+def test_what_is_left_of_the_past_counts_with_its_errors():
+    """Both products lose less than a unit and are known to two; the rest is rounded up to 1 before."""
+    one = checker.Fixed([[UNIT]], 0)
+    past = checker.Past(checker.Fixed([[0]], 0), checker.Fixed([[UNIT - 1]], 0), checker.Fixed([[1]], 0))
+    assert past.of(one) == [2 + 1 + 2]
+
+
+def test_loops_that_forget_nothing_are_refused():
+    for flow, events in (([[F(0)]], [([[F(1)]], F(1))]), ([[F(0)]], [])):
+        with pytest.raises(checker.Refused, match="nominal loop must"):
+            checker.gains(checker.Loop(flow, events, [[F(1)]] * 3, [], None, F(1)), [F(1)], False)
