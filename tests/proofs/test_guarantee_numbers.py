@@ -58,10 +58,8 @@ def gains_of_both(flow, jumps, durations, entry, row, *, sudden=False):
 
 
 def both_are(found, exact, share=F(1, 10**20)):
-    for gains in found:
-        assert len(gains) == len(exact)
-        for v, e in zip(gains, exact, strict=True):
-            assert e <= v <= e + (abs(e) + 1) * share
+    """Whether the gains that both found bound the exact ones from above, and closely."""
+    return all(e <= v <= e + (abs(e) + 1) * share for gains in found for v, e in zip(gains, exact, strict=True))
 
 
 def chain(size):
@@ -74,14 +72,14 @@ def test_the_area_of_a_parabola_between_ends_of_pieces_is_exact():
     found = gains_of_both(flow, [nothing], [8], [0, 8, -1], [1, 0, 0])
     area = lambda t: F(4 * t**2) - F(t**3, 6)  # noqa: E731
     falls = [8 - i + 1 for i in range(8)]  # |c|·e^{Mh}·|Ab|, with e^{M} = 1 + M + M²/2
-    both_are(found, [area(i + 1) + F(falls[i], 8) for i in range(8)])
+    assert both_are(found, [area(i + 1) + F(falls[i], 8) for i in range(8)])
 
 
 def test_what_enters_with_the_sample_peaks_between_the_ends_of_a_piece():
     """9θ − θ² has its peak at 4.5, in the middle of the fifth piece, h²/8·2 above both ends."""
     found = gains_of_both(chain(3), [[[0] * 3] * 3], [8], [0, 9, -2], [1, 0, 0], sudden=True)
     ends = [9 * t - t**2 for t in range(9)]
-    both_are(found, [max(ends[i : i + 2]) + F(1, 4) for i in range(8)])
+    assert both_are(found, [max(ends[i : i + 2]) + F(1, 4) for i in range(8)])
 
 
 def test_what_is_earlier_peaks_between_the_ends_of_a_piece():
@@ -90,7 +88,7 @@ def test_what_is_earlier_peaks_between_the_ends_of_a_piece():
     flow = [[*line, 0] for line in chain(3)] + [[0] * 4]
     found = gains_of_both(flow, [jump], [8], [0, 0, 0, 1], [1, 0, 0, 0])
     ends = [9 * t - t**2 for t in range(9)]
-    both_are(found, [8 * (max(ends[i : i + 2]) + F(1, 4)) for i in range(8)])
+    assert both_are(found, [8 * (max(ends[i : i + 2]) + F(1, 4)) for i in range(8)])
 
 
 def test_what_is_earlier_falls_while_what_is_new_rises():
@@ -98,7 +96,7 @@ def test_what_is_earlier_falls_while_what_is_new_rises():
     jump = [[0, 0, 7], [0, 0, F(-7, 16)], [0, 0, 0]]
     found = gains_of_both([[0, 1, 0], [0, 0, 0], [0, 0, 0]], [jump], [8], [8, -1, 1], [1, 0, 0])
     ends = [56 * (1 - F(t, 16)) + 8 * t - F(t**2, 2) for t in range(9)]
-    both_are(found, [max(ends[i : i + 2]) + F(1, 8) for i in range(8)])
+    assert both_are(found, [max(ends[i : i + 2]) + F(1, 8) for i in range(8)])
 
 
 @pytest.mark.parametrize("sudden", [False, True])
@@ -125,7 +123,7 @@ def test_two_flows_of_a_period_follow_each_other(sudden):
         before = (16 + F(8, 3)) / (1 - F(1, 6))
         second = (before / 2 + 8) / 3
         exact = [before / 2 + i + 1 for i in range(8)] + [second + 2 * (i + 1) for i in range(8)]
-    both_are(found, exact, F(1, 10**4))
+    assert both_are(found, exact, F(1, 10**4))
 
 
 def test_three_flows_of_a_period_with_bends_count_in_every_one():
@@ -139,7 +137,7 @@ def test_three_flows_of_a_period_with_bends_count_in_every_one():
         h = F(time, 8)
         exact += [before + area((i + 1) * h) + (8 - i * h + h) * h**2 / 8 for i in range(8)]
         before += area(time)
-    both_are(found, exact, F(1, 10**5))
+    assert both_are(found, exact, F(1, 10**5))
 
 
 def upper_sum(flow, entry, row, piece):
@@ -365,7 +363,7 @@ def test_a_bend_that_changes_counts_in_every_piece():
     y = [F(t**2, 2) - F(t**3, 96) for t in range(9)]
     areas = [(y[i] + y[i + 1]) / 2 + (1 - F(i, 16) + F(1, 16)) / 12 for i in range(8)]
     steep = F(7) - F(49, 32) + (1 - F(7, 16)) + F(1, 32)  # |c|·e^{Mh}·|A·e^{Aα}b| on the last piece
-    both_are([gains[-1:] for gains in found], [2 * sum(areas) + steep / 8], F(1, 10**2))
+    assert both_are([gains[-1:] for gains in found], [2 * sum(areas) + steep / 8], F(1, 10**2))
     assert all(gains[-1] >= 2 * sum(areas) for gains in found)
 
 
