@@ -47,9 +47,8 @@ VARIANTS = (
 )  # fmt: skip
 
 
-SLIDING = [("cta", v) for v in VARIANTS] + [
-    pytest.param("dia", v, marks=() if v in ("real", "strong weakening") else pytest.mark.slow) for v in VARIANTS
-]
+SHORT = {"cta": {"real", "lab", "ten percent", "stable", "strong weakening"}, "dia": {"strong weakening"}}
+SLIDING = [pytest.param(law, v, marks=() if v in SHORT[law] else pytest.mark.slow) for law in SHORT for v in VARIANTS]
 
 
 @pytest.mark.parametrize(("law", "variant"), SLIDING)

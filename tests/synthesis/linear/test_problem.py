@@ -55,7 +55,7 @@ def gains_in_si(gains, metre, second, kilogram):
 
 
 @pytest.mark.parametrize("name", UNITS)
-@pytest.mark.parametrize("preset", ["real-fault", "lab-fault"])
+@pytest.mark.parametrize("preset", [pytest.param("real-fault", marks=pytest.mark.slow), "lab-fault"])
 def test_designs_do_not_depend_on_the_units(preset, name):
     fault = qd.load_fault(preset, box="ten-percent").with_disturbance(
         Disturbance(amplitude=1e-4, frequency=0.5, slip_growth=1e-3, rate_growth=1e-2)
