@@ -1,7 +1,7 @@
 """The slip that the controller shall follow."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from quakedesign.fault.checks import require_ordinary, require_positive
 
@@ -29,8 +29,8 @@ class Reference:
         require_ordinary(0, target_slip=self.target_slip)
         require_ordinary(operation_time=self.operation_time)
 
-    def shape(self, stage: "sp.Expr") -> "sp.Expr":
-        """Share of the target slip [-] at the stage s = t/t_op in [0, 1] (eq. ref)."""
+    def shape(self, stage: Any) -> Any:
+        """Share of the target slip [-] at the stage s = t/t_op in [0, 1] (eq. ref): number, array or expression."""
         return stage**3 * (10 - 15 * stage + 6 * stage**2)
 
     def slip(self, time: "sp.Expr") -> "sp.Expr":
