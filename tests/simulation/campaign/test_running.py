@@ -62,6 +62,7 @@ def test_processes_have_the_same_digits_and_a_death_loses_nothing(serial, tmp_pa
     assert not active_children()
 
 
+@pytest.mark.filterwarnings("ignore:Creating scratch directories")  # dask's advice where a disk is slow for a second
 def test_dask_has_the_same_digits(serial, tmp_path):
     from distributed import LocalCluster
 
