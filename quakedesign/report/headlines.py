@@ -107,12 +107,14 @@ FEEDFORWARD_COLUMNS = ("feed-forward", "along_reference", "level_set", "domain |
 
 def scheme_sentence(comparison: "Comparison") -> str:
     """How the pressure of the runs was computed."""
-    names = {o: {e.run.provenance["scheme"] for e in comparison.of(o) if e.run} for o in ("designed", "published")}
-    told = [f"{', '.join(sorted(found))} for {origin} gains" for origin, found in names.items() if found]
-    said = " and ".join(told) or "none"
+    runs: dict[str, list[str]] = {}
+    for entry in comparison.entries:
+        if entry.run:
+            runs.setdefault(entry.run.provenance["scheme"], []).append(f"{entry.design.title} ({entry.origin})")
+    said = "; ".join(f"{scheme}: {', '.join(labels)}" for scheme, labels in runs.items()) or "none"
     return (
-        f"Scheme {said}; continuous evaluates the law in every Runge–Kutta stage, all others hold p over a step, which "
-        "no certificate of a sliding mode covers"
+        f"Schemes: {said}. Continuous evaluates the law in every Runge–Kutta stage, all others hold p over a "
+        "step, which no certificate in continuous time covers"
     )
 
 

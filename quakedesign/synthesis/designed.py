@@ -151,9 +151,10 @@ class Design:
             return found
         reason = f"run in the scheme compensated, {found.reason}"
         if isinstance(other.found, Guarantee):
-            claims, scales = other.found.claims, (float(other.controller.scale), float(law.scale))
+            claims, better = other.found.claims, other.controller
             reason += (
-                f"; with λ = {scales[0]:.3g} in place of {scales[1]:.3g} the slip rate never exceeds "
+                f"; with λ = {better.scale} in place of {float(law.scale):.3g}, divisor {float(better.divisor):.6g} "
+                f"m²/kg, weight {other.weight} and B0 = {float(other.authority):.6g} m²/kg the slip rate never exceeds "
                 f"{claims.peak_slip_rate:.3g} m/s, the slip stays within {claims.slip_error:.3g} m"
             )
         return NoGuarantee(reason=reason, small_gain=found.small_gain)

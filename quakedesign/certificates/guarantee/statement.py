@@ -162,11 +162,14 @@ class Guarantee:
 
 def sentence_of(task: Task, claims: Claims, when: str) -> str:
     """What is claimed of a task, for people; `when` says how the pressure follows the law."""
-    kind = f"|phi| <= {UpperBound(task.amplitude):.3g} m/s^2"
-    kind += "" if task.change is None else f" that starts at 0 and changes by {UpperBound(task.change):.3g} m/s^3"
+    kind = f"for every disturbance |phi| <= {UpperBound(task.amplitude):.3g} m/s^2"
+    if task.change is not None:
+        kind += f" that starts at 0 and changes by at most {UpperBound(task.change):.3g} m/s^3"
+    if not task.amplitude:
+        kind = "without disturbance"
     pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
     return (
-        f"from rest, {when}, for every disturbance {kind} at most and all friction and parameters of the box: "
+        f"from rest, {when}, {kind}, for all friction and parameters of the box: "
         f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
         f"{claims.slip_error:.3g} m of the reference, the pressure between {pressures} "
         "(for a plant continued to negative slip rates)"

@@ -7,7 +7,7 @@ import pytest
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Bounds, Claims, task_of
-from quakedesign.certificates.guarantee.statement import _above
+from quakedesign.certificates.guarantee.statement import _above, sentence_of
 from quakedesign.fault import load_fault
 
 TASK = task_of(load_fault("real-fault"))
@@ -49,3 +49,20 @@ def test_rounded_claims_are_a_thousandth_weaker_with_four_digits():
 @pytest.mark.parametrize(("value", "rounded"), [("12345.1", "12350"), ("-12345.1", "-12340"), ("0", "0"), ("1", "1")])
 def test_four_digits_are_not_below(value, rounded):
     assert _above(F(value)) == F(rounded)
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "change", "said"),
+    [
+        (F("0.00032"), None, "for every disturbance |phi| <= 0.00032 m/s^2, for all"),
+        (
+            F("0.00032"),
+            F("0.0002208"),
+            "|phi| <= 0.00032 m/s^2 that starts at 0 and changes by at most 0.000221 m/s^3, for",
+        ),
+        (F(0), None, "held over 1 s, without disturbance, for all friction"),
+        (F(0), F(0), "held over 1 s, without disturbance, for all friction"),
+    ],
+)
+def test_a_sentence_says_which_disturbances(amplitude, change, said):
+    assert said in sentence_of(replace(TASK, amplitude=amplitude, change=change), CLAIMS, "held over 1 s")

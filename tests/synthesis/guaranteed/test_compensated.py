@@ -239,6 +239,11 @@ def test_designs_in_continuous_time_say_which_scale_has_a_guarantee_when_it_runs
     )  # fmt: skip
     assert small.guarantee.check() is Verdict.UNDECIDED
     assert small.guarantee.sentence().startswith("none: run in the scheme compensated, the root of the implicit step")
+    made = designed("cta")
+    stated = (
+        f"with λ = {made.controller.scale} in place of 0.00025, divisor 1.8824e-08 m²/kg, weight {made.weight} and "
+    )
+    assert f"{stated}B0 = {float(made.authority):.6g} m²/kg the slip rate" in small.guarantee.sentence()
     assert small.guarantee.sentence().endswith("never exceeds 0.000299 m/s, the slip stays within 4.12e-05 m")
     assert large.guarantee == replace(designed("cta").found, held=large.guarantee.held)
     for design in (small, large):
