@@ -115,6 +115,13 @@ class Fault:
         return self.area / self.mass
 
     @property
+    def authority_range(self) -> tuple[float, float]:
+        """Smallest and largest input gain μN̂ [m²/kg] over the uncertainty box."""
+        low, high = self.friction.bounds
+        width = float(self.box.authority)
+        return low * self.authority * (1 - width), high * self.authority * (1 + width)
+
+    @property
     def specific_stiffness(self) -> float:
         """k̂ = k/m [1/s²]."""
         return self.stiffness / self.mass

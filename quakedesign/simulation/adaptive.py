@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from quakedesign.errors import ParameterError, SimulationError
-from quakedesign.simulation.closed_loop import ClosedLoop, law_expressions
+from quakedesign.loop.law_expressions import law_expressions
+from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.energy import WORKS, powers
 from quakedesign.simulation.integrators.adaptive import AdaptiveIntegrator, Flow, StoppedError
 from quakedesign.simulation.recorder import Recorder

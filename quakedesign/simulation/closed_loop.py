@@ -7,8 +7,9 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
-from quakedesign.controllers import Controller, Signals, SlidingMode
+from quakedesign.controllers import Controller, SlidingMode
 from quakedesign.fault import Fault
+from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.rationals import rational
 from quakedesign.simulation.energy import WORKS, powers
 from quakedesign.simulation.integrators import Integrator
@@ -27,26 +28,6 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 Motion = Callable[[Callable[[Any, Any, Any], Any], Any, Any], Any]
 
 phi = sp.Symbol("phi", real=True)
-r, r_rate, r_acceleration = sp.symbols("r r_rate r_acceleration", real=True)
-
-
-def integral_symbols(controller: Controller | None) -> tuple[sp.Symbol, ...]:
-    """Symbols ξ1, ξ2 … of the law's own states."""
-    count = len(controller.integral_units) if controller else 0
-    return tuple(sp.Symbol(f"xi_{i + 1}", real=True) for i in range(count))
-
-
-def law_expressions(controller: Controller) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
-    """Pressure [Pa] and ξ' of a law, in x1, x2, r, r', r'' and ξ."""
-    signals = Signals(
-        slip=plant.x1,
-        slip_rate=plant.x2,
-        slip_error=plant.x1 - r,
-        slip_rate_error=plant.x2 - r_rate,
-        integrals=integral_symbols(controller),
-        reference_acceleration=r_acceleration,
-    )
-    return controller.pressure(signals), controller.integral_rates(signals)
 
 
 def reference_expressions(fault: Fault) -> tuple[sp.Expr, sp.Expr, sp.Expr]:

@@ -5,7 +5,8 @@ from typing import Any
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
-from quakedesign.simulation.closed_loop import ClosedLoop, integral_symbols, law_expressions, r, r_acceleration, r_rate
+from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
+from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_numpy
 

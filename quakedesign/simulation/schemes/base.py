@@ -1,10 +1,51 @@
 """What every scheme offers."""
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
-from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.integrators import Integrator
+import sympy as sp
+
+from quakedesign.controllers import Controller
+from quakedesign.fault import Fault
+
+
+class Stepped(Protocol):
+    """What a scheme asks of the closed loop that it carries over a step; its functions work on CasADi SX."""
+
+    @property
+    def fault(self) -> Fault:
+        """What is controlled."""
+
+    @property
+    def controller(self) -> Controller | None:
+        """What controls it."""
+
+    @property
+    def constant_pressure(self) -> float:
+        """Pressure [Pa] where there is no controller."""
+
+    @property
+    def integrals(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of the law's own states."""
+
+    @property
+    def sticks(self) -> bool:
+        """Whether friction is set-valued."""
+
+    @property
+    def plant(self) -> Any:
+        """(t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²]."""
+
+    @property
+    def reference(self) -> Any:
+        """Time [s] → reference [m, m/s, m/s²]."""
+
+    @property
+    def law(self) -> Any:
+        """(x, xi, reference) → p [Pa], dxi."""
+
+    def advance(self, method: Any, motion: Any, state: Any, step: float) -> Any:
+        """State after one step of an integrator on a motion, given the plant, how much has passed [-] and the state."""
 
 
 class Scheme(ABC):
@@ -20,23 +61,23 @@ class Scheme(ABC):
 
     name: ClassVar[str]
 
-    def memory(self, loop: ClosedLoop, step: float) -> dict[str, float]:
+    def memory(self, loop: Stepped, step: float) -> dict[str, float]:
         """Entries of the memory with their values at the start; none unless told."""
         return {}
 
     @abstractmethod
-    def pressure(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> Any:
+    def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
         """Pressure [Pa] in the fault at the start of step number `counter`."""
 
     @abstractmethod
-    def advance(self, loop: ClosedLoop, method: type[Integrator], counter: Any, state: Any, step: float) -> Any:
+    def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
         """State at the end of step number `counter`, which starts at counter·step [s]."""
 
-    def rates(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> Any:
+    def rates(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
         """Time derivative of the state at the start of a step; None where the scheme has none."""
         return None
 
-    def outputs(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> dict[str, Any]:
+    def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:
         """Further signals (SX) at the start of a step, by the names of `described`; none unless told."""
         return {}
 

@@ -8,13 +8,13 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.compensation import answered, followed
-from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.schemes import lawful
 from quakedesign.simulation.schemes.backward import backward_euler, inclusion
+from quakedesign.simulation.schemes.base import Stepped
 from quakedesign.simulation.schemes.control_step import slope_of
 from quakedesign.simulation.schemes.inclusion import end_rate
 from quakedesign.simulation.schemes.lawful import Law, Values
-from quakedesign.simulation.schemes.sampled import Decision, Sampled, authority_range
+from quakedesign.simulation.schemes.sampled import Decision, Sampled
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,9 +62,9 @@ class Compensated(Sampled):
         """See `Sampled.starts`: whether a sample has been taken, e2⁻, the feed-forward then, d, and the weight."""
         return 0.0, 0.0, 0.0, 0.0, float(self.weight)
 
-    def nominal(self, loop: ClosedLoop) -> float:
+    def nominal(self, loop: Stepped) -> float:
         """See `Sampled.nominal`: here √(smallest · largest)."""
-        return math.sqrt(math.prod(authority_range(loop)))
+        return math.sqrt(math.prod(loop.fault.authority_range))
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -2,9 +2,7 @@
 
 from typing import Any, ClassVar
 
-from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.integrators import Integrator
-from quakedesign.simulation.schemes.base import Scheme
+from quakedesign.simulation.schemes.base import Scheme, Stepped
 
 
 class Continuous(Scheme):
@@ -15,11 +13,11 @@ class Continuous(Scheme):
 
     name: ClassVar[str] = "continuous"
 
-    def pressure(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> Any:
+    def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
         """Pressure [Pa] that the law asks for now."""
         return loop.law(state[:2], state[2:], loop.reference(counter * step))[0]
 
-    def advance(self, loop: ClosedLoop, method: type[Integrator], counter: Any, state: Any, step: float) -> Any:
+    def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
         """State after one step of the integrator on plant and law together."""
 
         def motion(plant: Any, passed: Any, now: Any) -> Any:
@@ -27,12 +25,12 @@ class Continuous(Scheme):
 
         return loop.advance(method, motion, state, step)
 
-    def rates(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> Any:
+    def rates(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
         """Time derivative of the state; None where friction is set-valued."""
         return None if loop.sticks else self._motion(loop, loop.plant, counter * step, state)
 
     @staticmethod
-    def _motion(loop: ClosedLoop, plant: Any, time: Any, now: Any) -> Any:
+    def _motion(loop: Stepped, plant: Any, time: Any, now: Any) -> Any:
         import casadi as ca
 
         pressure, integral_rates = loop.law(now[:2], now[2:], loop.reference(time))

@@ -6,7 +6,7 @@ from typing import Any
 import sympy as sp
 
 from quakedesign.controllers import Controller, Signals
-from quakedesign.simulation.closed_loop import integral_symbols
+from quakedesign.loop.law_expressions import integral_symbols
 from quakedesign.symbolic.casadi_printer import to_casadi
 
 Values = dict[sp.Symbol, Any]

@@ -9,11 +9,9 @@ import sympy as sp
 from quakedesign.errors import ParameterError
 from quakedesign.simulation.actuators import DIRECT, Actuator
 from quakedesign.simulation.actuators.base import FLOWS
-from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.integrators import Integrator
 from quakedesign.simulation.measurement import EXACT, Measurement
 from quakedesign.simulation.schemes import lawful
-from quakedesign.simulation.schemes.base import Scheme
+from quakedesign.simulation.schemes.base import Scheme, Stepped
 from quakedesign.simulation.schemes.control_step import SIGNALS, ControlStep, control_step
 from quakedesign.simulation.schemes.lawful import Law, Values
 from quakedesign.simulation.sensing.base import Sensor
@@ -104,11 +102,11 @@ class Sampled(Scheme):
     def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
         """What the controller does, given the expressions, the values of their symbols, and its own memory."""
 
-    def nominal(self, loop: ClosedLoop) -> float:
+    def nominal(self, loop: Stepped) -> float:
         """B0 [m²/kg] unless told: the smallest μN̂ of the fault's uncertainty box."""
-        return authority_range(loop)[0]
+        return loop.fault.authority_range[0]
 
-    def memory(self, loop: ClosedLoop, step: float) -> dict[str, float]:
+    def memory(self, loop: Stepped, step: float) -> dict[str, float]:
         """See `Scheme.memory`; refuses a sensor that was made for another step."""
         self.actuator.require_resolved(step / self.substeps)
         if isinstance(self.measurement, Sensor):
@@ -116,12 +114,12 @@ class Sampled(Scheme):
         parts = self._parts(loop)
         return {f"{name}_{i}": float(v) for name, values in parts.items() for i, v in enumerate(values)}
 
-    def pressure(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> Any:
+    def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
         """See `Scheme.pressure`."""
         sample = self._sample(loop, counter, state, step)
         return self.actuator.flow(sample.numbers, sample.flow, sample.held)[1]
 
-    def outputs(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> dict[str, Any]:
+    def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:
         """See `Scheme.outputs`."""
         if not self.actuator.stages:
             return {}
@@ -142,7 +140,7 @@ class Sampled(Scheme):
         said |= {"authority": self.authority} if self.authority else {}
         return said | ({"measurement": repr(self.measurement)} if self.measurement.noisy else {})
 
-    def advance(self, loop: ClosedLoop, method: type[Integrator], counter: Any, state: Any, step: float) -> Any:
+    def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
         """See `Scheme.advance`."""
         import casadi as ca
 
@@ -162,7 +160,7 @@ class Sampled(Scheme):
         constants = state[first : first + count]
         return ca.vertcat(moving[:2], *sample.integrals, constants, rest, moving[2:])
 
-    def _parts(self, loop: ClosedLoop) -> dict[str, tuple[float, ...]]:
+    def _parts(self, loop: Stepped) -> dict[str, tuple[float, ...]]:
         """Values of the memory at the start."""
         sampled, flowing = self.actuator.sampled, self.actuator.flowing
         return {
@@ -178,11 +176,11 @@ class Sampled(Scheme):
             "flow": self.actuator.flow_start,
         }
 
-    def control_step(self, loop: ClosedLoop) -> ControlStep:
+    def control_step(self, loop: Stepped) -> ControlStep:
         """What the controller of a loop computes at one sample."""
         return control_step(type(self), Law.of(loop.controller, loop.constant_pressure))
 
-    def _sample(self, loop: ClosedLoop, counter: Any, state: Any, step: float) -> Sample:
+    def _sample(self, loop: Stepped, counter: Any, state: Any, step: float) -> Sample:
         """Measure, decide, and pass the decision on to the actuator; ξ does not wind up where a stage limits."""
         import casadi as ca
 
@@ -204,7 +202,7 @@ class Sampled(Scheme):
         )
 
     @staticmethod
-    def _known(loop: ClosedLoop, counter: Any, step: float, seen: Any) -> Values:
+    def _known(loop: Stepped, counter: Any, step: float, seen: Any) -> Values:
         """Values of the signals of one sample."""
         import casadi as ca
 
@@ -219,11 +217,3 @@ class Sampled(Scheme):
             lawful.next_reference_rate: later[1],
             lawful.step: ca.SX(step),
         }
-
-
-def authority_range(loop: ClosedLoop) -> tuple[float, float]:
-    """Smallest and largest input gain μN̂ [m²/kg] over the uncertainty box of the loop's fault."""
-    fault = loop.fault
-    low, high = fault.friction.bounds
-    width = float(fault.box.authority)
-    return low * fault.authority * (1 - width), high * fault.authority * (1 + width)

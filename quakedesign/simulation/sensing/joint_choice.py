@@ -22,6 +22,7 @@ from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_nonnegative
+from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.simulation.sensing.accuracy import worst_errors
 from quakedesign.simulation.sensing.differentiator import Differentiator
 
@@ -88,7 +89,7 @@ def joint_condition(
     slip_error, rate_error, *_ = worst_errors(differentiator, noise)
     required = math.inf
     if differentiator.order == 1:
-        required = acceleration + _authority(fault, controller) * pressure_swing(controller, slip_error, rate_error)
+        required = acceleration + fault.authority_range[1] * pressure_swing(controller, slip_error, rate_error)
     ratio = required / differentiator.bound
     return JointCondition(
         required=required,
@@ -139,17 +140,8 @@ def pressure_swing(controller: Controller, slip_error: float, rate_error: float)
 
 
 def _pressure(controller: Controller, slip: float, rate: float) -> float:
-    from quakedesign.simulation.closed_loop import integral_symbols, law_expressions, r, r_acceleration, r_rate
     from quakedesign.symbolic import plant
     from quakedesign.symbolic.casadi_printer import to_numpy
 
     rest = dict.fromkeys((*integral_symbols(controller), r, r_rate, r_acceleration), 0.0)
     return float(to_numpy([law_expressions(controller)[0]], {plant.x1: slip, plant.x2: rate, **rest})[0])
-
-
-def _authority(fault: Fault, controller: Controller) -> float:
-    """Largest input gain μN̂ [m²/kg] over the fault's box."""
-    from quakedesign.simulation.closed_loop import ClosedLoop
-    from quakedesign.simulation.schemes.sampled import authority_range
-
-    return authority_range(ClosedLoop(fault, controller))[1]
