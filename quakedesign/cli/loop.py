@@ -97,10 +97,10 @@ def simulate(
         Print JSON.
     """
     from quakedesign.fault import load_fault
+    from quakedesign.loop.schemes import own_way
     from quakedesign.report.single import optional_choice, run_single
     from quakedesign.simulation import Load
     from quakedesign.simulation import perturbation as read_perturbation
-    from quakedesign.simulation.schemes import own_way
 
     new_file(out, "output file", force=force)
     found = load_fault(fault)

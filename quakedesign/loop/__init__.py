@@ -1,4 +1,4 @@
-"""What stands between law and fault, each element stated once, as exact matrices."""
+"""What stands between law and fault, each element stated once: loops as exact matrices, schemes, actuators, sensors."""
 
 from quakedesign.arguments import check_arguments
 from quakedesign.loop.compensation import compensated

@@ -160,7 +160,7 @@ def compare(
     with_published : bool
         Add the paper's gains, where the fault has any, with their verdicts and premises.
     scheme, published_scheme : str
-        Of the runs of designed and of published gains, see `quakedesign.simulation.schemes`; ``continuous``, as in the
+        Of the runs of designed and of published gains, see `quakedesign.loop.schemes`; ``continuous``, as in the
         paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed.
     progress : callable, optional
         Called with what is being done and the fraction done [-].

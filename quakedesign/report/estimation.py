@@ -7,9 +7,7 @@ from quakedesign.certificates.premises import Premise
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.simulation import simulate
-from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.sensing import (
+from quakedesign.loop.sensing import (
     Averaging,
     Differentiator,
     OutputFeedback,
@@ -17,6 +15,8 @@ from quakedesign.simulation.sensing import (
     Transducer,
     joint_condition,
 )
+from quakedesign.loop.sensing.measurement import Measurement
+from quakedesign.simulation import simulate
 
 WINDOW = 4000
 DEVIATIONS = 4.0  # of normal noise that count as its bound

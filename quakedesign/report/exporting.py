@@ -5,13 +5,13 @@ from typing import Any
 
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
+from quakedesign.loop.schemes import own_way
+from quakedesign.loop.sensing import OutputFeedback
+from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.report.estimation import differentiator_premise, sensor
 from quakedesign.simulation import export_controller
 from quakedesign.simulation.export import HEADER, SOURCE
-from quakedesign.simulation.measurement import EXACT
 from quakedesign.simulation.run import sampled_scheme
-from quakedesign.simulation.schemes import own_way
-from quakedesign.simulation.sensing import OutputFeedback
 
 
 def export_answer(

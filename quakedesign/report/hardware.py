@@ -1,7 +1,7 @@
 """Actuators as the command line makes them, from quantities in SI units."""
 
 from quakedesign.errors import ParameterError
-from quakedesign.simulation.actuators import (
+from quakedesign.loop.actuators import (
     Actuator,
     Delay,
     Diffusion,

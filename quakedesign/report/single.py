@@ -10,14 +10,14 @@ from quakedesign.controllers import Controller, SlidingMode, control_law, publis
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Fault
+from quakedesign.loop.actuators import DIRECT
+from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.sensing import OutputFeedback, Sensor
+from quakedesign.loop.sensing.measurement import EXACT, Measurement
 from quakedesign.report.estimation import differentiator_premise
 from quakedesign.report.on_trajectory import certified_bound, trajectory_premise
 from quakedesign.simulation import Actuator, Load, Trajectory, natural_earthquake
 from quakedesign.simulation import simulate as run_loop
-from quakedesign.simulation.actuators import DIRECT
-from quakedesign.simulation.measurement import EXACT, Measurement
-from quakedesign.simulation.schemes import simulation_scheme
-from quakedesign.simulation.sensing import OutputFeedback, Sensor
 from quakedesign.synthesis import design
 
 PUBLISHED, DESIGNED = ("published",), ("designed",)

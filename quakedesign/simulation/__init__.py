@@ -4,7 +4,7 @@ Numerical libraries load inside the functions that need them. Campaigns are in `
 """
 
 from quakedesign.arguments import check_arguments
-from quakedesign.simulation.actuators import (
+from quakedesign.loop.actuators import (
     Actuator,
     Delay,
     Diffusion,
@@ -14,20 +14,8 @@ from quakedesign.simulation.actuators import (
     Saturation,
     stages,
 )
-from quakedesign.simulation.earthquake import natural_earthquake
-from quakedesign.simulation.energy import EnergyBudget
-from quakedesign.simulation.export import ControllerStep, controller_step, export_controller
-from quakedesign.simulation.integrators import Integrator, integrator, integrators
-from quakedesign.simulation.interop import to_casadi, to_iosystem
-from quakedesign.simulation.loading import Load
-from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.metrics import ActuatorMetrics, Metrics, StickMetrics
-from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
-from quakedesign.simulation.perturbation import perturbation
-from quakedesign.simulation.sampled_trajectory import SampledTrajectory
-from quakedesign.simulation.sampling_study import Study, accuracy, gain_sensitivity, noise_sensitivity, weight_study
-from quakedesign.simulation.schemes import Scheme, schemes, simulation_scheme
-from quakedesign.simulation.sensing import (
+from quakedesign.loop.schemes import Scheme, schemes, simulation_scheme
+from quakedesign.loop.sensing import (
     Averaging,
     Differentiator,
     JointCondition,
@@ -37,6 +25,18 @@ from quakedesign.simulation.sensing import (
     joint_condition,
     smallest_bound,
 )
+from quakedesign.loop.sensing.measurement import Measurement
+from quakedesign.simulation.earthquake import natural_earthquake
+from quakedesign.simulation.energy import EnergyBudget
+from quakedesign.simulation.export import ControllerStep, controller_step, export_controller
+from quakedesign.simulation.integrators import Integrator, integrator, integrators
+from quakedesign.simulation.interop import to_casadi, to_iosystem
+from quakedesign.simulation.loading import Load
+from quakedesign.simulation.metrics import ActuatorMetrics, Metrics, StickMetrics
+from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
+from quakedesign.simulation.perturbation import perturbation
+from quakedesign.simulation.sampled_trajectory import SampledTrajectory
+from quakedesign.simulation.sampling_study import Study, accuracy, gain_sensitivity, noise_sensitivity, weight_study
 from quakedesign.simulation.simulate import simulate
 from quakedesign.simulation.state_plants import SpringSlider
 from quakedesign.simulation.state_run import simulate_state, velocity_step

@@ -9,11 +9,11 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.loop.law_expressions import law_expressions
+from quakedesign.loop.schemes import Scheme
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.energy import WORKS, powers
 from quakedesign.simulation.integrators.adaptive import AdaptiveIntegrator, Flow, StoppedError
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.schemes import Scheme
 from quakedesign.symbolic import SignedPower
 from quakedesign.symbolic.signed_power import AbsolutePower
 

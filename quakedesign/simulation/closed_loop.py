@@ -10,6 +10,7 @@ import sympy as sp
 from quakedesign.controllers import Controller, SlidingMode
 from quakedesign.fault import Fault
 from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
+from quakedesign.loop.schemes import Stepped
 from quakedesign.rationals import rational
 from quakedesign.simulation.energy import WORKS, powers
 from quakedesign.simulation.integrators import Integrator
@@ -77,7 +78,7 @@ def _with_numbers(expression: sp.Expr, fault: Fault, varied: bool) -> sp.Expr:
 
 
 @dataclass(frozen=True)
-class ClosedLoop:
+class ClosedLoop(Stepped):
     """One fault under one law, or under a constant pressure.
 
     Attributes
@@ -96,7 +97,6 @@ class ClosedLoop:
 
     plant_name: ClassVar[str] = "smooth"
     plant_title: ClassVar[str] = ""
-    sticks: ClassVar[bool] = False
 
     fault: Fault
     controller: Controller | None = None

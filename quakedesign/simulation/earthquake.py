@@ -7,11 +7,11 @@ from math import pi
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Disturbance, Fault
+from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import Setting, loop_class, run
-from quakedesign.simulation.schemes import simulation_scheme
 from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.symbolic import derive
 

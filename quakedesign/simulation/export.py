@@ -10,15 +10,15 @@ from quakedesign.controllers import Controller
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_positive
+from quakedesign.loop.schemes import Scheme, own_way, simulation_scheme
+from quakedesign.loop.sensing import Sensor
+from quakedesign.loop.sensing.measurement import EXACT
+from quakedesign.loop.steps.sampled import Sampled
 from quakedesign.output import require_room, whole_folder, write_whole
 from quakedesign.simulation.c_source import header_text, source_text
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.integrators import integrator
-from quakedesign.simulation.measurement import EXACT
 from quakedesign.simulation.run import library_versions
-from quakedesign.simulation.schemes import Scheme, own_way, simulation_scheme
-from quakedesign.simulation.schemes.sampled import Sampled
-from quakedesign.simulation.sensing import Sensor
 
 SOURCE, HEADER = "controller.c", "controller.h"
 

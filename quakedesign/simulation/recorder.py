@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from quakedesign.loop.schemes import Scheme
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.energy import WORKS, EnergyBudget, budget
 from quakedesign.simulation.integrators import Integrator
-from quakedesign.simulation.schemes import Scheme
 
 NEVER = -1.0
 LARGEST_MOTION = 1e9

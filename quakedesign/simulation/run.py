@@ -7,7 +7,10 @@ from time import perf_counter
 from typing import Any
 
 from quakedesign.errors import ParameterError
-from quakedesign.simulation.actuators import Actuator
+from quakedesign.loop.actuators import Actuator
+from quakedesign.loop.schemes import Scheme, simulation_scheme
+from quakedesign.loop.sensing import Sensor
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
 from quakedesign.simulation.assembly import trajectory
 from quakedesign.simulation.backend import prepare
@@ -16,11 +19,8 @@ from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.coulomb import CoulombLoop
 from quakedesign.simulation.integrators import AdaptiveIntegrator, Integrator
 from quakedesign.simulation.integrators.adaptive import FLOOR
-from quakedesign.simulation.measurement import Measurement
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.schemes import Scheme, simulation_scheme
-from quakedesign.simulation.sensing import Sensor
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.stepping import Advancer, instants, march
 from quakedesign.simulation.trajectory import Trajectory

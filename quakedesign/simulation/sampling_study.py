@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.controllers import Controller, SlidingMode
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Fault
-from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.simulate import simulate
 from quakedesign.simulation.variation import Variation
 
@@ -243,7 +243,7 @@ def weight_study(
     """Errors of the scheme ``compensated`` from the start on, against the weight of its estimate.
 
     Its B0 is the smallest of the box, so that β/β0 = μ_max/μ_res at the start: what
-    `quakedesign.simulation.schemes.compensation` says about the weights then shows.
+    `quakedesign.loop.steps.stable_ratios` says about the weights then shows.
     """
     base: Any = simulation_scheme("compensated")
 

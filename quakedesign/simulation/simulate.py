@@ -5,16 +5,16 @@ from pathlib import Path
 
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault, require_fault
-from quakedesign.simulation.actuators import Actuator
+from quakedesign.loop.actuators import Actuator
+from quakedesign.loop.schemes import Scheme, own_way
+from quakedesign.loop.sensing import Sensor
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator
 from quakedesign.simulation.loading import Load
-from quakedesign.simulation.measurement import Measurement
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import loop_class, run, run_adaptive, sampled_scheme
-from quakedesign.simulation.schemes import Scheme, own_way
-from quakedesign.simulation.sensing import Sensor
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.simulation.variation import Variation
@@ -51,7 +51,7 @@ def simulate(
     step : float, optional
         Length of one step [s]; that of a law of samples, or the fault's sampling time, unless given.
     scheme : str or Scheme, optional
-        How the law is carried out over a step, by name, or set as wanted; see `quakedesign.simulation.schemes`. All but
+        How the law is carried out over a step, by name, or set as wanted; see `quakedesign.loop.schemes`. All but
         ``"continuous"`` measure and decide once per step and hold the pressure in between. Unless given, ``"explicit"``
         for a law of samples, which has no other, and ``"continuous"`` for others.
     method : str

@@ -11,7 +11,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop import ImplicitRoot, Power, compensated
 from quakedesign.loop.implicit_root import pulled, root_of
-from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.synthesis.guaranteed.implicit_pull import implicit_pull
 
 STEP, AUTHORITY, WEIGHT = F("0.184"), F("2.25e-8"), F("0.3")

@@ -5,9 +5,9 @@ import pytest
 from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.report.estimation import differentiator_premise, largest_acceleration, sensor
 from quakedesign.simulation import Measurement, joint_condition
-from quakedesign.simulation.measurement import EXACT
 
 LAB = load_fault("lab-fault")
 LAW = published("lab-fault")["cta"]

@@ -71,11 +71,11 @@ def test_a_dashpot_takes_what_a_closed_form_says():
 
 def test_a_held_pressure_relieves_friction_of_its_share():
     """Constant friction under p: ∫μAp dx1 = μApx1, which the push of the pressure gives to the spring."""
+    from quakedesign.loop.schemes import simulation_scheme
     from quakedesign.simulation.integrators import integrator
     from quakedesign.simulation.outcome import OutcomeCriterion
     from quakedesign.simulation.recorder import Recorder
     from quakedesign.simulation.run import Setting, loop_class, run
-    from quakedesign.simulation.schemes import simulation_scheme
 
     pressure, half = 2e6, math.pi / FREQUENCY
     setting = Setting.of(BLOCK, half / 400, half, 10, 0.0)

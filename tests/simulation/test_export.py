@@ -14,16 +14,16 @@ from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop import Prediction, SampledController, disturbance_estimate
+from quakedesign.loop.actuators.chain import Actuator
+from quakedesign.loop.actuators.delay import Delay
+from quakedesign.loop.actuators.lag import Lag
+from quakedesign.loop.actuators.rate_limit import RateLimit
+from quakedesign.loop.actuators.saturation import Saturation
+from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Transducer
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import simulate
-from quakedesign.simulation.actuators.chain import Actuator
-from quakedesign.simulation.actuators.delay import Delay
-from quakedesign.simulation.actuators.lag import Lag
-from quakedesign.simulation.actuators.rate_limit import RateLimit
-from quakedesign.simulation.actuators.saturation import Saturation
 from quakedesign.simulation.export import controller_step, export_controller
-from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.schemes import simulation_scheme
-from quakedesign.simulation.sensing import Averaging, Differentiator, OutputFeedback, Transducer
 
 LAB = load_fault("lab-fault")
 PUBLISHED = published("lab-fault")

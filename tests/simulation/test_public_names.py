@@ -6,8 +6,8 @@ import sys
 import pytest
 
 import quakedesign.simulation as room
-from quakedesign.simulation.actuators.base import Stage, stages
-from quakedesign.simulation.schemes import Scheme, schemes
+from quakedesign.loop.actuators.base import Stage, stages
+from quakedesign.loop.schemes import Scheme, schemes
 
 
 def test_every_stage_of_an_actuator_has_its_name_in_the_room():

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
+from quakedesign.loop.schemes import Scheme
 from quakedesign.simulation.campaign.ledger import plain
 from quakedesign.simulation.campaign.program import STEP, Program
 from quakedesign.simulation.campaign.reseeding import reseeded
@@ -20,7 +21,6 @@ from quakedesign.simulation.metrics import events, metrics
 from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import Setting, library_versions, loop_class, run
-from quakedesign.simulation.schemes import Scheme
 from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.simulation.variation import Variation
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
+from quakedesign.loop.schemes import Scheme, own_way, simulation_scheme
 from quakedesign.simulation.campaign.crews import Cluster, Given
 from quakedesign.simulation.campaign.dispatch import dispatch
 from quakedesign.simulation.campaign.ledger import Ledger
@@ -24,7 +25,6 @@ from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.metrics import ActuatorMetrics
 from quakedesign.simulation.run import Setting
-from quakedesign.simulation.schemes import Scheme, own_way, simulation_scheme
 from quakedesign.temporary import temporary_folder
 from quakedesign.workers import Crew, Processes
 

@@ -97,7 +97,7 @@ def sampling(
     metric : str
         One of `Metrics` that are better when smaller.
     scheme : str
-        One of `quakedesign.simulation.schemes`.
+        One of `quakedesign.loop.schemes`.
     step : float, optional
         Sampling time T_s [s]; the fault's unless given.
     duration : float, optional

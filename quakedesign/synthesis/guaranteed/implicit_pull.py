@@ -7,11 +7,11 @@ import sympy as sp
 from quakedesign.controllers import Controller
 from quakedesign.errors import UnsupportedError
 from quakedesign.loop import Power
+from quakedesign.loop.schemes.compensated import Compensated
+from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps.inclusion import end_rate, end_slip
+from quakedesign.loop.steps.sampled_law import Law
 from quakedesign.rationals import fraction_of, to_sympy
-from quakedesign.simulation.schemes import lawful
-from quakedesign.simulation.schemes.compensated import Compensated
-from quakedesign.simulation.schemes.inclusion import end_rate, end_slip
-from quakedesign.simulation.schemes.lawful import Law
 from quakedesign.symbolic import SignedPower
 
 _NAMES = {end_slip: "slip", end_rate: "rate"}
@@ -36,7 +36,7 @@ def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -
     pull, feed_forward, _ = Compensated.derive(Law.of(controller, 0.0))
     if feed_forward != 0:
         raise UnsupportedError("a law with a feed-forward has no guarantee in an implicit step. Use feedforward none.")
-    numbers = {lawful.step: to_sympy(step), lawful.authority: to_sympy(authority)}
+    numbers = {sampled_law.step: to_sympy(step), sampled_law.authority: to_sympy(authority)}
     return _terms(-pull.subs(numbers))
 
 

@@ -7,7 +7,7 @@ from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee import NoGuarantee, Task
 from quakedesign.controllers import SlidingMode, family
 from quakedesign.errors import ParameterError
-from quakedesign.simulation.schemes import schemes
+from quakedesign.loop.schemes import schemes
 from quakedesign.synthesis.guaranteed.compensated import Compensation, design_compensated
 
 GUARANTEED = "compensated"

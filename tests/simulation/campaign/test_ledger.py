@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import OutputError, SimulationError
+from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.sensing import Transducer
 from quakedesign.simulation.campaign.ledger import Ledger, differences, plain
-from quakedesign.simulation.schemes import simulation_scheme
-from quakedesign.simulation.sensing import Transducer
 from quakedesign.temporary import FAMILY, PREFIX
 
 INPUTS = {"seed": 1, "controller": {"gains": {"k1": "7"}}}

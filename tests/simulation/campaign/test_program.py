@@ -8,14 +8,14 @@ import pytest
 
 from quakedesign.controllers import published
 from quakedesign.fault import load_fault
+from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Variation, simulate
 from quakedesign.simulation.backend import compiler, shared_library
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign import worker as worker_module
 from quakedesign.simulation.campaign.program import mover
 from quakedesign.simulation.campaign.worker import advance
-from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.schemes import simulation_scheme
 
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]  # sampled at 1 ms it is on the verge of instability (ERRATA 22)

@@ -16,9 +16,9 @@ import pytest
 from quakedesign.controllers import published
 from quakedesign.errors import OutputError, ParameterError, SimulationError
 from quakedesign.fault import load_fault
+from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.campaign import SerialExecutor, campaign_problem, run_campaign
-from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.schemes import simulation_scheme
 
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]
@@ -137,8 +137,8 @@ from dataclasses import replace
 from quakedesign.controllers import published
 from quakedesign.fault import load_fault
 from quakedesign.simulation.campaign import SerialExecutor, campaign_problem, run_campaign
-from quakedesign.simulation.measurement import Measurement
-from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.loop.sensing.measurement import Measurement
+from quakedesign.loop.schemes import simulation_scheme
 
 folder = sys.argv[1]
 scheme = simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-7))

@@ -18,7 +18,7 @@ from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop import Power
-from quakedesign.simulation.schemes import simulation_scheme
+from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.synthesis import Design
 from quakedesign.synthesis.guaranteed import compensated, design_compensated, worst_found
 from quakedesign.synthesis.guaranteed.implicit_pull import implicit_pull

@@ -1,0 +1,28 @@
+"""What lies between the pressure that a law asks for and the pressure in the fault, one stage a file."""
+
+from quakedesign.arguments import check_arguments
+from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage, stages
+from quakedesign.loop.actuators.chain import DIRECT, Actuator
+from quakedesign.loop.actuators.delay import Delay
+from quakedesign.loop.actuators.diffusion import Diffusion
+from quakedesign.loop.actuators.lag import Lag
+from quakedesign.loop.actuators.quantisation import Quantisation
+from quakedesign.loop.actuators.rate_limit import RateLimit
+from quakedesign.loop.actuators.saturation import Saturation
+
+__all__ = [
+    "DIRECT",
+    "Actuator",
+    "Delay",
+    "Diffusion",
+    "FlowStage",
+    "Lag",
+    "Quantisation",
+    "RateLimit",
+    "SampledStage",
+    "Saturation",
+    "Stage",
+    "stages",
+]
+
+check_arguments(__name__)

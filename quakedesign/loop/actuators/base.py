@@ -1,0 +1,87 @@
+"""What every stage of an actuator offers."""
+
+from abc import ABC, abstractmethod
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, ClassVar
+
+
+class Stage(ABC):
+    """One element of a chain that carries a pressure [Pa] from the controller to the fault.
+
+    Its numbers and its memory are entries of the vector that the compiled loop carries along, so that one machine
+    code serves all of them; the methods work on CasADi SX and on floats.
+
+    Attributes
+    ----------
+    name : str
+    limits : bool
+        Whether an output that differs from the input means that the law asked for more than there is, so that its
+        integral states must not wind up.
+    """
+
+    name: ClassVar[str]
+    limits: ClassVar[bool] = False
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Parameters in SI units, as the other methods expect them."""
+        return ()
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Memory before anything has been injected."""
+        return ()
+
+
+class SampledStage(Stage):
+    """A stage that acts once per sample."""
+
+    @abstractmethod
+    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+        """Pressure [Pa] that leaves the stage over one sample of length `step` [s], and the memory afterwards."""
+
+
+class FlowStage(Stage):
+    """A stage with a motion of its own, integrated along with the plant."""
+
+    @property
+    @abstractmethod
+    def fastest(self) -> float:
+        """Largest rate of decay [1/s]; it limits the length of a substep."""
+
+    @abstractmethod
+    def rates(self, numbers: Any, memory: list[Any], pressure: Any) -> list[Any]:
+        """Time derivative of the memory under a pressure [Pa] at the inlet."""
+
+    @abstractmethod
+    def output(self, numbers: Any, memory: list[Any], pressure: Any) -> Any:
+        """Pressure [Pa] at the outlet."""
+
+    @property
+    def stores(self) -> bool:
+        """Whether `flows` knows volume and flow rate."""
+        return type(self).flows is not FlowStage.flows
+
+    def flows(self, numbers: Any, memory: list[Any], pressure: Any) -> dict[str, Any]:
+        """Further signals by the names of `FLOWS`; none unless the stage stores fluid."""
+        return {}
+
+
+FLOWS = {
+    "injected_volume": ("injected volume", "m^3"),
+    "flow_rate": ("injected flow rate", "m^3/s"),
+}
+
+
+@cache
+def stages() -> dict[str, type[Stage]]:
+    """Every stage of the package, by name."""
+    found: dict[str, type[Stage]] = {}
+    package = import_module("quakedesign.loop.actuators")
+    for info in iter_modules(package.__path__):
+        for item in vars(import_module(f"{package.__name__}.{info.name}")).values():
+            if isinstance(item, type) and issubclass(item, Stage) and hasattr(item, "name"):
+                found[item.name] = item
+    return found

@@ -1,0 +1,116 @@
+"""Stages in a row."""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from quakedesign.errors import ParameterError
+from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
+
+LONGEST = 2.5  # of a substep times the fastest rate: below the limits 2.78 and 3.3 of the Runge–Kutta methods
+
+
+@dataclass(frozen=True, kw_only=True)
+class Actuator:
+    """From the pressure that a law asks for to the pressure in the fault.
+
+    Attributes
+    ----------
+    stages : tuple of Stage
+        In the order of the signal; those that act once per sample first, since what they leave is then held. None:
+        the fault has at once what the law asks for.
+
+    Raises
+    ------
+    ParameterError
+        For anything but stages, or another order.
+    """
+
+    stages: tuple[Stage, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stages", tuple(self.stages))
+        for stage in self.stages:
+            if not isinstance(stage, SampledStage | FlowStage):
+                raise ParameterError(
+                    f"an actuator consists of stages. Received {stage!r}. Use Delay, Lag and the like."
+                )
+        for before, after in pairwise(self.stages):
+            if isinstance(before, FlowStage) and isinstance(after, SampledStage):
+                raise ParameterError(
+                    f"stages that act once per sample come first. Received {before.name} before {after.name}. "
+                    "Change their order."
+                )
+        if len(self._stores) > 1:
+            names = ", ".join(stage.name for stage in self._stores)
+            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Leave one out.")
+
+    @property
+    def sampled(self) -> tuple[SampledStage, ...]:
+        """Stages that act once per sample."""
+        return tuple(stage for stage in self.stages if isinstance(stage, SampledStage))
+
+    @property
+    def flowing(self) -> tuple[FlowStage, ...]:
+        """Stages that move between samples."""
+        return tuple(stage for stage in self.stages if isinstance(stage, FlowStage))
+
+    @property
+    def flow_start(self) -> tuple[float, ...]:
+        """Memory of the flowing stages at the start."""
+        return tuple(value for stage in self.flowing for value in stage.start)
+
+    @property
+    def stores(self) -> bool:
+        """Whether volume and flow rate are known."""
+        return bool(self._stores)
+
+    @property
+    def _stores(self) -> list[FlowStage]:
+        return [stage for stage in self.flowing if stage.stores]
+
+    def require_resolved(self, substep: float) -> None:
+        """Refuse a substep [s] that a stage is too fast for.
+
+        Raises
+        ------
+        ParameterError
+        """
+        for stage in self.flowing:
+            times = substep * stage.fastest / LONGEST
+            if times > 1:
+                raise ParameterError(
+                    f"a substep must be at most {LONGEST / stage.fastest:.3g} s for the {stage.name}. "
+                    f"Received {substep:.3g} s. Take {math.ceil(times)} times as many substeps, or leave the stage out."
+                )
+
+    def hold(self, numbers: list[Any], memory: list[Any], pressure: Any, step: float) -> tuple[Any, Any, list[Any]]:
+        """Pressure [Pa] that is held, how much more [Pa] was asked for than there is, and the memory afterwards."""
+        kept: list[Any] = []
+        excess: Any = 0.0
+        for stage, own, past in zip(self.sampled, *_split(self.sampled, numbers, memory), strict=True):
+            before = pressure
+            pressure, past = stage.apply(own, past, pressure, step)
+            excess = excess + (before - pressure) if stage.limits else excess
+            kept += past
+        return pressure, excess, kept
+
+    def flow(self, numbers: list[Any], memory: list[Any], held: Any) -> tuple[list[Any], Any, dict[str, Any]]:
+        """Rates of the flowing stages, pressure [Pa] in the fault, and signals of `FLOWS`, under a pressure held."""
+        rates: list[Any] = []
+        signals: dict[str, Any] = {}
+        for stage, own, past in zip(self.flowing, *_split(self.flowing, numbers, memory), strict=True):
+            rates += stage.rates(own, past, held)
+            signals |= stage.flows(own, past, held)
+            held = stage.output(own, past, held)
+        return rates, held, signals
+
+
+DIRECT = Actuator()
+
+
+def _split(stages: tuple[Stage, ...], numbers: list[Any], memory: list[Any]) -> tuple[list[list[Any]], list[list[Any]]]:
+    """Entries of every stage."""
+    own, past = iter(numbers), iter(memory)
+    return [[next(own) for _ in s.numbers] for s in stages], [[next(past) for _ in s.start] for s in stages]

@@ -1,0 +1,72 @@
+"""Ways to carry a law out over a step, one a file, found by looking into this folder."""
+
+from dataclasses import fields, is_dataclass
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
+
+from quakedesign.arguments import check_arguments
+from quakedesign.controllers import Controller
+from quakedesign.errors import ParameterError
+from quakedesign.loop.schemes.base import Scheme, Stepped
+
+__all__ = ["Scheme", "Stepped", "own_way", "schemes", "simulation_scheme"]
+
+
+@cache
+def schemes() -> dict[str, type[Scheme]]:
+    """Every scheme of the package, by name."""
+    found: dict[str, type[Scheme]] = {}
+    for info in iter_modules(__path__):
+        for item in vars(import_module(f"{__name__}.{info.name}")).values():
+            if isinstance(item, type) and issubclass(item, Scheme) and hasattr(item, "name"):
+                found[item.name] = item
+    return found
+
+
+def simulation_scheme(name: str, **settings: Any) -> Scheme:
+    """Scheme of a given name, with settings other than its own defaults.
+
+    Raises
+    ------
+    ParameterError
+        When there is none, or it does not have one of the settings.
+    """
+    if name not in schemes():
+        raise ParameterError(f"scheme must be one of {', '.join(sorted(schemes()))}. Received {name!r}.")
+    kind = schemes()[name]
+    known: set[str] = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
+    for setting in sorted(settings.keys() - known):
+        able = [n for n, one in schemes().items() if is_dataclass(one) and setting in {f.name for f in fields(one)}]
+        raise ParameterError(
+            f"settings of {setting} are for the schemes {', '.join(sorted(able)) or 'of nobody'}. "
+            f"Received {name}. Use one of them, or leave the settings out."
+        )
+    return kind(**settings)
+
+
+def own_way(
+    controller: Controller | None, scheme: str | Scheme | None, step: float | None, usual: str = "explicit"
+) -> tuple[str | Scheme, float | None]:
+    """Scheme and step of a run: those that are asked for, else the usual scheme; a law of samples has its own.
+
+    Raises
+    ------
+    ParameterError
+        When a law of samples is asked to run otherwise.
+    """
+    own = controller.sampling_time if controller else None
+    if own is None:
+        return usual if scheme is None else scheme, step
+    chosen = "explicit" if scheme is None else scheme
+    name = chosen if isinstance(chosen, str) else chosen.name
+    if name != "explicit" or step not in (None, own):
+        raise ParameterError(
+            f"a law of samples runs with the scheme explicit and the step {own!r} s it was designed for. Received "
+            f"{name} and {own if step is None else step!r} s. Leave scheme and step out."
+        )
+    return chosen, own
+
+
+check_arguments(__name__)

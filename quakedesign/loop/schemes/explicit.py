@@ -1,0 +1,32 @@
+"""The law at the measured state."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import sympy as sp
+
+from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps.sampled import Decision, Sampled
+from quakedesign.loop.steps.sampled_law import Law, Values
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explicit(Sampled):
+    """Evaluates the law at the measured state and moves ξ by one forward Euler step.
+
+    A sliding mode chatters then with |e1| ~ T_s³, |e2| ~ T_s², |e3| ~ T_s (Levant 1993, Int. J. Control 58, 1247).
+    """
+
+    name: ClassVar[str] = "explicit"
+
+    @staticmethod
+    def derive(law: Law) -> tuple[sp.Expr, ...]:
+        """Pressure [Pa] and ξ'."""
+        return law.pressure, *law.rates
+
+    @classmethod
+    def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
+        """See `Sampled.decide`."""
+        pressure, *rates = sampled_law.values(found, known)
+        after = [known[s] + known[sampled_law.step] * rate for s, rate in zip(law.integrals, rates, strict=True)]
+        return Decision(pressure, after, [])

@@ -1,0 +1,77 @@
+"""What a sampled controller computes at one sample, as one CasADi Function."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps.sampled_law import Law, Lifted
+
+if TYPE_CHECKING:
+    from quakedesign.loop.steps.sampled import Sampled
+
+SIGNALS = (
+    sampled_law.slip,
+    sampled_law.rate,
+    sampled_law.slip_error,
+    sampled_law.rate_error,
+    sampled_law.acceleration,
+    sampled_law.next_reference,
+    sampled_law.next_reference_rate,
+    sampled_law.step,
+    sampled_law.authority,
+    sampled_law.held,
+)
+
+
+@dataclass(frozen=True)
+class ControlStep:
+    """The sampled-step function of a controller, without plant and actuator.
+
+    Attributes
+    ----------
+    function : casadi.Function
+        (signals in the order of `SIGNALS`, integrals ξ, numbers of the law, memory of the scheme) → pressure [Pa],
+        integrals and memory at the next sample, and push, the change of the pressure [Pa] that the change of ξ makes.
+    numbers : tuple of float
+        Of this law; another law of the same kind has the same function.
+    """
+
+    function: Any
+    numbers: tuple[float, ...]
+
+
+@lru_cache(maxsize=64)
+def control_step(kind: "type[Sampled]", law: Law) -> ControlStep:
+    """Sampled-step function of a law under a scheme."""
+    import casadi as ca
+
+    slopes = tuple(slope_of(law.pressure, symbol) for symbol in law.integrals)
+    lifted = Lifted.of((*kind.derive(law), *slopes))
+    symbols = {"signals": SIGNALS, "integrals": law.integrals, "numbers": lifted.numbers}
+    inputs = {name: ca.SX.sym(name, len(parts)) for name, parts in symbols.items()}
+    own = ca.SX.sym("own", kind.own_size)
+    known = {s: inputs[name][i] for name, parts in symbols.items() for i, s in enumerate(parts)}
+    split = len(lifted.expressions) - len(slopes)
+    decision = kind.decide(lifted.expressions[:split], law, known, ca.vertsplit(own) if kind.own_size else [])
+    changes = (after - known[s] for s, after in zip(law.integrals, decision.integrals, strict=True))
+    slope = sampled_law.values(lifted.expressions[split:], known)
+    push = sum((k * change for k, change in zip(slope, changes, strict=True)), start=ca.SX(0))
+    results = [decision.pressure, _column(decision.integrals), _column(decision.own), push]
+    names = ["pressure", "integrals", "own", "push"]
+    function = ca.Function("control", [*inputs.values(), own], results, [*inputs, "own"], [f"{n}_next" for n in names])
+    return ControlStep(function, lifted.values)
+
+
+def slope_of(pressure: sp.Expr, integral: sp.Symbol) -> sp.Expr:
+    """Slope of the pressure in an integral state; 0 where the law limits itself and so looks after its own windup."""
+    limited = pressure.has(sp.Min, sp.Max, sp.Piecewise)
+    return sp.Integer(0) if limited else sp.diff(pressure, integral)
+
+
+def _column(entries: list[Any]) -> Any:
+    import casadi as ca
+
+    return ca.vertcat(*entries) if entries else ca.SX(0, 1)

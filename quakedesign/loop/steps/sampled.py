@@ -1,0 +1,219 @@
+"""What the sampled schemes share: the law once per T_s, its pressure held while the plant moves on."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError
+from quakedesign.loop.actuators import DIRECT, Actuator
+from quakedesign.loop.actuators.base import FLOWS
+from quakedesign.loop.schemes.base import Scheme, Stepped
+from quakedesign.loop.sensing.base import Sensor
+from quakedesign.loop.sensing.measurement import EXACT, Measurement
+from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps.control_step import SIGNALS, ControlStep, control_step
+from quakedesign.loop.steps.sampled_law import Law, Values
+
+MOST_SUBSTEPS = 100
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What a controller decides at one sample.
+
+    Attributes
+    ----------
+    pressure : SX
+        That it asks for [Pa].
+    integrals : list of SX
+        ξ at the next sample.
+    own : list of SX
+        Memory of the scheme itself at the next sample.
+    """
+
+    pressure: Any
+    integrals: list[Any]
+    own: list[Any]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Everything known at one sample (SX): the decision, the pressure that is held, and the memory afterwards."""
+
+    held: Any
+    integrals: list[Any]
+    numbers: list[Any]
+    own: list[Any]
+    kept: list[Any]
+    noise: list[Any]
+    flow: list[Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampled(Scheme):
+    """A controller that measures every T_s and holds its pressure in between (zero-order hold).
+
+    The entries of the memory are: the law's numbers, those of actuator and measurement, the scheme's own memory, the
+    pressure that was held last, and the memories of the actuator and of the noise generator.
+
+    Attributes
+    ----------
+    substeps : int
+        Steps of the integrator per sample, 1 … 100.
+    actuator : Actuator
+    measurement : Measurement or Sensor
+        A sensor is told the true slip alone, once per sample of its own period.
+    authority : float or None
+        Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    own_size: ClassVar[int] = 0
+
+    substeps: int = 1
+    actuator: Actuator = DIRECT
+    measurement: Measurement | Sensor = EXACT
+    authority: float | None = None
+
+    def __post_init__(self) -> None:
+        whole = isinstance(self.substeps, int) and not isinstance(self.substeps, bool)
+        if not (whole and 1 <= self.substeps <= MOST_SUBSTEPS):
+            raise ParameterError(f"substeps must be a whole number, 1 to {MOST_SUBSTEPS}. Received {self.substeps!r}.")
+        if self.authority is not None and not 0 < self.authority < float("inf"):
+            raise ParameterError(f"authority must be positive and finite. Received {self.authority!r} m²/kg.")
+
+    @property
+    def starts(self) -> tuple[float, ...]:
+        """The scheme's own memory at the start, `own_size` entries."""
+        return ()
+
+    @staticmethod
+    @abstractmethod
+    def derive(law: Law) -> tuple[sp.Expr, ...]:
+        """Return the expressions that `decide` evaluates, with the numbers of the law in them."""
+
+    @classmethod
+    @abstractmethod
+    def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
+        """What the controller does, given the expressions, the values of their symbols, and its own memory."""
+
+    def nominal(self, loop: Stepped) -> float:
+        """B0 [m²/kg] unless told: the smallest μN̂ of the fault's uncertainty box."""
+        return loop.fault.authority_range[0]
+
+    def memory(self, loop: Stepped, step: float) -> dict[str, float]:
+        """See `Scheme.memory`; refuses a sensor that was made for another step."""
+        self.actuator.require_resolved(step / self.substeps)
+        if isinstance(self.measurement, Sensor):
+            self.measurement.require_step(step)
+        parts = self._parts(loop)
+        return {f"{name}_{i}": float(v) for name, values in parts.items() for i, v in enumerate(values)}
+
+    def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+        """See `Scheme.pressure`."""
+        sample = self._sample(loop, counter, state, step)
+        return self.actuator.flow(sample.numbers, sample.flow, sample.held)[1]
+
+    def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:
+        """See `Scheme.outputs`."""
+        if not self.actuator.stages:
+            return {}
+        sample = self._sample(loop, counter, state, step)
+        return {"well_pressure": sample.held} | self.actuator.flow(sample.numbers, sample.flow, sample.held)[2]
+
+    @property
+    def described(self) -> dict[str, tuple[str, str]]:
+        """See `Scheme.described`."""
+        well = {"well_pressure": ("pressure at the well", "Pa")}
+        return (well | (FLOWS if self.actuator.stores else {})) if self.actuator.stages else {}
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """See `Scheme.settings`."""
+        said: dict[str, Any] = {"substeps": self.substeps}
+        said |= {"actuator": ", ".join(map(repr, self.actuator.stages))} if self.actuator.stages else {}
+        said |= {"authority": self.authority} if self.authority else {}
+        return said | ({"measurement": repr(self.measurement)} if self.measurement.noisy else {})
+
+    def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
+        """See `Scheme.advance`."""
+        import casadi as ca
+
+        sample = self._sample(loop, counter, state, step)
+        moving = ca.vertcat(state[:2], *sample.flow)
+        for number in range(self.substeps):
+
+            def motion(plant: Any, passed: Any, now: Any, before: int = number) -> Any:
+                time = (counter + (before + passed) / self.substeps) * step
+                rates, pressure, _ = self.actuator.flow(sample.numbers, ca.vertsplit(now[2:]), sample.held)
+                return ca.vertcat(plant(time, now[:2], pressure), *rates)
+
+            moving = loop.advance(method, motion, moving, step / self.substeps)
+        rest = ca.vertcat(*sample.own, sample.held, *sample.kept, *sample.noise)
+        first = 2 + len(sample.integrals)
+        count = state.shape[0] - first - rest.shape[0] - len(sample.flow)
+        constants = state[first : first + count]
+        return ca.vertcat(moving[:2], *sample.integrals, constants, rest, moving[2:])
+
+    def _parts(self, loop: Stepped) -> dict[str, tuple[float, ...]]:
+        """Values of the memory at the start."""
+        sampled, flowing = self.actuator.sampled, self.actuator.flowing
+        return {
+            "law": self.control_step(loop).numbers,
+            "authority": (self.authority or self.nominal(loop),),
+            "sampled": tuple(v for stage in sampled for v in stage.numbers),
+            "flowing": tuple(v for stage in flowing for v in stage.numbers),
+            "deviation": self.measurement.numbers,
+            "own": self.starts,
+            "held": (0.0,),
+            "kept": tuple(v for stage in sampled for v in stage.start),
+            "noise": self.measurement.start,
+            "flow": self.actuator.flow_start,
+        }
+
+    def control_step(self, loop: Stepped) -> ControlStep:
+        """What the controller of a loop computes at one sample."""
+        return control_step(type(self), Law.of(loop.controller, loop.constant_pressure))
+
+    def _sample(self, loop: Stepped, counter: Any, state: Any, step: float) -> Sample:
+        """Measure, decide, and pass the decision on to the actuator; ξ does not wind up where a stage limits."""
+        import casadi as ca
+
+        count = len(loop.integrals)
+        entries = iter(ca.vertsplit(state[2 + count :]))
+        part = {name: [next(entries) for _ in values] for name, values in self._parts(loop).items()}
+        seen, noise = self.measurement.measure(part["deviation"], part["noise"], state[:2])
+        known = self._known(loop, counter, step, seen)
+        known |= {sampled_law.authority: part["authority"][0], sampled_law.held: part["held"][0]}
+        signals = ca.vertcat(*(known[symbol] for symbol in SIGNALS))
+        before = state[2 : 2 + count]
+        given = signals, before, ca.vertcat(*part["law"]), ca.vertcat(*part["own"])
+        pressure, after, own, push = self.control_step(loop).function(*given)
+        held, excess, kept = self.actuator.hold(part["sampled"], part["kept"], pressure, step)
+        winds = excess * push > 0
+        integrals = [ca.if_else(winds, before[i], after[i]) for i in range(count)]
+        return Sample(
+            held, integrals, part["flowing"], [own[i] for i in range(self.own_size)], kept, noise, part["flow"]
+        )
+
+    @staticmethod
+    def _known(loop: Stepped, counter: Any, step: float, seen: Any) -> Values:
+        """Values of the signals of one sample."""
+        import casadi as ca
+
+        now, later = loop.reference(counter * step), loop.reference((counter + 1) * step)
+        return {
+            sampled_law.slip: seen[0],
+            sampled_law.rate: seen[1],
+            sampled_law.slip_error: seen[0] - now[0],
+            sampled_law.rate_error: seen[1] - now[1],
+            sampled_law.acceleration: now[2],
+            sampled_law.next_reference: later[0],
+            sampled_law.next_reference_rate: later[1],
+            sampled_law.step: ca.SX(step),
+        }

@@ -1,0 +1,73 @@
+"""The joint condition on bound and sampling period, against loops that track and loops that do not."""
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from quakedesign.controllers import published
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.sensing import Differentiator, OutputFeedback, joint_condition, smallest_bound
+from quakedesign.loop.sensing.joint_choice import pressure_swing
+from quakedesign.simulation import simulate
+
+LAB = load_fault("lab-fault")
+PUBLISHED = published("lab-fault")
+ACCELERATION = {1e-5: 0.073, 1e-4: 3.0}  # of the sampled 2-CTA with exact states [m/s²]
+
+
+def tracks(differentiator):
+    scheme = simulation_scheme("explicit", measurement=OutputFeedback(differentiator=differentiator))
+    run = simulate(LAB, PUBLISHED["cta"], step=differentiator.step, scheme=scheme, duration=1.0, samples=50)
+    return run.metrics is not None and run.metrics.max_slip_error < 1e-5
+
+
+def test_the_swing_of_a_linear_law_is_its_gains_times_the_errors():
+    assert pressure_swing(PUBLISHED["elqr"], 1e-6, 1e-3) == pytest.approx(4.17e8 * 1e-6 + 6.94e5 * 1e-3)
+
+
+def test_the_swing_of_the_sliding_mode_is_that_of_its_powers_astride_the_origin():
+    a, b = 1e-9, 1e-6
+    nu = 7.5 * 500 ** (2 / 3) * 2 * (a / 2) ** (1 / 3) + 5 * 500**0.5 * 2 * (b / 2) ** 0.5
+    assert pressure_swing(PUBLISHED["cta"], a, b) == pytest.approx(nu * 1385 / 4, rel=1e-12)
+
+
+@pytest.mark.parametrize(("step", "discretisation"), [(1e-5, "homogeneous"), (1e-4, "homogeneous"), (1e-4, "implicit")])
+def test_the_loop_tracks_from_the_smallest_bound_on_and_is_lost_well_below(step, discretisation):
+    d = Differentiator(bound=1.0, step=step, discretisation=discretisation)
+    least = smallest_bound(LAB, PUBLISHED["cta"], d, acceleration=ACCELERATION[step])
+    assert tracks(replace(d, bound=1.5 * least))
+    assert not tracks(replace(d, bound=least / 8))
+
+
+def test_for_a_linear_law_the_sampling_period_decides():
+    explicit, implicit = (
+        Differentiator(bound=1.0, step=1e-4, discretisation=name) for name in ("homogeneous", "implicit")
+    )
+    law = PUBLISHED["elqr"]
+    assert smallest_bound(LAB, law, explicit, acceleration=0.0035) is None
+    assert smallest_bound(LAB, law, implicit, acceleration=0.0035) == pytest.approx(0.0035, rel=0.2)
+    assert smallest_bound(LAB, law, replace(implicit, step=1e-3), acceleration=0.0035) is None
+
+
+def test_a_second_derivative_that_jumps_meets_no_bound_on_the_third():
+    d = Differentiator(bound=1e9, step=1e-5, order=2, filter_order=2)
+    found = joint_condition(LAB, PUBLISHED["elqr"], d, acceleration=0.0035)
+    assert (found.required, found.ratio, found.holds) == (math.inf, math.inf, False)
+    assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["ratio"] is None
+    with pytest.raises(ParameterError, match="order 1"):
+        smallest_bound(LAB, PUBLISHED["elqr"], d, acceleration=0.0035)
+
+
+def test_noise_asks_for_more():
+    d = Differentiator(bound=100.0, step=1e-4)
+    quiet, loud = (joint_condition(LAB, PUBLISHED["cta"], d, acceleration=3.0, noise=n) for n in (0.0, 1e-5))
+    assert quiet.holds
+    assert quiet.ratio == pytest.approx(quiet.required / 100)
+    assert loud.required > quiet.required
+    assert loud.rate_error > quiet.rate_error
+    with pytest.raises(ParameterError, match="acceleration"):
+        joint_condition(LAB, PUBLISHED["cta"], d, acceleration=-1.0)
