@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import pairwise, product
-from math import comb
+from itertools import chain, pairwise, product
+from math import ceil, comb
 from typing import Any
 
 BITS = 192
@@ -120,7 +120,8 @@ class Task:
     rest: tuple[Fraction, Fraction]
     reference_rate: Fraction
     reference_acceleration: Fraction
-    reference_jerk: Fraction | None
+    reference_jerk: Fraction
+    smooth: bool
     reference_force: Fraction
     drift: Fraction
     amplitude: Fraction
@@ -174,7 +175,8 @@ def read_task(document: dict[str, Any]) -> Task:
         rest=(sigma - stress[1], sigma - stress[0]),
         reference_rate=first,
         reference_acceleration=second,
-        reference_jerk=None if bent[0] or sum(bent) else third,
+        reference_jerk=third,
+        smooth=bent[0] == 0 and sum(bent) == 0,
         reference_force=max(abs(v) for v in w) * first + second,
         drift=max(abs(v) for v in s) * first,
         amplitude=amplitude,
@@ -188,12 +190,12 @@ def read_reference(value: Any) -> tuple[Row, Fraction, Fraction]:
     """Shape, target slip and operation time."""
     given = keys(value, "reference", "shape", "target_slip", "operation_time")
     listed = given["shape"]
-    need(type(listed) is list and 3 <= len(listed) <= MAX_DEGREE + 1, "shape must have 3 to 13 coefficients")
+    need(type(listed) is list and len(listed) <= MAX_DEGREE + 1, "shape must have at most 13 coefficients")
     shape = row(listed, "shape", len(listed))
     target, duration = (number(given[k], k) for k in ("target_slip", "operation_time"))
     need(min(target, duration) > 0, "target slip and operation time must be > 0")
     rate = slope(shape)
-    ends = shape[0] == 0 and sum(shape) == 1 and rate[0] == 0 and sum(rate) == 0
+    ends = shape[:1] == [0] and sum(shape) == 1 and rate[:1] == [0] and sum(rate) == 0
     need(ends and on_unit_interval(rate)[0] >= 0, "the shape must rise from 0 to 1 with slope 0 at both ends")
     return shape, target, duration
 
@@ -401,7 +403,7 @@ def read_continuous(value: Any, task: Task) -> Loop:
     inputs = [unit(2 + n)[1], [Fraction(0)] * 2 + [-v / task.b for v in steady]]
     forward = row(given.get("of_reference", ["0", "0"]), "of_reference", 2)
     if any(forward):
-        need(task.reference_jerk is not None, "the reference must start and end without acceleration for this law")
+        need(task.smooth, "the reference must start and end without acceleration for this law")
         moving = steady_states(rates, output, steady, Fraction(0))
         inputs += [[Fraction(0)] * 2 + [k * v for v in moving] for k in forward]
     return Loop(flow, [], [unit(2 + n)[0], unit(2 + n)[1], push], inputs, None, Fraction(0))
@@ -452,7 +454,7 @@ class Fixed:
     """Matrix of integers in units of 2^-BITS; no entry is farther from the true one than `error` units."""
 
     rows: list[list[int]]
-    error: int
+    error: int = 0
 
     def __mul__(self, other: "Fixed") -> "Fixed":
         columns = list(zip(*other.rows, strict=True))
@@ -472,7 +474,7 @@ class Fixed:
 
     def size(self) -> "Fixed":
         """Upper bounds of the absolute values, exact."""
-        return Fixed([[abs(v) + self.error for v in line] for line in self.rows], 0)
+        return Fixed([[abs(v) + self.error for v in line] for line in self.rows])
 
     def beside(self, *others: "Fixed") -> "Fixed":
         """Columns of several matrices side by side."""
@@ -492,8 +494,8 @@ class Fixed:
 
 def bounded(value: Fixed) -> Fixed:
     """Refuse numbers that only an unstable or absurd loop can have."""
-    largest = max((max(map(abs, line), default=0) for line in value.rows), default=0)
-    need(max(largest, value.error) <= LARGEST, "the nominal loop must be stable, its numbers of ordinary size")
+    largest = max(map(abs, chain([value.error], *value.rows)))
+    need(largest <= LARGEST, "the nominal loop must be stable, its numbers of ordinary size")
     return value
 
 
@@ -509,17 +511,15 @@ def column(values: Sequence[Fraction]) -> Fixed:
 
 def exponential(flow: list[Row], time: Fraction) -> Fixed:
     """e^{At} by a Taylor sum at t/2^j and squaring."""
-    norm, halvings = max(sum(map(abs, line)) for line in flow) * time, 0
+    norm = max(sum(map(abs, line)) for line in flow) * time
     need(norm <= 1 << 12, "the flow must change by a factor of ordinary size between two events")
-    while norm > Fraction(1, 2):
-        norm, halvings = norm / 2, halvings + 1
+    halvings = int(norm).bit_length()  # to a norm below 1
     base = fixed([[v * time / 2**halvings for v in line] for line in flow])
     term = total = fixed(unit(len(flow)))
     for k in range(1, BITS // 2):
         term = (term * base).scaled(Fraction(1, k))
         total = total + term
-    # what is left out is below 2·2^-n/n!, n = BITS/2 terms: less than a unit
-    total = Fixed(total.rows, total.error + 1)
+    # what is left out is below 2/n!, n = BITS/2: less than the unit that the error of the exact first term has to spare
     for _ in range(halvings):
         total = total * total
     return total
@@ -580,7 +580,7 @@ def pieces(flow: Flow, later: Fixed) -> Fixed:
         bent = bent + other
     rest = (later.size() * bent).size().scaled(flow.piece**3 / 12).size()
     corner = [i for i, (v,) in enumerate(rest.rows) if v]
-    diagonal = Fixed([[v if i == j else 0 for j in corner] for i, (v,) in enumerate(rest.rows)], 0)
+    diagonal = Fixed([[v if i == j else 0 for j in corner] for i, (v,) in enumerate(rest.rows)])
     return ends[0].beside(*ends[1:], diagonal)
 
 
@@ -596,30 +596,31 @@ class Past:
         """Bounds of the integrals for every row; equal rows are done once."""
         once = list(dict.fromkeys(map(tuple, rows.rows)))
         different = Fixed([list(line) for line in once], rows.error)
-        rest = (different * self.far).size() * self.left
+        rest = ((different * self.far).size() * self.left).size()
         sums = zip((different * self.columns).sums(), rest.rows, strict=True)
-        found = dict(zip(once, (near + far + rest.error for near, (far,) in sums), strict=True))
+        found = dict(zip(once, (near + far for near, (far,) in sums), strict=True))
         return [found[tuple(line)] for line in rows.rows]
 
 
 def past(flows: list[Flow], rows: int) -> Past:
     """Sum 2^j periods until what is left is below a 256th of every unit row's sum."""
     size = len(flows[0].event.rows)
-    later, columns = fixed(unit(size)), None
+    period, parts = fixed(unit(size)), []
     for flow in reversed(flows):
-        own = pieces(flow, later)
-        columns, later = own if columns is None else own.beside(columns), later * flow.whole
-    assert columns is not None
-    sums, period = columns.sums(), later
+        parts.append(pieces(flow, period))
+        period = period * flow.whole
+    first, *others = parts
+    columns = first.beside(*others)
+    sums = columns.sums()
     for _ in range(DOUBLINGS):
         width = len(columns.rows[0])
         need(2 * width * size * (size + rows) <= MAX_WORK, "the loop must forget its past sooner: it takes too long")
         following = period * columns
         sums = [a + b for a, b in zip(sums, following.sums(), strict=True)]
         columns, period = columns.beside(following), period * period
-        left = period.size() * Fixed([[v] for v in sums], 0)
-        if all((v + left.error) * SHARE <= total for (v,), total in zip(left.rows, sums, strict=True)):
-            return Past(columns, period, Fixed([[v * SHARE // (SHARE - 1) + 1] for v in sums], 0))
+        left = (period.size() * Fixed([[v] for v in sums])).size()
+        if all(v * SHARE <= total for (v,), total in zip(left.rows, sums, strict=True)):
+            return Past(columns, period, Fixed([[ceil(Fraction(v * SHARE, SHARE - 1))] for v in sums]))
     raise Refused(f"the nominal loop must be stable, and seen to be within {2**DOUBLINGS} periods")
 
 
@@ -637,21 +638,19 @@ def gains(loop: Loop, entry: Row, sudden: bool) -> list[list[Fraction]]:
             phases.append(phases[-1] * flow.step)
         stack = phases[0].above(*phases[1:], fixed(unit(size))) * flow.event
         earlier = integral(flows[:number_of], before, stack)
-        units = Fixed([[v] for v in earlier[-size:]], 0)
+        units = Fixed([[v] for v in earlier[-size:]])
+        bent = [(((phases[i] * flow.bend).size() * flow.near).size() * units).sums() for i in range(PIECES)]
         for k in range(3):
-            since, ends = [0], [(start * end).sums()[k] for end in flow.ends]
+            ends = [(start * end).sums()[k] for end in flow.ends]
             bends, slopes = ([(start.size() * v).sums()[k] for v in part] for part in (flow.bends, flow.slopes))
+            areas = [
+                (one + other) * flow.piece / 2 + bend * flow.piece**3 / 12
+                for (one, other), bend in zip(pairwise(ends), bends, strict=True)
+            ]
+            total = [earlier[3 * i + k] + (ends[i] if sudden else sum(areas[:i])) for i in range(PIECES + 1)]
             for i in range(PIECES):
-                bent = bends[i]
-                area = Fraction(ends[i] + ends[i + 1]) * flow.piece / 2 + bent * flow.piece**3 / 12
-                since.append(since[-1] + int(area) + 1)
-            if sudden:
-                since, slopes = ends, bends
-            total = [earlier[3 * i + k] + since[i] for i in range(PIECES + 1)]
-            for i in range(PIECES):
-                bending = ((phases[i] * flow.bend).size() * flow.near).size() * units
-                bent = bending.sums()[k] + slopes[i]
-                found[k].append((max(total[i], total[i + 1]) + bent * flow.piece**2 / 8) / (1 << BITS))
+                most = bent[i][k] + (bends if sudden else slopes)[i]
+                found[k].append((max(total[i], total[i + 1]) + most * flow.piece**2 / 8) / (1 << BITS))
     return found
 
 
@@ -662,22 +661,20 @@ def flow_gains(loop: Loop, entry: Row) -> Row:
     while max(sum(map(abs, line)) for line in flow) * piece > Fraction(1, 1 << PARTS):
         piece /= 2
     step, near = exponential(flow, piece), exponential(majorant(flow), piece).size()
-    square, sums, work = fixed(flow) * fixed(flow), [[0] * (size + 1) for _ in outputs.rows], 0
-    for _ in range(STRETCHES):
-        work += 4 * size**2 * (size + 1) << PARTS
-        need(work <= MAX_WORK, "the loop must forget its past sooner: it takes too long")
+    square, sums = fixed(flow) * fixed(flow), [[0] * (size + 1) for _ in outputs.rows]
+    for _ in range(min(STRETCHES, MAX_WORK // (4 * size**2 * (size + 1) << PARTS))):
         ends, power = now, step
         for _ in range(PARTS):
             ends, power = ends.beside(power * ends), power * power
         now = power * now
         bends = ((outputs.size() * near).size() * (square * ends).size()).size()
         add_areas(sums, (outputs * ends.beside(now)).size(), bends, piece)
-        late = (Fixed([line[:size] for line in sums], 0) * now.size()).size()
+        late = (Fixed([line[:size] for line in sums]) * now.size()).size()
         pairs = list(zip(late.rows, sums, strict=True))
         if all(v * LATE <= total for far, line in pairs for v, total in zip(far[:size], line[:size], strict=True)):
             return [(line[size] + Fraction(LATE * far[size], LATE - 1)) / (1 << BITS) for far, line in pairs]
         further = (step.size() * near).size()
-        near = Fixed([list(map(max, *lines)) for lines in zip(near.rows, further.rows, strict=True)], 0)
+        near = Fixed([list(map(max, *lines)) for lines in zip(near.rows, further.rows, strict=True)])
         step, piece = step * step, 2 * piece
     raise Refused("the nominal loop must be stable, and seen to be")
 
@@ -687,7 +684,7 @@ def add_areas(sums: list[list[int]], heights: Fixed, bends: Fixed, piece: Fracti
     for total, line, bent in zip(sums, heights.rows, bends.rows, strict=True):
         for i, bend in enumerate(bent):
             area = (line[i] + line[i + len(total)]) * piece / 2 + bend * piece**3 / 12
-            total[i % len(total)] += int(area) + 1
+            total[i % len(total)] += ceil(area)
 
 
 def balanced(loop: Loop, entry: Row) -> tuple[list[Row], Fixed, Fixed]:
@@ -740,7 +737,6 @@ def of_class(task: Task, loop: Loop, found: list[list[list[Fraction]]]) -> tuple
         own.append(loop.root.remainder)
         shares.append([(high - low) / 2 / loop.step, Fraction(0), Fraction(0)])
     if not loop.events and len(loop.inputs) > 2:
-        assert task.reference_jerk is not None
         own += [task.reference_acceleration, task.reference_jerk]
         shares += [[Fraction(0)] * 3] * 2
     table = [

@@ -176,7 +176,7 @@ def test_both_derive_the_same_ranges_and_inputs_from_a_fault():
         assert (found.drift, found.amplitude, found.change) == (task.drift, task.amplitude, task.change)
         assert found.reference_acceleration == task.reference_rates[1]
         smooth = task.shape == SHAPES[1]
-        assert found.reference_jerk == (task.reference_jerk if smooth else None)
+        assert (found.reference_jerk, found.smooth) == (task.reference_jerk, smooth)
         with nullcontext() if smooth else pytest.raises(ParameterError, match="without acceleration"):
             task.require_smooth_reference()
         half = task.half_ranges

@@ -235,8 +235,8 @@ class Task:
 
     @property
     def drift(self) -> Fraction:
-        """Bound of b·|dp*/dt| [m/s³]."""
-        return max(map(abs, self.slip_chord)) * self.reference_rates[0] / self.beta[0]
+        """Bound of b·|dp*/dt| [m/s³], β being at least 1."""
+        return max(map(abs, self.slip_chord)) * self.reference_rates[0]
 
 
 def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
@@ -327,6 +327,5 @@ def _range_of(shape: tuple[Fraction, ...]) -> Range:
 def _rises_from_rest_to_rest(shape: tuple[Fraction, ...]) -> bool:
     """Whether a polynomial goes from 0 to 1 on [0, 1] with slope 0 at both ends and never falls."""
     slope = _derived(shape, 1)
-    if len(shape) < 3 or shape[0] or sum(shape) != 1 or slope[0] or sum(slope):
-        return False
-    return _range_of(slope)[0] >= 0
+    ends = shape[:1] == (0,) and sum(shape) == 1 and slope[:1] == (0,) and sum(slope) == 0
+    return ends and _range_of(slope)[0] >= 0
