@@ -706,7 +706,7 @@ def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:
     """Bounds for rows that act after the given flows of this period, and before the event of the next."""
     if not flows:
         return before.of(rows)
-    own = (rows * pieces(flows[-1], fixed(unit(len(rows.rows[0]))))).sums()
+    own = (rows * pieces(flows[-1], fixed(unit(len(before.far.rows))))).sums()
     return [a + b for a, b in zip(own, integral(flows[:-1], before, rows * flows[-1].whole), strict=True)]
 
 
@@ -736,7 +736,7 @@ def of_class(task: Task, loop: Loop, found: list[list[list[Fraction]]]) -> tuple
         low, high = loop.root.slopes
         own.append(loop.root.remainder)
         shares.append([(high - low) / 2 / loop.step, Fraction(0), Fraction(0)])
-    if not loop.events and len(loop.inputs) > 2:
+    if not loop.events and len(loop.inputs) == 4:
         own += [task.reference_acceleration, task.reference_jerk]
         shares += [[Fraction(0)] * 3] * 2
     table = [
@@ -844,8 +844,6 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
 
 def upper(value: Fraction) -> str:
     """Decimal with four digits that is not below the number."""
-    if value == 0:
-        return "0"
     exponent = len(str(abs(value.numerator))) - len(str(value.denominator)) - 4
     digits = -(-value // Fraction(10) ** exponent)
     while abs(digits) >= 10**4:
@@ -856,4 +854,4 @@ def upper(value: Fraction) -> str:
 
 def lower(value: Fraction) -> str:
     """Decimal with four digits that is not above the number."""
-    return f"{-float(upper(-value)):.4g}"
+    return f"{0 - float(upper(-value)):.4g}"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from quakedesign.certificates.guarantee import task as package_task
 from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.errors import CertificateError
 
@@ -37,6 +38,13 @@ HELD = {
              "measured": [["1", "1"]], "output": ["1"], "feedback": ["1", "1"]},
     "claims": dict(zip(CLAIMS, ("1", "2", "3", "-4", "5"), strict=True)),
 }  # fmt: skip
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Few parts of the unit interval: cheap, and as strict."""
+    monkeypatch.setattr(checker, "HALVINGS", 2)
+    monkeypatch.setattr(package_task, "_HALVINGS", 2)
 
 
 def changed(raw, *changes):
@@ -93,10 +101,11 @@ LIMITS = [
     (HELD, ("loop", "delay"), ["8", "1/3"], ["801/100", "-1/100"]),
     (HELD, ("loop", "lag"), ["1/3"], ["-1/100"]),
     (HELD, ("loop", "states"), [["a" * 40], ["Z_9"]], [["a" * 41], ["1a"], [""], [5], ["a b"], ["z", "z"], [], "z", 5]),
-    (HELD, ("loop", "update"), [[["1"]]], [[["1", "0"]], [["1"], ["1"]], [], [5], "1", ["1"]]),
-    (HELD, ("loop", "measured"), [[["0", "-1"]]], [[["1"]], [["1", "1", "1"]], [["1", "1"]] * 2, []]),
+    (HELD, ("loop", "update"), [[["1"]]], [[["1", "0"]], [["1"], ["1"]], [], [5], "1", ["1"], 5, {"1": 1}]),
+    (HELD, ("loop", "measured"), [[["0", "-1"]]], [[["1"]], [["1", "1", "1"]], [["1", "1"]] * 2, [], ["11"], [5]]),
     (HELD, ("loop", "output"), [["-1"]], [["0"], ["1", "1"], []]),
-    (HELD, ("loop", "feedback"), [["0", "0"]], [["1"], ["1", "1", "1"]]),
+    (HELD, ("loop", "feedback"), [["0", "0"]], [["1"], ["1", "1", "1"], "11", 5, {"1": 1, "2": 2}]),
+    (HELD, ("loop",), [HELD["loop"] | {"step": "1/2", "delay": "4"}], [HELD["loop"] | {"step": "1/2", "delay": "5"}]),
     (HELD, ("loop",), [many(9, "8", "0")["loop"], many(8, "8", "1")["loop"], many(12, "5", "0")["loop"]],
      [5, [], many(9, "8", "1")["loop"], many(10, "8", "0")["loop"], many(13, "0", "0")["loop"],
       HELD["loop"] | {"root": ROOT}, HELD["loop"] | {"more": "1"}]),
@@ -119,6 +128,7 @@ LIMITS = [
 ]  # fmt: skip
 
 
+@pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize(("raw", "path", "taken", "refused"), LIMITS, ids=lambda v: str(v) if type(v) is tuple else "")
 def test_both_take_what_is_just_allowed_and_refuse_what_is_just_beyond(raw, path, taken, refused):
     for expected, values in ((True, taken), (False, refused)):
@@ -201,6 +211,10 @@ def test_the_statement_has_every_number_on_its_outer_side():
     at_once = "for a pressure that acts at once (continuous time), which no sampled controller has"
     assert lines[2] == f"law with 1 states, {at_once}"
     assert lines[3].startswith("disturbance: |phi| <= 0.3334 m/s^2; from rest")
+
+
+def test_zero_has_no_sign():
+    assert checker.upper(F(0)) == checker.lower(F(0)) == "0"
 
 
 @pytest.mark.parametrize("value", ["1/3", "2/3", "99999", "100001", "10000", "1/99999", "123456789", "3/10000000", "0"])
