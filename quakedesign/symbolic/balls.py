@@ -16,6 +16,7 @@ from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 Box = Mapping[sp.Symbol, tuple[Fraction, Fraction]]
 Operation = Callable[[list[Any]], Any]
+Work = list[tuple[int, Operation, list[int]]]
 
 
 def ball(low: Fraction, high: Fraction) -> Any:
@@ -45,42 +46,67 @@ def enclose(expression: sp.Expr, box: Box) -> Any:
     UnsupportedError
         For a function without an enclosure.
     """
-    return _compiled(sp.sympify(expression))({symbol: ball(*ends) for symbol, ends in box.items()})
+    return _compiled(sp.sympify(expression)).value(_balls(box))
 
 
-@lru_cache(maxsize=64)
-def _compiled(expression: sp.Expr) -> Callable[[Mapping[sp.Symbol, Any]], Any]:
-    """Flatten an expression into a list of ball operations, each subexpression once."""
-    places: dict[sp.Expr, int] = {}
-    symbols: list[tuple[int, sp.Symbol]] = []
-    steps: list[tuple[Operation, list[int]]] = []
-    constants: dict[int, Any] = {}
+class _Operations:
+    """An expression as a list of ball operations, each subexpression once."""
 
-    def place(e: sp.Expr) -> int:
-        if e not in places:
-            arguments = [place(a) for a in e.args]
-            places[e] = len(steps)
-            steps.append((_operation(e), arguments))
-            if e.is_Symbol:
-                symbols.append((places[e], e))
-            elif e.is_number:
-                constants[places[e]] = _number(e)
-        return places[e]
+    def __init__(self, expression: sp.Expr) -> None:
+        places: dict[sp.Expr, int] = {}
+        self._places: dict[sp.Symbol, int] = {}
+        self._start: list[Any] = []
+        work: Work = []
 
-    last = place(expression)
-    start = [constants.get(i) for i in range(len(steps))]
-    known = {*constants, *(i for i, _ in symbols)}
-    work = [(i, operation, arguments) for i, (operation, arguments) in enumerate(steps) if i not in known]
+        def place(e: sp.Expr) -> int:
+            if e not in places:
+                arguments = [place(a) for a in e.args]
+                places[e] = len(self._start)
+                self._start.append(_number(e) if e.is_number else None)
+                if e.is_Symbol:
+                    self._places[e] = places[e]
+                elif not e.is_number:
+                    work.append((places[e], _operation(e), arguments))
+            return places[e]
 
-    def evaluate(values: Mapping[sp.Symbol, Any]) -> Any:
-        results = start.copy()
-        for i, symbol in symbols:
-            results[i] = values[symbol]
-        for i, operation, arguments in work:
-            results[i] = operation([results[j] for j in arguments])
-        return results[last]
+        place(expression)
+        self._work = work
+        self._after = {symbol: _depending(work, index) for symbol, index in self._places.items()}
 
-    return evaluate
+    def value(self, balls: Mapping[sp.Symbol, Any]) -> Any:
+        """Ball of the expression for balls of its symbols."""
+        return self.values(balls)[-1]
+
+    def values(self, balls: Mapping[sp.Symbol, Any]) -> list[Any]:
+        """Balls of all subexpressions, the expression's own last."""
+        results = self._start.copy()
+        for symbol, index in self._places.items():
+            results[index] = balls[symbol]
+        return _worked(results, self._work)
+
+    def moved(self, results: list[Any], symbol: sp.Symbol, changed: Any) -> list[Any]:
+        """The same for another ball of one symbol: what depends on it is computed again."""
+        results = results.copy()
+        results[self._places[symbol]] = changed
+        return _worked(results, self._after[symbol])
+
+
+_compiled = lru_cache(maxsize=64)(_Operations)
+
+
+def _worked(results: list[Any], work: Work) -> list[Any]:
+    for i, operation, arguments in work:
+        results[i] = operation([results[j] for j in arguments])
+    return results
+
+
+def _depending(work: Work, index: int) -> Work:
+    known, found = {index}, []
+    for step in work:
+        if not known.isdisjoint(step[2]):
+            known.add(step[0])
+            found.append(step)
+    return found
 
 
 def _number(e: sp.Expr) -> Any:
@@ -211,19 +237,21 @@ def upper_bound(
         When no finite bound is found.
     """
     order = count()
+    operations = _compiled(sp.sympify(expression))
     symbols = [s for s in box if s in expression.free_symbols]
     start = {s: box[s] for s in symbols}
+    values = operations.values(_balls(start))
     attained = Fraction(0)
-    heap = [(-_upper(expression, start), next(order), start)]
+    heap = [(-_upper(values[-1]), next(order), start, values)]
     for _ in range(pieces):
-        bound, _, worst = heap[0]
+        bound, _, worst, values = heap[0]
         middle = {s: ((a + b) / 2,) * 2 for s, (a, b) in worst.items()}
-        attained = max(attained, _lower(expression, middle))
+        attained = max(attained, _lower(operations.value(_balls(middle))))
         if -bound <= attained * (1 + tolerance):
             break
         heapq.heappop(heap)
-        for part in _halves(expression, worst):
-            heapq.heappush(heap, (-_upper(expression, part), next(order), part))
+        for part, found in _halves(operations, worst, values):
+            heapq.heappush(heap, (-_upper(found[-1]), next(order), part, found))
     result = -heap[0][0]
     if result == float("inf"):
         raise ParameterError(
@@ -233,31 +261,36 @@ def upper_bound(
     return Fraction(result)
 
 
-def _halves(expression: sp.Expr, box: dict) -> list[dict]:
-    """Halve the box where that lowers the bound most."""
-    best: list[dict] = []
+def _balls(box: Box) -> dict[sp.Symbol, Any]:
+    return {symbol: ball(*ends) for symbol, ends in box.items()}
+
+
+def _halves(operations: _Operations, box: dict, values: list[Any]) -> list[tuple[dict, list[Any]]]:
+    """Halve the box where that lowers the bound most: parts with the balls of all subexpressions."""
+    best: list[tuple[dict, list[Any]]] = []
     least: Any = None
     for symbol, (low, high) in box.items():
         if low == high:
             continue
         middle = (low + high) / 2
-        parts = [box | {symbol: (low, middle)}, box | {symbol: (middle, high)}]
-        worst = max(_upper(expression, p) for p in parts)
+        ends = ((low, middle), (middle, high))
+        parts = [(box | {symbol: part}, operations.moved(values, symbol, ball(*part))) for part in ends]
+        worst = max(_upper(found[-1]) for _, found in parts)
         if least is None or worst < least:
             best, least = parts, worst
-    return best or [box]
+    return best or [(box, values)]
 
 
-def _upper(expression: sp.Expr, box: Box) -> Any:
-    enclosure = abs(enclose(expression, box))
+def _upper(enclosure: Any) -> Any:
+    enclosure = abs(enclosure)
     if not enclosure.is_finite():
         return float("inf")
     top = enclosure.upper().fmpq()
     return fraction_of(top)
 
 
-def _lower(expression: sp.Expr, box: Box) -> Fraction:
-    enclosure = abs(enclose(expression, box))
+def _lower(enclosure: Any) -> Fraction:
+    enclosure = abs(enclosure)
     if not enclosure.is_finite():
         return Fraction(0)
     bottom = enclosure.abs_lower().fmpq()
