@@ -9,7 +9,7 @@ import heapq
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, lru_cache
 from itertools import combinations, count, pairwise, product
 from math import factorial, lcm, prod
 from typing import Any
@@ -94,6 +94,9 @@ class Form:
         return [self.coefficients[i] * self.scale for i in places]
 
 
+Problem = tuple[tuple[Form, ...], tuple[Fraction, ...]]
+
+
 @cache
 def _corners(variables: int, degree: int) -> tuple[int, ...]:
     order = {e: i for i, e in enumerate(_exponents(variables, degree))}
@@ -122,6 +125,11 @@ def largest_ratio(
     Fraction or None
         None when some form with a negative exponent was not shown to be positive.
     """
+    return _largest(tuple((tuple(forms), tuple(exponents)) for forms, exponents in problems), tolerance, pieces)
+
+
+@lru_cache(maxsize=32)
+def _largest(problems: tuple[Problem, ...], tolerance: Fraction, pieces: int) -> Fraction | None:
     order, heap, attained = count(), [], 0.0
     for forms, exponents in problems:
         corners = _identity(forms[0].variables)

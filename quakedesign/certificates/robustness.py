@@ -12,15 +12,13 @@ from fractions import Fraction
 import sympy as sp
 
 from quakedesign.certificates.claim import Certificate, error_units, require
-from quakedesign.certificates.forms import Form, largest_ratio
+from quakedesign.certificates.forms import Form, Problem, largest_ratio
 from quakedesign.certificates.obligations import Obligations, degree
 from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError, KinkError
 from quakedesign.rationals import fraction_of
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.terms import Term, cell_polynomial, from_terms, lie_derivative, to_terms
-
-Problem = tuple[tuple[Form, ...], tuple[Fraction, ...]]
 
 _PUSHED = 1
 """Index of e2, on which ν acts."""
