@@ -35,6 +35,7 @@ def _no_warning_wanders():
     """What a file of tests has left open is warned of there, and not in another file."""
     yield
     gc.collect()
+    gc.freeze()  # what lives on is not searched again
 
 
 @pytest.fixture
