@@ -8,7 +8,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from quakedesign import load_fault
-from quakedesign.report.errata import Finding, Row
+from quakedesign.studies.errata import Finding, Row
 
 FAULT = load_fault("real-fault")
 

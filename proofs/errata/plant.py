@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from quakedesign import derive, load_fault
-from quakedesign.report.errata import Finding, Row
+from quakedesign.studies.errata import Finding, Row
 from quakedesign.symbolic import plant
 
 

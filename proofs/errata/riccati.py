@@ -14,7 +14,7 @@ from quakedesign import load_fault
 from quakedesign.certificates.linear_premises import effective_stress
 from quakedesign.certificates.premises import least_authority
 from quakedesign.controllers import Signals, control_law
-from quakedesign.report.errata import Finding, Row
+from quakedesign.studies.errata import Finding, Row
 from quakedesign.symbolic import plant
 
 FAULT = load_fault("real-fault")

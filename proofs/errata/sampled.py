@@ -12,10 +12,10 @@ from scipy.optimize import brentq
 
 import quakedesign as qd
 from quakedesign.controllers import published
-from quakedesign.report.errata import Finding, Row
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.step_stability import amplification
+from quakedesign.studies.errata import Finding, Row
 
 REAL, LAB = qd.load_fault("real-fault"), qd.load_fault("lab-fault")
 CHUNK = 1000

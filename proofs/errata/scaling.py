@@ -11,7 +11,7 @@ import sympy as sp
 from quakedesign import load_fault
 from quakedesign.controllers import published
 from quakedesign.controllers.dia import DiscontinuousIntegral
-from quakedesign.report.errata import Finding, Row
+from quakedesign.studies.errata import Finding, Row
 
 
 def signed(x, a):

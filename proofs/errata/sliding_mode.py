@@ -10,7 +10,7 @@ import sympy as sp
 
 from quakedesign import load_fault
 from quakedesign.controllers import control_law, published
-from quakedesign.report.errata import Finding, Row
+from quakedesign.studies.errata import Finding, Row
 from quakedesign.symbolic import AbsolutePower, SignedPower, off_kinks, plant
 
 FAULT = load_fault("real-fault")

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from quakedesign import load_fault
 from quakedesign.controllers import published
-from quakedesign.report.errata import Finding, Row
+from quakedesign.studies.errata import Finding, Row
 
 FAULT = load_fault("real-fault")
 LAW, TASK = FAULT.friction, FAULT.reference

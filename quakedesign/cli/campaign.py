@@ -120,11 +120,11 @@ def campaign(
     """
     from quakedesign.fault import load_fault
     from quakedesign.loop.schemes import own_way
-    from quakedesign.report.single import optional_choice
     from quakedesign.simulation import Load
     from quakedesign.simulation import perturbation as read_perturbation
     from quakedesign.simulation.campaign import campaign_problem, run_campaign
     from quakedesign.simulation.run import sampled_scheme
+    from quakedesign.studies.single import optional_choice
 
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")

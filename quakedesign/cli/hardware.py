@@ -65,7 +65,7 @@ class ActuatorOptions:
         """Actuator for a sampling period [s]; raises `ParameterError`."""
         from dataclasses import asdict
 
-        from quakedesign.report.hardware import actuator
+        from quakedesign.studies.hardware import actuator
 
         return actuator(step, **asdict(self))
 
@@ -113,8 +113,8 @@ class SensorOptions(EstimateOptions):
         """Measurement or sensor for a sampling period [s] and a seed of the noise; raises `ParameterError`."""
         import math
 
-        from quakedesign.report.estimation import sensor
         from quakedesign.simulation import Measurement
+        from quakedesign.studies.estimation import sensor
 
         return sensor(
             step,

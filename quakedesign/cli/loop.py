@@ -98,9 +98,9 @@ def simulate(
     """
     from quakedesign.fault import load_fault
     from quakedesign.loop.schemes import own_way
-    from quakedesign.report.single import optional_choice, run_single
     from quakedesign.simulation import Load
     from quakedesign.simulation import perturbation as read_perturbation
+    from quakedesign.studies.single import optional_choice, run_single
 
     new_file(out, "output file", force=force)
     found = load_fault(fault)
@@ -135,8 +135,8 @@ def simulate(
 
 
 def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
-    from quakedesign.report.needed_pressure import shortfall
     from quakedesign.simulation.waiting import waiting
+    from quakedesign.studies.needed_pressure import shortfall
 
     metrics, energy = trajectory.metrics.to_dict(), trajectory.energy
     begins = waiting(trajectory, fault)
@@ -206,9 +206,9 @@ def sampling(
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare
-    from quakedesign.report.sampling import sampling_report
-    from quakedesign.report.sampling_output import print_sampling, write_sampling
-    from quakedesign.report.single import DESIGNED, chosen_controller
+    from quakedesign.report.sampling import print_sampling, write_sampling
+    from quakedesign.studies.sampling import sampling_report
+    from quakedesign.studies.single import DESIGNED, chosen_controller
     from quakedesign.synthesis import design
 
     found = load_fault(fault)
@@ -273,8 +273,8 @@ def export(
         Print JSON.
     """
     from quakedesign.fault import load_fault
-    from quakedesign.report.exporting import export_answer, export_lines
-    from quakedesign.report.single import chosen_controller
+    from quakedesign.studies.exporting import export_answer, export_lines
+    from quakedesign.studies.single import chosen_controller
 
     found = load_fault(fault)
     law = chosen_controller(found, controller, gains, scale=scale, feedforward=feedforward)

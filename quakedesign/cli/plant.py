@@ -21,7 +21,7 @@ def fault(fault: str, /, *, box: str | None = None, json: Json = False) -> int:
         Print JSON with SI values.
     """
     from quakedesign.fault import load_fault
-    from quakedesign.report.facts import fault_dict, fault_sentences
+    from quakedesign.studies.facts import fault_dict, fault_sentences
 
     found = load_fault(fault, box=box)
     if json:
@@ -108,7 +108,7 @@ def scale(
     json
         Print JSON.
     """
-    from quakedesign.report.scaling import scale_answer, scale_lines
+    from quakedesign.studies.scaling import scale_answer, scale_lines
 
     clocks = {None: None, "operation-time": "reference.operation_time", "natural-period": "shear_modulus"}
     answer = scale_answer(source, target, controller, gains, clock=clocks[clock])
@@ -130,7 +130,7 @@ def errata(*rows: int, json: Json = False) -> int:
     json
         Print JSON.
     """
-    from quakedesign.report.errata import errata_rows, run_rows
+    from quakedesign.studies.errata import errata_rows, run_rows
 
     numbers = list(rows) or [row.number for row in errata_rows()]
     found = []

@@ -95,7 +95,7 @@ def _certify_for_rate(
     out: Path | None, json: bool,
 ) -> int:  # fmt: skip
     """Verdict on a sliding mode, or how far its gains reach."""
-    from quakedesign.report.certified import certified
+    from quakedesign.studies.certified import certified
 
     answer = certified(law, gains, lipschitz=lipschitz, maximize=maximize, gain_range=gain_range)
     if answer.certificate is not None and out is not None:

@@ -1,7 +1,7 @@
 """Figures, tables and pages from designs and runs."""
 
 from quakedesign.arguments import check_arguments
-from quakedesign.report.comparison import Comparison, Entry, compare, headline
+from quakedesign.studies.comparison import Comparison, Entry, compare, headline
 
 __all__ = ["Comparison", "Entry", "compare", "headline"]
 

@@ -23,8 +23,8 @@ from quakedesign.report.drawing import (
 )
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Comparison, Entry
     from quakedesign.simulation import Trajectory
+    from quakedesign.studies.comparison import Comparison, Entry
 
 _INSET = (0.16, 0.66, 0.82, 0.31)
 _ROOM = 0.9  # for the insets above the data, over the height of the data

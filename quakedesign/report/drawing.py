@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Entry
     from quakedesign.simulation import Trajectory
+    from quakedesign.studies.comparison import Entry
 
 WIDTH = 7.16  # two columns of a printed page [in]
 SMALL = 8  # size of letters [pt], still readable in print

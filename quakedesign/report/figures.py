@@ -22,8 +22,8 @@ from quakedesign.report.drawing import (
 )
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Comparison
     from quakedesign.simulation import Trajectory
+    from quakedesign.studies.comparison import Comparison
 
 
 def figures(comparison: "Comparison") -> dict[str, Any]:

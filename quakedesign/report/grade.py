@@ -9,7 +9,7 @@ from quakedesign.certificates.premise import Premise
 from quakedesign.rationals import rational
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Entry
+    from quakedesign.studies.comparison import Entry
 
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
 """Premises of a linear law's stability that its certified peaks do without."""

@@ -8,11 +8,11 @@ from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premises import Domain, Variant
 from quakedesign.report.linear import held_sentence, peaks_sentence
-from quakedesign.report.needed_pressure import run_sentences
 from quakedesign.simulation import Trajectory
+from quakedesign.studies.needed_pressure import run_sentences
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Comparison, Entry
+    from quakedesign.studies.comparison import Comparison, Entry
 
 AS_IN_THE_PAPER = "continuous"
 """Scheme of the paper's simulations."""

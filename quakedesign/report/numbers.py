@@ -7,8 +7,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Comparison, Entry
     from quakedesign.simulation import Trajectory
+    from quakedesign.studies.comparison import Comparison, Entry
 
 BARS = {
     "mise_slip": "MISE of the slip",

@@ -16,7 +16,7 @@ from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.text import visible
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Comparison
+    from quakedesign.studies.comparison import Comparison
 
 _TABLE = """<table><thead><tr>{% for c in columns %}<th>{{ c }}</th>{% endfor %}</tr></thead><tbody>
 {% for row in rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>

@@ -29,8 +29,8 @@ from quakedesign.report.figures import end, figures
 from quakedesign.report.numbers import BARS, BASIS, baseline, relative
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Comparison, Entry
-    from quakedesign.report.paper_study import PaperStudy
+    from quakedesign.studies.comparison import Comparison, Entry
+    from quakedesign.studies.paper_study import PaperStudy
 
 PAPER = {
     "friction-law": "fig:mu",

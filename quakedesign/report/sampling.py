@@ -1,280 +1,65 @@
-"""What sampling does to a law: every scheme beside the published controllers, orders, noise and input gain."""
+"""A sampling report on a terminal and in a folder."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from fractions import Fraction
+import json
+from pathlib import Path
 from typing import Any
 
-from quakedesign.certificates.premises import Premise
-from quakedesign.controllers import Controller, SlidingMode, published
-from quakedesign.errors import ParameterError
-from quakedesign.fault import Fault
-from quakedesign.rationals import rational
-from quakedesign.report.on_trajectory import certified_bound, trajectory_premise
-from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells, pressure_extremes
-from quakedesign.simulation import Study, Trajectory, accuracy, gain_sensitivity, noise_sensitivity, simulate
-from quakedesign.simulation.sampling_study import QUANTITIES, SCHEMES
-from quakedesign.synthesis import Design
+from rich.table import Table
 
-PUBLISHED_SCHEMES = ("continuous", "explicit", "compensated")
-DECADES = 3
-PERIODS = 650  # of the longest T_s that the runs for the orders take
-SHARE = 1 / 16  # of the task that a run for the sensitivity to noise takes
-UNCERTAIN = "ten-percent"
-_CELLS = {
-    "max_slip_error": (1, ".2e"),
-    "max_slip_rate_error": (1, ".2e"),
-    "rms_pressure": (1e6, ".3g"),
-    "pressure_total_variation": (1e9, ".3g"),
-    "reverse_slip_fraction": (1, ".2f"),
-}
-OUTCOMES = ("law", "scheme", *OUTCOME_COLUMNS, "least p [MPa]", "largest p [MPa]")
-COLUMNS = (
-    "law",
-    "scheme",
-    "slip error [m]",
-    "rate error [m/s]",
-    "RMS p [MPa]",
-    "path p [GPa]",
-    "back slip",
-    "on tra- jectory",
-)
-FOOTNOTE = (
-    "On trajectory: largest |Δh/Δt| over what the certificate covers (λ·L̄); a dash stands for gains without one here. "
-    "Certificates are about continuous time: none covers the errors of a scheme, and the compensated one "
-    "has an estimate in place of the law's integral state."
-)
-Tell = Callable[[str, float], None]
+from quakedesign.output import whole_folder, write_whole
+from quakedesign.studies.sampling import COLUMNS, FOOTNOTE, OUTCOMES, SamplingReport, order_rows, study_rows
+
+OUTCOME_WIDTHS = (13, 13, 10, 8, 10, 8, 8)
+WIDTHS = (13, 13, 8, 8, 8, 8, 5, 8)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Row:
-    """One law under one scheme.
-
-    Attributes
-    ----------
-    label : str
-        Law, and whether it is the published one, or its λ.
-    origin : str
-        Of the gains: ``"designed"``, ``"given"``, ``"published"``.
-    controller : Controller
-    scheme : str
-    run : Trajectory
-    premise : Premise or None
-        |h'| on the trajectory, for a sliding mode that did not diverge; nothing is certified of gains that come without
-        a certificate.
-    """
-
-    label: str
-    origin: str
-    controller: Controller
-    scheme: str
-    run: Trajectory
-    premise: Premise | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-able facts, SI."""
-        law, energy = self.controller, self.run.energy
-        return {
-            "label": self.label,
-            "origin": self.origin,
-            "law": law.name,
-            "gains": {name: str(v) for name, v in law.gains.items()},
-            "scale": str(law.scale) if isinstance(law, SlidingMode) else None,
-            "scheme": self.scheme,
-            "outcome": self.run.outcome.to_dict(),
-            "metrics": self.run.metrics.to_dict(),
-            "events": dict(self.run.events),
-            "on_trajectory": self.premise.to_dict() if self.premise else None,
-            "energy_residual": energy.relative_residual if energy else None,
-            "run": dict(self.run.provenance),
-        }
-
-    def outcome_cells(self) -> tuple[str, ...]:
-        """Texts under `OUTCOMES`; a dash means diverged."""
-        extremes = pressure_extremes(self.run)
-        pressures = (f"{p / 1e6 + 0.0:.3g}" for p in extremes) if extremes else ("–", "–")
-        return (self.label, self.scheme, *outcome_cells(self.run), *pressures)
-
-    def cells(self) -> tuple[str, ...]:
-        """Texts under `COLUMNS`; a dash means not applicable or diverged."""
-        metrics = self.run.metrics
-        values = ((getattr(metrics, name), unit, form) for name, (unit, form) in _CELLS.items())
-        texts = ("–" if value is None else format(value / unit, form) for value, unit, form in values)
-        ratio = self.premise.ratio if self.premise else None
-        return (self.label, self.scheme, *texts, "–" if ratio is None else f"{ratio:.3g}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SamplingReport:
-    """How a law bears sampling.
-
-    Attributes
-    ----------
-    fault : Fault
-    rows : tuple of Row
-        The law under every scheme, then the published ones: as in the paper, held, and with the compensated scheme.
-    studies : dict of str to Study
-        ``orders`` (of a sliding mode without feed-forward), ``slip_noise``, ``rate_noise``, ``input_gain``.
-    """
-
-    fault: Fault
-    rows: tuple[Row, ...]
-    studies: dict[str, Study]
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-able facts, SI; exact quantities are texts, null stands for what diverged or does not apply."""
-        told = {name: study.to_dict() for name, study in self.studies.items()}
-        if "orders" in told:
-            told["orders"]["exponents"] = self.studies["orders"].orders()
-        none = dict.fromkeys(("orders", "slip_noise", "rate_noise", "input_gain"))
-        return {"fault": self.fault.name, "schemes": [row.to_dict() for row in self.rows], **none, **told}
-
-    def figures(self) -> dict[str, Any]:
-        """Matplotlib figures of the studies, by name."""
-        return {name: study.figure() for name, study in self.studies.items()}
-
-
-def sampling_report(
-    fault: Fault,
-    law: Controller | Design,
-    *,
-    scales: Sequence[str] = (),
-    schemes: Sequence[str] = SCHEMES,
-    duration: float | None = None,
-    progress: Tell | None = None,
-) -> SamplingReport:
-    """Run a law under every scheme, the published laws as they are, and measure orders and sensitivities.
-
-    Parameters
-    ----------
-    fault : Fault
-    law : Controller or Design
-        Of a design the certified bound on |h'| is known.
-    scales : sequence of str
-        Further λ, exact, with which the base gains of a sliding mode are run; its certificate holds for every λ.
-    schemes : sequence of str
-        Those that sample.
-    duration : float, optional
-        Of the runs [s]; the operation time unless given. Sensitivities to noise take a sixteenth of it, orders 650 T_s.
-    progress : callable, optional
-        Called with what is being done and the fraction done [-].
-
-    Returns
-    -------
-    SamplingReport
+def write_sampling(report: SamplingReport, folder: Path) -> dict[str, Any]:
+    """Write ``results.json`` and ``figures/*.png`` into a folder that appears whole; return what the former holds.
 
     Raises
     ------
-    ParameterError
-        For a scale of a law that has none.
+    OutputError
     """
-    tell = progress or (lambda _what, _done: None)
-    design = law if isinstance(law, Design) else None
-    controller = law.controller if isinstance(law, Design) else law
-    if controller is None:
-        raise ParameterError(f"a law to sample needs gains. Received a design for {fault.name} without. Give gains.")
-    bound = certified_bound(design)
-    entries: list[tuple[str, Controller, tuple[str, ...]]]
-    entries = [
-        ("designed" if design else "given", variant, tuple(schemes)) for variant in _variants(controller, scales)
-    ]
-    entries += [("published", known, PUBLISHED_SCHEMES) for known in published(fault.name).values()]
-    found = [
-        _row(fault, origin, variant, scheme, bound if origin != "published" else None, duration, tell)
-        for origin, variant, chosen in entries
-        for scheme in chosen
-    ]
-    return SamplingReport(fault=fault, rows=tuple(found), studies=_studies(fault, controller, schemes, duration, tell))
+    found = report.to_dict()
+    with whole_folder(folder) as partial:
+        (partial / "figures").mkdir()
+        for name, drawing in report.figures().items():
+            drawing.savefig(partial / "figures" / f"{name}.png", metadata={"Software": None})
+        write_whole(partial / "results.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
+    return found
 
 
-def _variants(controller: Controller, scales: Sequence[str]) -> list[Controller]:
-    """The law, and the same base gains with other λ."""
-    if not scales:
-        return [controller]
-    if not isinstance(controller, SlidingMode):
-        raise ParameterError(f"a scale belongs to a sliding mode. Received {controller.name}. Leave it out.")
-    return [controller, *(controller.scaled(rational(scale, "scale")) for scale in scales)]
+def print_sampling(report: SamplingReport, console: Any) -> None:
+    """Table of the schemes, and one of every study."""
+    console.print(report.fault.name, style="bold", end=", ")
+    console.print(f"T_s = {report.fault.sampling_time:g} s")
+    console.print(_table(OUTCOMES, [row.outcome_cells() for row in report.rows], OUTCOME_WIDTHS), soft_wrap=False)
+    console.print()
+    console.print(_table(COLUMNS, [row.cells() for row in report.rows], WIDTHS), soft_wrap=False)
+    for row in report.rows:
+        if not row.run.outcome.harmless:
+            console.print(f"{row.label}, {row.scheme}: {dict(row.run.events)}")
+    console.print(FOOTNOTE)
+    for name, study in report.studies.items():
+        console.print()
+        console.print(study.title, style="bold")
+        levels = f"largest errors at {study.label} {study.levels[0]:.3g} … {study.levels[-1]:.3g} {study.unit}".rstrip()
+        if name == "orders":
+            levels = (
+                f"error ~ T_s^order for T_s = {study.levels[-1]:.3g} … {study.levels[0]:.3g} s, errors at the latter"
+            )
+        console.print(levels)
+        head, rows = order_rows(study) if name == "orders" else study_rows(study)
+        console.print(_table(head, rows, (13,) if name == "orders" else (13, 10)), soft_wrap=False)
 
 
-def _row(
-    fault: Fault,
-    origin: str,
-    law: Controller,
-    scheme: str,
-    bound: Fraction | None,
-    duration: float | None,
-    tell: Tell,
-) -> Row:
-    label = f"{law.title}{f', λ {float(law.scale):.3g}' if isinstance(law, SlidingMode) else ''}"
-    label = f"{law.title}, published" if origin == "published" else label
-    said = f"{label}, {scheme}"
-    run = simulate(fault, law, scheme=scheme, duration=duration, samples=1000, progress=lambda done: tell(said, done))
-    premise = None
-    if isinstance(law, SlidingMode):
-        premise = trajectory_premise(law, None if bound is None else float(bound * law.scale), run)
-    return Row(label=label, origin=origin, controller=law, scheme=scheme, run=run, premise=premise)
-
-
-def _studies(
-    fault: Fault, law: Controller, schemes: Sequence[str], duration: float | None, tell: Tell
-) -> dict[str, Study]:
-    task = fault.reference.operation_time
-    window = (task if duration is None else duration) * SHARE
-    found = {}
-    if isinstance(law, SlidingMode) and not any(law.feedforward.coefficients.values()):
-        tell("orders of accuracy", 0.0)
-        found["orders"] = orders(fault, law, schemes)
-    for i, of in enumerate(("slip_noise", "rate_noise")):
-        tell(f"sensitivity to {of.replace('_', ' ')}", i / 3)
-        found[of] = noise_sensitivity(
-            fault, law, levels=noise_levels(fault, of), of=of, schemes=schemes, duration=window
-        )
-    tell("sensitivity to the input gain", 2 / 3)
-    box = fault if fault.box.authority else fault.with_box(UNCERTAIN)
-    return found | {"input_gain": gain_sensitivity(box, law, points=3, schemes=schemes, duration=duration)}
-
-
-def orders(fault: Fault, law: SlidingMode, schemes: Sequence[str] = SCHEMES) -> Study:
-    """Errors over three decades of T_s below that of the fault, in runs of 650 of its T_s, from half of them on."""
-    longest = fault.sampling_time
-    steps = [longest * 10 ** (-k / 2) for k in range(2 * DECADES + 1)]
-    return accuracy(
-        fault, law, steps=steps, schemes=schemes, duration=PERIODS * longest, settled_from=PERIODS * longest / 2
-    )
-
-
-def noise_levels(fault: Fault, of: str) -> tuple[float, ...]:
-    """Standard deviations: 1e-8 … 1e-4 of the target slip [m], or 1e-2 … 100 times the mean slip rate [m/s]."""
-    task = fault.reference
-    first = 1e-8 * task.target_slip if of == "slip_noise" else 1e-2 * task.target_slip / task.operation_time
-    return tuple(float(f"{first * 10**k:.2g}") for k in range(5))
-
-
-def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of a study as texts: one row a scheme and quantity, the errors at every level."""
-    head = ("scheme", "error", *(f"{level:.2g}" for level in study.levels))
-    rows = [
-        (scheme, _quantity(name), *(f"{v:.1e}" for v in values))
-        for scheme, found in study.errors.items()
-        for name, values in found.items()
-    ]
-    return head, rows
-
-
-def order_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of the orders as texts: one row a scheme, with exponents and the errors at the longest T_s."""
-    exponents = study.orders()
-    names = list(next(iter(study.errors.values())))
-    head = ("scheme", *(f"order of {QUANTITIES[n][0].removeprefix('max ')}" for n in names), *map(_quantity, names))
-    rows = []
-    for scheme, found in study.errors.items():
-        powers = (exponents[scheme][n] for n in names)
-        largest = (f"{found[n][0]:.1e}" for n in names)
-        rows.append((scheme, *("–" if power is None else f"{power:.2f}" for power in powers), *largest))
-    return head, rows
-
-
-def _quantity(name: str) -> str:
-    label, unit = QUANTITIES[name]
-    return f"{label.removeprefix('max ')} [{unit}]"
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], widths: tuple[int, ...]) -> Table:
+    """Table whose columns of text, the first one or two, have the widths given; so have others as far as given."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    texts = min(len(widths), 2)
+    for i, column in enumerate(head):
+        width = widths[i] if i < len(widths) else None
+        table.add_column(column, justify="left" if i < texts else "right", width=width)
+    for row in rows:
+        table.add_row(*row)
+    return table

@@ -6,8 +6,8 @@ from quakedesign.report.grade import grade
 from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells
 
 if TYPE_CHECKING:
-    from quakedesign.report.comparison import Comparison
     from quakedesign.simulation import Trajectory
+    from quakedesign.studies.comparison import Comparison
 
 OUTCOMES = ("controller", *OUTCOME_COLUMNS, "verdict")
 COLUMNS = (

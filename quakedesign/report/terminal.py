@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from quakedesign.report.comparison import Comparison
-from quakedesign.report.facts import fault_sentences
 from quakedesign.report.grade import GRADES
 from quakedesign.report.headlines import (
     FEEDFORWARD_COLUMNS,
@@ -16,14 +14,16 @@ from quakedesign.report.headlines import (
     headline,
     scheme_sentence,
 )
-from quakedesign.report.needed_pressure import run_sentences
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
+from quakedesign.studies.comparison import Comparison
+from quakedesign.studies.facts import fault_sentences
+from quakedesign.studies.needed_pressure import run_sentences
 
 if TYPE_CHECKING:
     from quakedesign.certificates.premises import Premise
     from quakedesign.fault import Fault
-    from quakedesign.report.comparison import Entry
     from quakedesign.simulation import Trajectory
+    from quakedesign.studies.comparison import Entry
 
 
 def print_comparison(comparison: Comparison, console: Any) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from quakedesign.report.errata import KINDS, errata_folder, errata_rows, find_rows, run_rows
+from quakedesign.studies.errata import KINDS, errata_folder, errata_rows, find_rows, run_rows
 
 ROWS = {row.number: row for row in errata_rows()}
 

@@ -14,10 +14,10 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Reference, load_fault
 from quakedesign.report import compare, comparison, headline
 from quakedesign.report.folder import write_folder
-from quakedesign.report.paper_study import paper_study
 from quakedesign.report.tables import outcome_rows, rows
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate
+from quakedesign.studies.paper_study import paper_study
 from quakedesign.synthesis import Design
 
 LAB = load_fault("lab-fault")

@@ -10,10 +10,10 @@ import quakedesign as qd
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premise import Premise
-from quakedesign.report.comparison import Entry
 from quakedesign.report.headlines import domain_sentence, headline
 from quakedesign.report.linear import held_sentence, peaks_sentence, verdict_lines
 from quakedesign.report.terminal import _line
+from quakedesign.studies.comparison import Entry
 from quakedesign.synthesis.linear.analysis.verdict import judge
 
 LAB = qd.load_fault("lab-fault")

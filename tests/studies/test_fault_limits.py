@@ -13,9 +13,9 @@ from quakedesign.certificates.impossibility import longest_reaction
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
 from quakedesign.loop import summed_integrals
-from quakedesign.report.facts import beyond_control
 from quakedesign.report.limits import limits_figure, limits_lines
 from quakedesign.studies import limits as study
+from quakedesign.studies.facts import beyond_control
 from quakedesign.synthesis.guaranteed import reached
 
 REAL = qd.load_fault("real-fault")

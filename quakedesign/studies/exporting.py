@@ -8,10 +8,10 @@ from quakedesign.fault import Fault
 from quakedesign.loop.schemes import own_way
 from quakedesign.loop.sensing import OutputFeedback
 from quakedesign.loop.sensing.measurement import EXACT
-from quakedesign.report.estimation import differentiator_premise, sensor
 from quakedesign.simulation import export_controller
 from quakedesign.simulation.export import HEADER, SOURCE
 from quakedesign.simulation.run import sampled_scheme
+from quakedesign.studies.estimation import differentiator_premise, sensor
 
 
 def export_answer(

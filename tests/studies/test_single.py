@@ -8,9 +8,9 @@ from quakedesign.controllers import published
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import load_fault
-from quakedesign.report.estimation import sensor
-from quakedesign.report.single import Choice, choice, chosen_controller, run_single
 from quakedesign.simulation import Actuator, Lag, Load, Measurement, simulate, simulation_scheme
+from quakedesign.studies.estimation import sensor
+from quakedesign.studies.single import Choice, choice, chosen_controller, run_single
 
 LAB = load_fault("lab-fault")
 USUAL = {"step": None, "scheme": "continuous", "method": "dormand-prince", "plant": "smooth", "substeps": 1}
@@ -44,7 +44,7 @@ def test_an_unknown_feed_forward_is_refused():
 def test_designed_gains_are_those_of_the_design(monkeypatch):
     from types import SimpleNamespace
 
-    from quakedesign.report import single
+    from quakedesign.studies import single
 
     law = chosen_controller(LAB, "cta", BASE)
     for found in (law, None):
@@ -102,7 +102,7 @@ def test_without_a_certificate_the_premise_on_the_run_says_so():
 
 def test_a_certified_bound_goes_with_the_scale(monkeypatch):
     """λ multiplies what is certified for λ = 1."""
-    from quakedesign.report import single
+    from quakedesign.studies import single
 
     law = chosen_controller(LAB, "cta", BASE)
     monkeypatch.setattr(single, "design", lambda fault, name: law)
@@ -119,7 +119,7 @@ def test_the_bound_of_a_proved_design_is_that_of_its_certificate():
     from types import SimpleNamespace
 
     from quakedesign.certificates import Verdict
-    from quakedesign.report.on_trajectory import certified_bound
+    from quakedesign.studies.on_trajectory import certified_bound
 
     law = chosen_controller(LAB, "cta", BASE)
     design = SimpleNamespace(controller=law, certificate=None, verdict=Verdict.PROVED)

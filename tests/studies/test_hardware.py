@@ -3,8 +3,8 @@
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.report.hardware import actuator
 from quakedesign.simulation import Delay, Diffusion, Lag, Quantisation, RateLimit, Saturation, stages
+from quakedesign.studies.hardware import actuator
 
 
 def test_nothing_asked_for_is_no_stage():

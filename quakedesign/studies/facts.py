@@ -8,8 +8,8 @@ from quakedesign.bounds import LowerBound
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.report.needed_pressure import need_sentence, needed_pressure, ways
 from quakedesign.studies import limits
+from quakedesign.studies.needed_pressure import need_sentence, needed_pressure, ways
 from quakedesign.symbolic import derive
 from quakedesign.synthesis.analysis.sampling_adequacy import LARGEST_PRODUCT, SamplingAdequacy, sampling_adequacy
 

@@ -6,7 +6,7 @@ import pytest
 
 from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError
-from quakedesign.report.certified import certified
+from quakedesign.studies.certified import certified
 
 KEYS = {
     "verdict", "lipschitz", "gain_range", "decay", "settling", "limit", "counterexample", "dual", "certificate",

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from quakedesign.errors import ParameterError, UnknownNameError
-from quakedesign.report import errata
-from quakedesign.report.errata import Finding, Row, errata_table, find_rows, run_rows
+from quakedesign.studies import errata
+from quakedesign.studies.errata import Finding, Row, errata_table, find_rows, run_rows
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -69,7 +69,7 @@ def test_an_unknown_kind_is_refused():
 
 
 MODULE = """
-from quakedesign.report.errata import Finding, Row
+from quakedesign.studies.errata import Finding, Row
 ROWS = (Row(number=5, printed="p", correct="c", kind="counterexample", check=lambda: Finding(True, "1")),)
 """
 
@@ -103,9 +103,7 @@ def ask(site, code):
 
 def test_an_installed_package_finds_its_own_checks(tmp_path):
     installed(tmp_path)
-    code = (
-        "from quakedesign.report.errata import errata_folder, run_rows as r; print(errata_folder(), r([4])[0]['holds'])"
-    )
+    code = "from quakedesign.studies.errata import errata_folder as f, run_rows as r; print(f(), r([4])[0]['holds'])"
     done = ask(tmp_path, code)
     assert done.stdout.split() == [str(tmp_path / "quakedesign" / "proofs" / "errata"), "True"], done.stderr
 
@@ -113,7 +111,7 @@ def test_an_installed_package_finds_its_own_checks(tmp_path):
 def test_a_package_without_its_checks_says_so(tmp_path):
     installed(tmp_path)
     shutil.rmtree(tmp_path / "quakedesign" / "proofs")
-    done = ask(tmp_path, "from quakedesign.report.errata import run_rows; run_rows()")
+    done = ask(tmp_path, "from quakedesign.studies.errata import run_rows; run_rows()")
     assert "UnknownNameError: the checks of the errata must be in" in done.stderr
 
 

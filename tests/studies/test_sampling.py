@@ -11,15 +11,15 @@ from quakedesign.controllers import control_law
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.report.sampling import (
+from quakedesign.report.sampling import print_sampling, write_sampling
+from quakedesign.simulation import Study
+from quakedesign.studies.sampling import (
     COLUMNS,
     noise_levels,
     order_rows,
     sampling_report,
     study_rows,
 )
-from quakedesign.report.sampling_output import print_sampling, write_sampling
-from quakedesign.simulation import Study
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
 OWN = replace(LAB, name="own")  # without published gains

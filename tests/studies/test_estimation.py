@@ -6,8 +6,8 @@ from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop.sensing.measurement import EXACT
-from quakedesign.report.estimation import differentiator_premise, largest_acceleration, sensor
 from quakedesign.simulation import Measurement, joint_condition
+from quakedesign.studies.estimation import differentiator_premise, largest_acceleration, sensor
 
 LAB = load_fault("lab-fault")
 LAW = published("lab-fault")["cta"]

@@ -14,10 +14,10 @@ from quakedesign.loop.actuators import DIRECT
 from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.loop.sensing import OutputFeedback, Sensor
 from quakedesign.loop.sensing.measurement import EXACT, Measurement
-from quakedesign.report.estimation import differentiator_premise
-from quakedesign.report.on_trajectory import certified_bound, trajectory_premise
 from quakedesign.simulation import Actuator, Load, Trajectory, natural_earthquake
 from quakedesign.simulation import simulate as run_loop
+from quakedesign.studies.estimation import differentiator_premise
+from quakedesign.studies.on_trajectory import certified_bound, trajectory_premise
 from quakedesign.synthesis import design
 
 PUBLISHED, DESIGNED = ("published",), ("designed",)

@@ -21,7 +21,7 @@ from quakedesign.fault import Fault, load_fault
 from quakedesign.fault.radical import Radical, radical
 from quakedesign.fault.scaling import TOLERANCE, GroupComparison, Scales, Similarity, similarity
 from quakedesign.rationals import rational
-from quakedesign.report.single import chosen_controller
+from quakedesign.studies.single import chosen_controller
 
 SCALED = {
     "slip": ("λ_δ", "slip_m"),

@@ -7,9 +7,9 @@ from math import pi
 from typing import Any
 
 from quakedesign.loop import SampledController
-from quakedesign.report.comparison import Comparison
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.studies import FrontPoint, objective_front
+from quakedesign.studies.comparison import Comparison
 
 INDUCING_SHARE = 0.1
 """Constant pressure over σ'_n of the induced earthquake: 5 MPa on the paper's fault at 50 MPa."""
