@@ -89,7 +89,8 @@ found
 # The dimensionless groups are computed from the units. Two faults are similar if all groups agree; gains then carry over.
 
 # %%
-from quakedesign.studies.scaling import scale_answer, scale_lines
+from quakedesign.report.scaling import scale_lines
+from quakedesign.studies.scaling import scale_answer
 
 answer = scale_answer("lab-fault", "real-fault", "cta", "published")
 print("\n".join(scale_lines(answer)))

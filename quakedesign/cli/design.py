@@ -92,8 +92,8 @@ def design(
     found = load_fault(fault, box=box)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
+    from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import write_folder
-    from quakedesign.studies.comparison import designed_comparison
 
     with progress() as tell:
         comparison = designed_comparison(

@@ -42,9 +42,9 @@ def compare(
         Print JSON with the keys of design's results.json.
     """
     from quakedesign.fault import load_fault
+    from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import results
     from quakedesign.report.numbers import printed, printed_lines, table
-    from quakedesign.studies.comparison import designed_comparison
 
     names, found = controllers(controller), load_fault(fault, box=box)
     options = linear.told(names)
@@ -108,10 +108,10 @@ def figures(
     options = linear.told(names)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
+    from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.numbers import printed_lines
-    from quakedesign.studies.comparison import designed_comparison
-    from quakedesign.studies.needed_pressure import run_sentences
-    from quakedesign.studies.paper_study import paper_study
+    from quakedesign.report.outcomes import run_sentences
+    from quakedesign.report.paper_study import paper_study
 
     with progress() as tell:
         comparison = designed_comparison(

@@ -273,7 +273,8 @@ def export(
         Print JSON.
     """
     from quakedesign.fault import load_fault
-    from quakedesign.studies.exporting import export_answer, export_lines
+    from quakedesign.report.exporting import export_lines
+    from quakedesign.studies.exporting import export_answer
     from quakedesign.studies.single import chosen_controller
 
     found = load_fault(fault)

@@ -108,7 +108,8 @@ def scale(
     json
         Print JSON.
     """
-    from quakedesign.studies.scaling import scale_answer, scale_lines
+    from quakedesign.report.scaling import scale_lines
+    from quakedesign.studies.scaling import scale_answer
 
     clocks = {None: None, "operation-time": "reference.operation_time", "natural-period": "shear_modulus"}
     answer = scale_answer(source, target, controller, gains, clock=clocks[clock])

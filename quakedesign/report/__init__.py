@@ -1,7 +1,9 @@
 """Figures, tables and pages from designs and runs."""
 
 from quakedesign.arguments import check_arguments
-from quakedesign.studies.comparison import Comparison, Entry, compare, headline
+from quakedesign.report.comparison import Comparison, compare
+from quakedesign.report.headlines import headline
+from quakedesign.studies.comparison import Entry
 
 __all__ = ["Comparison", "Entry", "compare", "headline"]
 

@@ -24,20 +24,20 @@ from quakedesign.report.drawing import (
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Comparison, Entry
+    from quakedesign.studies.comparison import Compared, Entry
 
 _INSET = (0.16, 0.66, 0.82, 0.31)
 _ROOM = 0.9  # for the insets above the data, over the height of the data
 
 
-def grid(comparison: "Comparison") -> tuple[list[str], list[str], dict[tuple[str, str], "Entry"]]:
+def grid(comparison: "Compared") -> tuple[list[str], list[str], dict[tuple[str, str], "Entry"]]:
     """Laws and origins that have a run, in order, and the entry of each pair."""
     found = {(e.design.name, e.origin): e for e, _ in runs_of(comparison.entries)}
     laws = list(dict.fromkeys(name for name, _ in found))
     return laws, [o for o in ORIGINS if any(origin == o for _, origin in found)], found
 
 
-def states(comparison: "Comparison") -> Any:
+def states(comparison: "Compared") -> Any:
     """Slip of all laws in the first row, below it the band of the slip rate of each law.
 
     The rate is on a scale that is linear below the largest reference rate and logarithmic beyond it.
@@ -69,7 +69,7 @@ def states(comparison: "Comparison") -> Any:
     )
 
 
-def _slips(axis: Any, comparison: "Comparison", origin: str, sizes: tuple[float, float]) -> None:
+def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, float]) -> None:
     divisor, size = sizes
     """Curves that lie on each other, each narrower than the one below it."""
     runs = runs_of(comparison.of(origin))
@@ -82,7 +82,7 @@ def _slips(axis: Any, comparison: "Comparison", origin: str, sizes: tuple[float,
     named(axis, f"{origin} gains")
 
 
-def _rate(axis: Any, entry: "Entry", comparison: "Comparison", divisor: float) -> None:
+def _rate(axis: Any, entry: "Entry", comparison: "Compared", divisor: float) -> None:
     run = entry.run
     assert run is not None
     reference, peak = known(run.reference_rate), comparison.uncontrolled.metrics.peak_slip_rate
@@ -120,12 +120,12 @@ def _time_below(column: Any, drawing: Any, unit: str) -> None:
     lowest.tick_params(labelbottom=True)
 
 
-def pressure(comparison: "Comparison", close_ups: "Mapping[str, Trajectory] | None" = None) -> Any:
+def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None" = None) -> Any:
     """Fluid pressure of every run as the band that it fills; with close-ups, each has an inset with every step.
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : Compared
     close_ups : mapping of str to Trajectory, optional
         Short runs by label of the entry.
     """

@@ -23,10 +23,10 @@ from quakedesign.report.drawing import (
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Comparison
+    from quakedesign.studies.comparison import Compared
 
 
-def figures(comparison: "Comparison") -> dict[str, Any]:
+def figures(comparison: "Compared") -> dict[str, Any]:
     """Figures by name: ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``."""
     drawn = {"uncontrolled": uncontrolled(comparison)}
     if runs_of(comparison.entries):
@@ -39,7 +39,7 @@ def figures(comparison: "Comparison") -> dict[str, Any]:
     return drawn
 
 
-def uncontrolled(comparison: "Comparison") -> Any:
+def uncontrolled(comparison: "Compared") -> Any:
     """Slip and slip rate of the natural earthquake, and where the statics let it rest."""
     run, fault = comparison.uncontrolled, comparison.fault
     drawing, ((slip,), (rate,)) = figure(2, 4.2)
@@ -63,7 +63,7 @@ def end(*runs: "Trajectory") -> float:
     return float(min(1.4 * max(settled), min(run.time[-1] for run in runs))) or float(runs[0].time[-1])
 
 
-def errors(comparison: "Comparison") -> Any:
+def errors(comparison: "Compared") -> Any:
     """Size of both tracking errors over time, as envelopes."""
     drawing, ((slip,), (rate,)) = figure(2, 5.2)
     runs = runs_of(comparison.entries)
@@ -89,7 +89,7 @@ _SHOWN = {
 }
 
 
-def metrics(comparison: "Comparison") -> Any:
+def metrics(comparison: "Compared") -> Any:
     """Bars of four metrics in their units."""
     drawing, axes = figure(2, 4.8, columns=2, sharey=True)
     settled = [(e, run) for e, run in runs_of(comparison.entries) if run.metrics.max_slip_error is not None]

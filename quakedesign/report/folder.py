@@ -12,12 +12,12 @@ from quakedesign.certificates.guarantee import Guarantee
 from quakedesign.certificates.guarantee.files import guarantee_text, save_guarantee
 from quakedesign.errors import OutputError
 from quakedesign.output import require_room, whole_folder
+from quakedesign.report.comparison import Comparison
 from quakedesign.report.numbers import csv_text, printed, table
-from quakedesign.studies.comparison import Comparison
 from quakedesign.studies.facts import fault_dict, fault_sentences
 
 if TYPE_CHECKING:
-    from quakedesign.studies.paper_study import PaperStudy
+    from quakedesign.report.paper_study import PaperStudy
 
 _PACKAGES = ("quakedesign", "sympy", "cvxpy", "clarabel", "casadi", "numpy", "scipy", "control", "python-flint")
 

@@ -2,20 +2,15 @@
 
 from collections.abc import Iterable
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premises import Domain, Variant
 from quakedesign.report.linear import held_sentence, peaks_sentence
+from quakedesign.report.outcomes import run_sentences
 from quakedesign.simulation import Trajectory
-from quakedesign.studies.needed_pressure import run_sentences
-
-if TYPE_CHECKING:
-    from quakedesign.studies.comparison import Comparison, Entry
-
-AS_IN_THE_PAPER = "continuous"
-"""Scheme of the paper's simulations."""
+from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, Entry
 
 
 def guarantee_lines(entry: "Entry") -> list[str]:
@@ -105,7 +100,7 @@ FEEDFORWARD_COLUMNS = ("feed-forward", "along_reference", "level_set", "domain |
 """The two premises are ratios required/certified; the gains are the same in every row."""
 
 
-def scheme_sentence(comparison: "Comparison") -> str:
+def scheme_sentence(comparison: "Compared") -> str:
     """How the pressure of the runs was computed."""
     runs: dict[str, list[str]] = {}
     for entry in comparison.entries:

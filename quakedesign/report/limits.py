@@ -10,7 +10,6 @@ import numpy as np
 from quakedesign.bounds import Bound, LowerBound, UpperBound
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.drawing import NATURAL, figure, finish
-from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.studies import Limits
 
 _FORBIDDEN, _PROVED = "#F3C6B2", "#0072B2"
@@ -71,7 +70,7 @@ def limits_figure(found: Limits) -> Any:
     matplotlib.figure.Figure
     """
     drawing, axes = figure(1, 4.2)
-    axis, natural = axes[0, 0], natural_peak(found.fault)
+    axis, natural = axes[0, 0], found.natural_peak
     axis.set(xscale="log", yscale="log", xlabel="T_s [s]", ylabel="slip-rate error [m/s]")
     steps, peaks = np.array([(float(step), float(peak)) for step, peak in found.smallest_peaks()]).reshape(-1, 2).T
     if len(steps):

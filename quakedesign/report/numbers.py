@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Comparison, Entry
+    from quakedesign.studies.comparison import Compared, Entry
 
 BARS = {
     "mise_slip": "MISE of the slip",
@@ -23,7 +23,7 @@ BASIS = "elqr"
 _MADE = ("scheme", "step", "method", "plant")
 
 
-def baseline(comparison: "Comparison") -> "Entry | None":
+def baseline(comparison: "Compared") -> "Entry | None":
     """Entry that numbers are divided by: the published e-LQR, the designed one where there is no other."""
     able = [
         e
@@ -43,12 +43,12 @@ def relative(run: "Trajectory | None", basis: "Trajectory | None") -> dict[str, 
     return found
 
 
-def table(comparison: "Comparison", more: "dict[str, Trajectory] | None" = None) -> list[dict[str, Any]]:
+def table(comparison: "Compared", more: "dict[str, Trajectory] | None" = None) -> list[dict[str, Any]]:
     """One row a run: what it is, its metrics in SI units, the five ratios, and how it was made.
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : Compared
     more : dict of str to Trajectory, optional
         Further runs without a controller, by name.
     """
@@ -80,7 +80,7 @@ def csv_text(rows: list[dict[str, Any]]) -> str:
     return stream.getvalue()
 
 
-def printed(comparison: "Comparison") -> list[dict[str, Any]]:
+def printed(comparison: "Compared") -> list[dict[str, Any]]:
     """Numbers that the paper prints about these runs beside ours, their ratio, and why they differ."""
     data = tomllib.loads((files(__package__) / "printed.toml").read_text(encoding="utf-8"))
     runs: dict[str, Trajectory | None] = {"uncontrolled": comparison.uncontrolled}

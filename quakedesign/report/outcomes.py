@@ -1,12 +1,21 @@
-"""What is said of a run first: what it came to, and the pressure that it took."""
+"""What is said of a run first: outcome, pressure, and whether that was what its task needs."""
 
 from quakedesign.fault import Fault
 from quakedesign.simulation import Trajectory
 from quakedesign.simulation.waiting import waiting
+from quakedesign.studies.needed_pressure import pressure_extremes, shortfall
 
 _NEGLIGIBLE = 1e-6
 """Of the larger end of a range of pressures: a smaller end is said to be zero."""
 OUTCOME_COLUMNS = ("outcome", "peak rate [m/s]", "of natural")
+
+
+def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
+    """Outcome of a run, and of one that is too short when its event would begin; its pressure, and why too little."""
+    extremes = pressure_extremes(run)
+    pressure = pressure_sentence(*extremes) if extremes else None
+    parts = [outcome_sentence(run), waiting_sentence(run, fault), pressure, shortfall(run, fault)]
+    return [part for part in parts if part]
 
 
 def outcome_sentence(run: Trajectory) -> str:
@@ -36,12 +45,6 @@ def outcome_cells(run: Trajectory | None) -> tuple[str, ...]:
     found = run.outcome
     peak = "–" if found.peak_slip_rate is None else f"{found.peak_slip_rate:.2e}"
     return found.kind, peak, "–" if found.share_of_natural is None else _percent(found.share_of_natural)
-
-
-def pressure_extremes(run: Trajectory) -> tuple[float, float] | None:
-    """Least and largest pressure [Pa] of a run; None without a controller, and for one that diverged."""
-    least, largest = run.metrics.min_pressure, run.metrics.max_pressure
-    return None if least is None or largest is None else (least, largest)
 
 
 def pressure_sentence(least: float, largest: float) -> str:

@@ -16,7 +16,7 @@ from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.text import visible
 
 if TYPE_CHECKING:
-    from quakedesign.studies.comparison import Comparison
+    from quakedesign.studies.comparison import Compared
 
 _TABLE = """<table><thead><tr>{% for c in columns %}<th>{{ c }}</th>{% endfor %}</tr></thead><tbody>
 {% for row in rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
@@ -69,17 +69,17 @@ def _shown(value: Any) -> Any:
     return visible(value) if isinstance(value, str) else value
 
 
-def table_html(comparison: "Comparison") -> str:
+def table_html(comparison: "Compared") -> str:
     """Tables of a comparison as HTML."""
     return _environment().from_string(_TABLES).render(**_tables(comparison))
 
 
-def _tables(comparison: "Comparison") -> dict[str, Any]:
+def _tables(comparison: "Compared") -> dict[str, Any]:
     """Columns and rows of both tables."""
     return {"outcomes": (OUTCOMES, outcome_rows(comparison)), "numbers": (COLUMNS, rows(comparison))}
 
 
-def page_html(comparison: "Comparison", facts: Iterable[str], figures: Iterable[str]) -> str:
+def page_html(comparison: "Compared", facts: Iterable[str], figures: Iterable[str]) -> str:
     """Whole report as HTML; figures are expected at ``figures/NAME.png``."""
     return (
         _environment()

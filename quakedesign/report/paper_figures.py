@@ -29,8 +29,8 @@ from quakedesign.report.figures import end, figures
 from quakedesign.report.numbers import BARS, BASIS, baseline, relative
 
 if TYPE_CHECKING:
-    from quakedesign.studies.comparison import Comparison, Entry
-    from quakedesign.studies.paper_study import PaperStudy
+    from quakedesign.studies.comparison import Compared, Entry
+    from quakedesign.studies.paper_study import PaperRuns
 
 PAPER = {
     "friction-law": "fig:mu",
@@ -44,7 +44,7 @@ PAPER = {
 """Label of the figure of the paper, in its source, that each of ours is about."""
 
 
-def paper_figures(study: "PaperStudy") -> dict[str, Any]:
+def paper_figures(study: "PaperRuns") -> dict[str, Any]:
     """Figures of a study by name: those of a comparison, and the paper's (`PAPER`).
 
     Those in closed loop are there if anything ran, the bars if an e-LQR did.
@@ -61,7 +61,7 @@ def paper_figures(study: "PaperStudy") -> dict[str, Any]:
     return drawn
 
 
-def peak_against_tracking(study: "PaperStudy") -> Any:
+def peak_against_tracking(study: "PaperRuns") -> Any:
     """Errors that were seen over the slip-rate error that is guaranteed, one point a design.
 
     Returns
@@ -88,7 +88,7 @@ def peak_against_tracking(study: "PaperStudy") -> Any:
     return finish(drawing, title, [point.run for point in study.front], note)
 
 
-def friction_law(comparison: "Comparison") -> Any:
+def friction_law(comparison: "Compared") -> Any:
     """Friction coefficient against slip, and the slope at which the spring unloads."""
     from quakedesign.simulation.closed_loop import ClosedLoop
 
@@ -108,7 +108,7 @@ def friction_law(comparison: "Comparison") -> Any:
     return finish(drawing, f"{fault.name}: friction law of the simulations", [], "from the law itself, not from a run")
 
 
-def earthquakes(study: "PaperStudy") -> Any:
+def earthquakes(study: "PaperRuns") -> Any:
     """Slip and slip rate of the natural and of the induced earthquake."""
     fault, natural, induced = study.comparison.fault, study.comparison.uncontrolled, study.induced
     drawing, ((slip,), (rate,)) = figure(2, 4.4)
@@ -129,7 +129,7 @@ def earthquakes(study: "PaperStudy") -> Any:
     return finish(drawing, f"{fault.name}: natural and induced earthquake", [natural, induced])
 
 
-def friction_coefficient(comparison: "Comparison") -> Any:
+def friction_coefficient(comparison: "Compared") -> Any:
     """Friction coefficient over time in closed loop; all laws that follow the reference share one curve."""
     drawing, ((axis,),) = figure(1, 3.2)
     runs = runs_of(comparison.entries)
@@ -150,7 +150,7 @@ def friction_coefficient(comparison: "Comparison") -> Any:
     return finish(drawing, title, [run for _, run in runs], with_diverged(comparison.entries), legend=axis)
 
 
-def errors_and_power(comparison: "Comparison") -> Any:
+def errors_and_power(comparison: "Compared") -> Any:
     """Mean squared and largest errors and RMS pressure over those of the e-LQR, in five panels."""
     basis = baseline(comparison)
     assert basis is not None

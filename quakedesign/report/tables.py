@@ -7,7 +7,7 @@ from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Comparison
+    from quakedesign.studies.comparison import Compared
 
 OUTCOMES = ("controller", *OUTCOME_COLUMNS, "verdict")
 COLUMNS = (
@@ -31,13 +31,13 @@ _METRICS = (
 )
 
 
-def outcome_rows(comparison: "Comparison") -> list[tuple[str, ...]]:
+def outcome_rows(comparison: "Compared") -> list[tuple[str, ...]]:
     """One row a run under `OUTCOMES`: outcome, and how far the proof reaches; a dash means not applicable."""
     uncontrolled = ("uncontrolled", *outcome_cells(comparison.uncontrolled), "")
     return [uncontrolled, *((e.label, *outcome_cells(e.run), grade(e)) for e in comparison.entries)]
 
 
-def rows(comparison: "Comparison") -> list[tuple[str, ...]]:
+def rows(comparison: "Compared") -> list[tuple[str, ...]]:
     """One row a controller under `COLUMNS`, narrow enough for 80 columns; a dash means not applicable.
 
     Largest errors, RMS and total variation (path) of the pressure and the share of reverse slip count after a quarter

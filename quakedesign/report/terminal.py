@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
+from quakedesign.report.comparison import Comparison
 from quakedesign.report.grade import GRADES
 from quakedesign.report.headlines import (
     FEEDFORWARD_COLUMNS,
@@ -14,10 +15,9 @@ from quakedesign.report.headlines import (
     headline,
     scheme_sentence,
 )
+from quakedesign.report.outcomes import run_sentences
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
-from quakedesign.studies.comparison import Comparison
 from quakedesign.studies.facts import fault_sentences
-from quakedesign.studies.needed_pressure import run_sentences
 
 if TYPE_CHECKING:
     from quakedesign.certificates.premises import Premise

@@ -1,6 +1,6 @@
 """All controllers of one fault side by side, in closed loop."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
@@ -11,15 +11,18 @@ from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import Variant, certified_lipschitz
 from quakedesign.controllers import SlidingMode, published
 from quakedesign.fault import Fault, require_fault
-from quakedesign.report.headlines import AS_IN_THE_PAPER, headline, said
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate, simulation_scheme
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.synthesis import Design, assess
-from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.analysis.sampling_time import largest_sampling_time, on_trajectory
 from quakedesign.synthesis.guaranteed import CLASSES, Answer, attacked
 from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
 from quakedesign.synthesis.linear.sampled.held import HeldLoop
+
+Tell = Callable[[str, float], None]
+
+AS_IN_THE_PAPER = "continuous"
+"""Scheme of the paper's simulations."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +71,7 @@ class Entry:
         return self.answer.found if self.answer else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Keys of DESIGN.md; exact quantities as texts, measured ones as numbers, SI."""
+        """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None for what a report adds."""
         found = self.design
         return {
             "guarantee": self.guarantee.sentence() if self.guarantee else None,
@@ -80,7 +83,7 @@ class Entry:
             "premises": [p.to_dict() for p in found.premises],
             "domain": found.domain.to_dict() if found.domain else None,
             "feedforward": {v.feedforward.name: v.to_dict() for v in self.variants},
-            "headline": headline(self),
+            "headline": None,
             "largest_sampling_time": self.largest_step,
             "growth_per_step": self.growth_per_step,
             "held": self.held.to_dict() if self.held else None,
@@ -93,8 +96,8 @@ class Entry:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Comparison:
-    """Uncontrolled, published and designed on one fault.
+class Compared:
+    """Uncontrolled, published and designed runs on one fault.
 
     Attributes
     ----------
@@ -112,66 +115,12 @@ class Comparison:
         """Entries of one origin."""
         return tuple(e for e in self.entries if e.origin == origin)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Keys of the command ``design`` in DESIGN.md."""
-        by_origin = {o: {e.design.name: e.to_dict() for e in self.of(o)} for o in ("designed", "published")}
-        return {
-            "controllers": by_origin["designed"],
-            "published": by_origin["published"],
-            "uncontrolled": {
-                "outcome": self.uncontrolled.outcome.to_dict(),
-                "metrics": self.uncontrolled.metrics.to_dict(),
-                "events": dict(self.uncontrolled.events),
-                "run": dict(self.uncontrolled.provenance),
-            },
-        }
 
-    def figures(self) -> dict[str, Any]:
-        """Matplotlib figures by name."""
-        from quakedesign.report.figures import figures
-
-        return figures(self)
-
-    def __repr__(self) -> str:
-        return "\n".join((f"Comparison on {self.fault.name}:", *(f"  {e.label}: {said(e)}" for e in self.entries)))
-
-    def _repr_html_(self) -> str:
-        from quakedesign.report.page import table_html
-
-        return table_html(self)
-
-
-def compare(
-    fault: Fault,
-    designs: Sequence[Design] = (),
-    *,
-    with_published: bool = True,
-    scheme: str | None = None,
-    published_scheme: str | None = None,
-    progress: Callable[[str, float], None] | None = None,
-) -> Comparison:
-    """Run all controllers of a fault over the whole task, step T_s.
-
-    Parameters
-    ----------
-    fault : Fault
-    designs : sequence of Design
-        Designed controllers; one without a controller is reported and not run.
-    with_published : bool
-        Add the paper's gains, where the fault has any, with their verdicts and premises.
-    scheme, published_scheme : str
-        Of the runs of designed and of published gains, see `quakedesign.loop.schemes`; ``continuous``, as in the
-        paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed.
-    progress : callable, optional
-        Called with what is being done and the fraction done [-].
-
-    Returns
-    -------
-    Comparison
-    """
+def compared(
+    fault: Fault, designs: Sequence[Design], tell: Tell, *, with_published: bool = True, schemes: Mapping[str, str]
+) -> Compared:
+    """Runs of all controllers of a fault, as `quakedesign.report.compare` shows them; schemes by origin."""
     require_fault(fault)
-    tell = progress or (lambda _what, _done: None)
-    schemes = {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}
     for name in schemes.values():
         simulation_scheme(name)
     tell("uncontrolled", 0.0)
@@ -184,40 +133,10 @@ def compare(
         entry = _entry("designed", found, schemes, tell)
         tell(f"{entry.label}: worst cases", 0.0)
         entries.append(replace(entry, answer=attacked(fault, found.guarantee)))
-    return Comparison(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
+    return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
 
 
-def designed_comparison(
-    fault: Fault,
-    names: Iterable[str],
-    tell: Callable[[str, float], None],
-    *,
-    linear: Mapping[str, Any] | None = None,
-    **schemes: Any,
-) -> Comparison:
-    """Comparison of a fault's designs of the named laws and the published gains.
-
-    Parameters
-    ----------
-    fault : Fault
-    names : iterable of str
-    tell : callable
-        Progress.
-    linear : mapping, optional
-        ``objective`` and ``continuous`` of an e-LQR.
-    **schemes
-        ``scheme`` and ``published_scheme`` of `compare`.
-    """
-    for name in filter(None, schemes.values()):
-        simulation_scheme(name)
-    designs, wanted = [], list(names)
-    for i, name in enumerate(wanted):
-        tell(f"synthesis and proof of {name}", i / len(wanted))
-        designs.append(synthesise(fault, name, **(linear or {} if name == "elqr" else {})))
-    return compare(fault, designs, progress=tell, **schemes)
-
-
-def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Callable[[str, float], None]) -> Entry:
+def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell) -> Entry:
     sampled = design.controller is not None and design.controller.sampling_time is not None
     scheme = "explicit" if sampled else schemes[origin]
     differ = len(set(schemes.values())) > 1

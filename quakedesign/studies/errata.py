@@ -1,7 +1,7 @@
 """Where the paper cannot be taken literally: every point as a check that computes, found in ``proofs/errata``."""
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
@@ -13,7 +13,6 @@ from typing import Any
 from quakedesign.errors import ParameterError, UnknownNameError
 
 KINDS = ("symbolic identity", "counterexample", "numeric reproduction")
-_HEADER = "| row | printed | correct | check | result |\n|---:|---|---|---|---|"
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,22 +163,3 @@ def _run(row: Row) -> dict[str, Any]:
         "evidence": finding.evidence,
         "seconds": perf_counter() - began,
     }
-
-
-def errata_table(results: Sequence[dict[str, Any]] | None = None) -> str:
-    """Markdown table of results of `run_rows`; runs every row where none are given."""
-    found = run_rows() if results is None else results
-    return "\n".join([_HEADER, *(_line(result) for result in found)]) + "\n"
-
-
-def _line(result: dict[str, Any]) -> str:
-    verdict = "holds" if result["holds"] else "**fails**"
-    row, *texts = (_cell(str(result[key])) for key in ("row", "printed", "correct", "kind", "evidence"))
-    return f"| {row} | {' | '.join(texts[:3])} | {verdict}: {texts[3]} |"
-
-
-def _cell(text: str) -> str:
-    """Text that Markdown shows as it is, in one cell."""
-    for sign in "\\|*_":
-        text = text.replace(sign, f"\\{sign}")
-    return " ".join(text.split())

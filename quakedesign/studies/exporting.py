@@ -1,4 +1,4 @@
-"""A controller as C, and what the command line says about it."""
+"""A controller as C, with what its differentiator needs."""
 
 from pathlib import Path
 from typing import Any
@@ -60,16 +60,3 @@ def export_answer(
         premises.append(differentiator_premise(fault, law, seen, scheme=chosen.name))
     files = [str(folder / name) for name in (HEADER, SOURCE)]
     return found.to_dict() | {"files": files, "premises": [p.to_dict() for p in premises]}
-
-
-def export_lines(answer: dict[str, Any]) -> list[str]:
-    """The same for people."""
-    measured = ", ".join(f"{name} [{unit}]" for name, unit in answer["measurement"].items())
-    lines = [f"written: {', '.join(answer['files'])}", f"every {answer['step']:g} s: {measured} to pressure [Pa]"]
-    lines += [f"  {name}: {value}" for name, value in answer["facts"].items()]
-    lines += [
-        f"premise {p['name']} {'holds' if p['holds'] else 'FAILS'}: required {p['required']:.4g} {p['unit']}, "
-        f"given {p['certified']:.4g} {p['unit']}; {p['note']}"
-        for p in answer["premises"]
-    ]
-    return lines

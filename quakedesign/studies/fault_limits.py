@@ -16,6 +16,7 @@ from quakedesign.certificates.impossibility import (
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
+from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.synthesis.guaranteed import design_held, longest_delay, reached
 
 _ATTEMPTS = 6  # designs for one time
@@ -100,6 +101,11 @@ class Limits:
             "smallest_pressure",
         )
         return {name: getattr(self, name) for name in names}
+
+    @property
+    def natural_peak(self) -> float | None:
+        """Slip rate [m/s] of the natural earthquake, which is simulated; None where there is none."""
+        return natural_peak(self.fault)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; what is proved as decimal texts, rounded outwards."""

@@ -1,23 +1,14 @@
-"""What is said of a run first: outcome, pressure, and whether that was what its task needs."""
+"""The pressure that a task needs at equilibrium, and whether a run had it."""
 
 from quakedesign.bounds import Enclosure
 from quakedesign.certificates.linear_premises import equilibrium_pressure
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.report.outcomes import outcome_sentence, pressure_extremes, pressure_sentence, waiting_sentence
 from quakedesign.simulation import Trajectory
 
 _MARGIN = 0.01
 """Of the range that is needed: what is closer to zero, or to the range, makes no difference."""
-
-
-def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
-    """Outcome of a run, and of one that is too short when its event would begin; its pressure, and why too little."""
-    extremes = pressure_extremes(run)
-    pressure = pressure_sentence(*extremes) if extremes else None
-    parts = [outcome_sentence(run), waiting_sentence(run, fault), pressure, shortfall(run, fault)]
-    return [part for part in parts if part]
 
 
 def needed_pressure(fault: Fault, slip: float | None = None) -> Enclosure | None:
@@ -47,6 +38,12 @@ def need_sentence(needed: Enclosure) -> str:
     taken = f"the task needs {' and '.join(ways(needed))} of fluid" if ways(needed) else "the task needs no fluid"
     ends = f"{needed.low.quantity('Pa')} to {needed.high.quantity('Pa')}"
     return f"pressure at equilibrium along the reference {ends} (p < 0 is withdrawal): {taken}"
+
+
+def pressure_extremes(run: Trajectory) -> tuple[float, float] | None:
+    """Least and largest pressure [Pa] of a run; None without a controller, and for one that diverged."""
+    least, largest = run.metrics.min_pressure, run.metrics.max_pressure
+    return None if least is None or largest is None else (least, largest)
 
 
 def shortfall(run: Trajectory, fault: Fault) -> str | None:

@@ -2,14 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from math import pi
-from typing import Any
 
 from quakedesign.loop import SampledController
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.studies import FrontPoint, objective_front
-from quakedesign.studies.comparison import Comparison
+from quakedesign.studies.comparison import Compared
 
 INDUCING_SHARE = 0.1
 """Constant pressure over σ'_n of the induced earthquake: 5 MPa on the paper's fault at 50 MPa."""
@@ -18,12 +16,12 @@ PERIODS = 16
 
 
 @dataclass(frozen=True, kw_only=True)
-class PaperStudy:
+class PaperRuns:
     """Runs of all figures.
 
     Attributes
     ----------
-    comparison : Comparison
+    comparison : Compared
     induced : Trajectory
         Without control, under a constant pressure of a tenth of the effective normal stress.
     close_ups : mapping of str to Trajectory
@@ -32,34 +30,24 @@ class PaperStudy:
         Peak against tracking, where a law of samples was designed.
     """
 
-    comparison: Comparison
+    comparison: Compared
     induced: Trajectory
     close_ups: Mapping[str, Trajectory]
     front: tuple[FrontPoint, ...] = ()
 
-    def figures(self) -> dict[str, Any]:
-        """Matplotlib figures by name, drawn once."""
-        return self._drawn
 
-    @cached_property
-    def _drawn(self) -> dict[str, Any]:
-        from quakedesign.report.paper_figures import paper_figures
-
-        return paper_figures(self)
-
-
-def paper_study(comparison: Comparison, *, progress: Callable[[str, float], None] | None = None) -> PaperStudy:
+def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] | None = None) -> PaperRuns:
     """Make the short runs that the figures of the paper need beside a comparison.
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : Compared
     progress : callable, optional
         Called with what is being done and the fraction done [-].
 
     Returns
     -------
-    PaperStudy
+    PaperRuns
     """
     tell, fault = progress or (lambda _what, _done: None), comparison.fault
     tell("induced earthquake", 0.0)
@@ -82,4 +70,4 @@ def paper_study(comparison: Comparison, *, progress: Callable[[str, float], None
     tell("peak against tracking", 0.0)
     steps = [law.step for law in laws if isinstance(law, SampledController)]
     front = objective_front(fault, steps[0]) if steps else ()
-    return PaperStudy(comparison=comparison, induced=induced, close_ups=close_ups, front=front)
+    return PaperRuns(comparison=comparison, induced=induced, close_ups=close_ups, front=front)

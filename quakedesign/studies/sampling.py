@@ -10,9 +10,8 @@ from quakedesign.controllers import Controller, SlidingMode, published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells, pressure_extremes
 from quakedesign.simulation import Study, Trajectory, accuracy, gain_sensitivity, noise_sensitivity, simulate
-from quakedesign.simulation.sampling_study import QUANTITIES, SCHEMES
+from quakedesign.simulation.sampling_study import SCHEMES
 from quakedesign.studies.on_trajectory import certified_bound, trajectory_premise
 from quakedesign.synthesis import Design
 
@@ -21,29 +20,6 @@ DECADES = 3
 PERIODS = 650  # of the longest T_s that the runs for the orders take
 SHARE = 1 / 16  # of the task that a run for the sensitivity to noise takes
 UNCERTAIN = "ten-percent"
-_CELLS = {
-    "max_slip_error": (1, ".2e"),
-    "max_slip_rate_error": (1, ".2e"),
-    "rms_pressure": (1e6, ".3g"),
-    "pressure_total_variation": (1e9, ".3g"),
-    "reverse_slip_fraction": (1, ".2f"),
-}
-OUTCOMES = ("law", "scheme", *OUTCOME_COLUMNS, "least p [MPa]", "largest p [MPa]")
-COLUMNS = (
-    "law",
-    "scheme",
-    "slip error [m]",
-    "rate error [m/s]",
-    "RMS p [MPa]",
-    "path p [GPa]",
-    "back slip",
-    "on tra- jectory",
-)
-FOOTNOTE = (
-    "On trajectory: largest |Δh/Δt| over what the certificate covers (λ·L̄); a dash stands for gains without one here. "
-    "Certificates are about continuous time: none covers the errors of a scheme, and the compensated one "
-    "has an estimate in place of the law's integral state."
-)
 Tell = Callable[[str, float], None]
 
 
@@ -89,20 +65,6 @@ class Row:
             "energy_residual": energy.relative_residual if energy else None,
             "run": dict(self.run.provenance),
         }
-
-    def outcome_cells(self) -> tuple[str, ...]:
-        """Texts under `OUTCOMES`; a dash means diverged."""
-        extremes = pressure_extremes(self.run)
-        pressures = (f"{p / 1e6 + 0.0:.3g}" for p in extremes) if extremes else ("–", "–")
-        return (self.label, self.scheme, *outcome_cells(self.run), *pressures)
-
-    def cells(self) -> tuple[str, ...]:
-        """Texts under `COLUMNS`; a dash means not applicable or diverged."""
-        metrics = self.run.metrics
-        values = ((getattr(metrics, name), unit, form) for name, (unit, form) in _CELLS.items())
-        texts = ("–" if value is None else format(value / unit, form) for value, unit, form in values)
-        ratio = self.premise.ratio if self.premise else None
-        return (self.label, self.scheme, *texts, "–" if ratio is None else f"{ratio:.3g}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,32 +211,3 @@ def noise_levels(fault: Fault, of: str) -> tuple[float, ...]:
     task = fault.reference
     first = 1e-8 * task.target_slip if of == "slip_noise" else 1e-2 * task.target_slip / task.operation_time
     return tuple(float(f"{first * 10**k:.2g}") for k in range(5))
-
-
-def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of a study as texts: one row a scheme and quantity, the errors at every level."""
-    head = ("scheme", "error", *(f"{level:.2g}" for level in study.levels))
-    rows = [
-        (scheme, _quantity(name), *(f"{v:.1e}" for v in values))
-        for scheme, found in study.errors.items()
-        for name, values in found.items()
-    ]
-    return head, rows
-
-
-def order_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of the orders as texts: one row a scheme, with exponents and the errors at the longest T_s."""
-    exponents = study.orders()
-    names = list(next(iter(study.errors.values())))
-    head = ("scheme", *(f"order of {QUANTITIES[n][0].removeprefix('max ')}" for n in names), *map(_quantity, names))
-    rows = []
-    for scheme, found in study.errors.items():
-        powers = (exponents[scheme][n] for n in names)
-        largest = (f"{found[n][0]:.1e}" for n in names)
-        rows.append((scheme, *("–" if power is None else f"{power:.2f}" for power in powers), *largest))
-    return head, rows
-
-
-def _quantity(name: str) -> str:
-    label, unit = QUANTITIES[name]
-    return f"{label.removeprefix('max ')} [{unit}]"

@@ -12,7 +12,7 @@ KEYS = ("peak_slip_rate_error", "largest_step", "largest_delay", "largest_diffus
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
-    monkeypatch.setattr("quakedesign.report.limits.natural_peak", lambda _fault: 0.05)
+    monkeypatch.setattr("quakedesign.studies.fault_limits.natural_peak", lambda _fault: 0.05)
     monkeypatch.setattr(
         "quakedesign.studies.fault_limits.design_held", lambda *_, **__: NoGuarantee(reason="none", small_gain=None)
     )

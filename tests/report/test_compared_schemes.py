@@ -14,10 +14,10 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Reference, load_fault
 from quakedesign.report import compare, comparison, headline
 from quakedesign.report.folder import write_folder
+from quakedesign.report.paper_study import paper_study
 from quakedesign.report.tables import outcome_rows, rows
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate
-from quakedesign.studies.paper_study import paper_study
 from quakedesign.synthesis import Design
 
 LAB = load_fault("lab-fault")
@@ -35,7 +35,7 @@ def compared():
     """The published 2-CTA and e-LQR play the designed ones too; held over 2 ms the latter diverges (ERRATA 22)."""
     laws = published("lab-fault")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(comparison, "assess", undecided)
+        patch.setattr("quakedesign.studies.comparison.assess", undecided)
         patch.setattr(comparison, "published", lambda _: {name: laws[name] for name in ("cta", "elqr")})
         designs = [undecided(SHORT, laws[name]) for name in ("cta", "elqr")]
         yield compare(SHORT, designs, scheme="compensated", published_scheme="explicit")
@@ -113,7 +113,7 @@ def test_one_scheme_for_all_stays_out_of_the_labels(compared, monkeypatch):
 
 @pytest.mark.parametrize("wrong", [{"scheme": "magic"}, {"published_scheme": "magic"}])
 def test_an_unknown_scheme_is_refused_before_the_work_begins(wrong, monkeypatch):
-    monkeypatch.setattr(comparison, "natural_earthquake", None)
+    monkeypatch.setattr("quakedesign.studies.comparison.natural_earthquake", None)
     monkeypatch.setattr(comparison, "synthesise", None)
     with pytest.raises(ParameterError, match="scheme must be one of"):
         compare(SHORT, [], **wrong)

@@ -19,8 +19,8 @@ from quakedesign.report.drawing import band, clock, colour, made, scaled
 from quakedesign.report.folder import study_results, write_folder
 from quakedesign.report.numbers import BARS, baseline, csv_text, printed, printed_lines, relative, table
 from quakedesign.report.paper_figures import PAPER, paper_figures
+from quakedesign.report.paper_study import PaperStudy, paper_study
 from quakedesign.simulation import Metrics, natural_earthquake
-from quakedesign.studies.paper_study import PaperStudy, paper_study
 from quakedesign.synthesis import Design
 
 EVERY = 2001

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.report.outcomes import run_sentences
 from quakedesign.simulation import simulate
 from quakedesign.simulation.waiting import waiting
-from quakedesign.studies.needed_pressure import run_sentences
 
 REAL = load_fault("real-fault")
 QUIET = REAL.with_disturbance(Disturbance())

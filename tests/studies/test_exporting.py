@@ -4,7 +4,8 @@ import json
 
 from quakedesign.controllers import published
 from quakedesign.fault import load_fault
-from quakedesign.studies.exporting import export_answer, export_lines
+from quakedesign.report.exporting import export_lines
+from quakedesign.studies.exporting import export_answer
 
 LAB = load_fault("lab-fault")
 LAW = published("lab-fault")["cta"]

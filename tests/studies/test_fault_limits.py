@@ -31,7 +31,7 @@ CLAIMS = Claims(
 
 @pytest.fixture(autouse=True)
 def _natural_peak(monkeypatch):
-    monkeypatch.setattr("quakedesign.report.limits.natural_peak", lambda fault: 0.25)
+    monkeypatch.setattr("quakedesign.studies.fault_limits.natural_peak", lambda fault: 0.25)
 
 
 @pytest.fixture

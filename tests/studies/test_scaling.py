@@ -10,7 +10,8 @@ from quakedesign.certificates.premises import least_authority
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import load_fault
 from quakedesign.rationals import rational
-from quakedesign.studies.scaling import scale_answer, scale_lines
+from quakedesign.report.scaling import scale_lines
+from quakedesign.studies.scaling import scale_answer
 
 LAB, REAL = load_fault("lab-fault"), load_fault("real-fault")
 

@@ -1,4 +1,4 @@
-"""What the command shows of the errata: rows by number, JSON, a table, and an installed package without a checkout."""
+"""What the command shows of the errata: rows by number, JSON, and an installed package without a checkout."""
 
 import json
 import os
@@ -12,14 +12,9 @@ import pytest
 
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.studies import errata
-from quakedesign.studies.errata import Finding, Row, errata_table, find_rows, run_rows
+from quakedesign.studies.errata import Finding, Row, find_rows, run_rows
 
 ROOT = Path(__file__).parent.parent.parent
-
-
-def result(**changes):
-    row = {"row": 7, "printed": "a", "correct": "b", "kind": "counterexample", "holds": True, "evidence": "1 < 2"}
-    return row | {"seconds": 0.1} | changes
 
 
 def test_results_have_the_promised_keys_and_go_into_json():
@@ -39,28 +34,6 @@ def test_an_unknown_row_is_refused_before_anything_runs(wrong, monkeypatch):
     with pytest.raises(UnknownNameError, match=r"whole number from 1 to 29\. Received") as caught:
         run_rows([3, wrong])
     assert "\n" not in str(caught.value)
-
-
-def test_the_table_has_one_line_a_row_and_five_cells_whatever_the_text():
-    text = errata_table([result(printed="|h| ≤ |Gx|", evidence="two\nlines | and *stars*"), result(row=8)])
-    lines = text.splitlines()
-    assert len(lines) == 4
-    assert all(line.replace("\\|", "").count("|") == 6 for line in lines)
-    assert "\\|h\\| ≤ \\|Gx\\|" in lines[2]
-    assert "holds: two lines \\| and \\*stars\\*" in lines[2]
-
-
-def test_the_table_shouts_when_a_check_fails():
-    assert "**fails**: 1 < 2" in errata_table([result(holds=False)])
-    assert "fails" not in errata_table([result()])
-
-
-def test_the_table_of_everything_runs_everything(monkeypatch):
-    rows = tuple(
-        Row(number=n, printed="p", correct="c", kind="counterexample", check=lambda: Finding(True, "1")) for n in (1, 2)
-    )
-    monkeypatch.setattr(errata, "errata_rows", lambda: rows)
-    assert errata_table().count("holds: 1") == 2
 
 
 def test_an_unknown_kind_is_refused():
@@ -121,6 +94,6 @@ def test_the_wheel_is_told_to_carry_the_proofs():
 
 
 def test_the_finder_itself_needs_the_standard_library_only():
-    lines = (ROOT / "quakedesign" / "report" / "errata.py").read_text(encoding="utf-8").splitlines()
+    lines = (ROOT / "quakedesign" / "studies" / "errata.py").read_text(encoding="utf-8").splitlines()
     roots = {line.split()[1].split(".")[0] for line in lines if line.startswith(("import ", "from "))}
     assert roots - {"quakedesign"} <= sys.stdlib_module_names

@@ -1,0 +1,107 @@
+"""Comparisons that show themselves: as JSON, as figures, in a notebook."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from quakedesign.fault import Fault
+from quakedesign.report.figures import figures
+from quakedesign.report.headlines import headline, said
+from quakedesign.report.page import table_html
+from quakedesign.simulation import simulation_scheme
+from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared
+from quakedesign.synthesis import Design
+from quakedesign.synthesis import design as synthesise
+
+
+class Comparison(Compared):
+    """Uncontrolled, published and designed on one fault, see `Compared`."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys of the command ``design`` in DESIGN.md."""
+        by_origin = {
+            o: {e.design.name: e.to_dict() | {"headline": headline(e)} for e in self.of(o)}
+            for o in ("designed", "published")
+        }
+        return {
+            "controllers": by_origin["designed"],
+            "published": by_origin["published"],
+            "uncontrolled": {
+                "outcome": self.uncontrolled.outcome.to_dict(),
+                "metrics": self.uncontrolled.metrics.to_dict(),
+                "events": dict(self.uncontrolled.events),
+                "run": dict(self.uncontrolled.provenance),
+            },
+        }
+
+    def figures(self) -> dict[str, Any]:
+        """Matplotlib figures by name."""
+        return figures(self)
+
+    def __repr__(self) -> str:
+        return "\n".join((f"Comparison on {self.fault.name}:", *(f"  {e.label}: {said(e)}" for e in self.entries)))
+
+    def _repr_html_(self) -> str:
+        return table_html(self)
+
+
+def compare(
+    fault: Fault,
+    designs: Sequence[Design] = (),
+    *,
+    with_published: bool = True,
+    scheme: str | None = None,
+    published_scheme: str | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> Comparison:
+    """Run all controllers of a fault over the whole task, step T_s.
+
+    Parameters
+    ----------
+    fault : Fault
+    designs : sequence of Design
+        Designed controllers; one without a controller is reported and not run.
+    with_published : bool
+        Add the paper's gains, where the fault has any, with their verdicts and premises.
+    scheme, published_scheme : str
+        Of the runs of designed and of published gains, see `quakedesign.loop.schemes`; ``continuous``, as in the
+        paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed.
+    progress : callable, optional
+        Called with what is being done and the fraction done [-].
+
+    Returns
+    -------
+    Comparison
+    """
+    schemes = {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}
+    tell = progress or (lambda _what, _done: None)
+    return Comparison(**vars(compared(fault, designs, tell, with_published=with_published, schemes=schemes)))
+
+
+def designed_comparison(
+    fault: Fault,
+    names: Iterable[str],
+    tell: Callable[[str, float], None],
+    *,
+    linear: Mapping[str, Any] | None = None,
+    **schemes: Any,
+) -> Comparison:
+    """Comparison of a fault's designs of the named laws and the published gains.
+
+    Parameters
+    ----------
+    fault : Fault
+    names : iterable of str
+    tell : callable
+        Progress.
+    linear : mapping, optional
+        ``objective`` and ``continuous`` of an e-LQR.
+    **schemes
+        ``scheme`` and ``published_scheme`` of `compare`.
+    """
+    for name in filter(None, schemes.values()):
+        simulation_scheme(name)
+    designs, wanted = [], list(names)
+    for i, name in enumerate(wanted):
+        tell(f"synthesis and proof of {name}", i / len(wanted))
+        designs.append(synthesise(fault, name, **(linear or {} if name == "elqr" else {})))
+    return compare(fault, designs, progress=tell, **schemes)
