@@ -71,6 +71,10 @@ def test_floats_of_a_sum_of_powers():
     assert list(pulled(terms, np.array([0.0, 1.0]), np.array([0.0, -4.0]))) == pytest.approx([0, 1 - 2 * 16 ** (1 / 3)])
 
 
+def test_a_weight_of_one_forgets_the_estimate():
+    assert compensated(ROOT, F(1), GAIN).update[2] == (-1, -1, 0)
+
+
 @pytest.mark.parametrize(("weight", "gain"), [(F(0), GAIN), (F(2), GAIN), (WEIGHT, F(0))])
 def test_impossible_weights_and_gains_are_refused(weight, gain):
     with pytest.raises(ParameterError, match="compensated step"):

@@ -1,6 +1,7 @@
 """The loop as matrices, against a schedule written out by hand."""
 
 from fractions import Fraction as F
+from random import Random
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from quakedesign.loop import (
     held_loop,
     summed_integrals,
 )
+from quakedesign.loop.held import steady_states
 
 STEP = F(1, 5)
 MODEL = Model(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
@@ -194,3 +196,30 @@ def test_the_estimate_rests_on_the_disturbance_that_its_model_has():
     law = disturbance_estimate((F(4), F(2)), F(2, 5), prediction, MODEL.gain)
     loop = held_loop(law, MODEL, AUTHORITY, STEP)
     assert np.allclose(run_matrices(loop, 80, 0.3)[-1], 0, atol=1e-9)
+
+
+def test_the_longest_delay_is_eight_periods():
+    loop = held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=8 * STEP)
+    assert loop.states == ("e1", "e2", *ESTIMATE.states, *(f"waiting{i}" for i in range(8)), "valve")
+    with pytest.raises(ParameterError, match="delay of 0 to 8 steps"):
+        held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=8 * STEP + F(1, 10**9))
+    assert held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=F(1, 10**9)).segments[0].duration == F(1, 10**9)
+
+
+def images(rows, vector):
+    return tuple(sum(a * b for a, b in zip(row, vector, strict=True)) for row in rows)
+
+
+@pytest.mark.parametrize("rank", [1, 2, 3])
+def test_steady_states_solve_their_equations(rank):
+    """Mz = v and Cz = p, by insertion, for M of any rank; a row that contradicts another leaves none."""
+    random = Random(rank)
+    some = lambda *size: [some(*size[1:]) for _ in range(size[0])] if size else F(random.randint(-9, 9), 4)  # noqa: E731
+    for _ in range(20):
+        basis, output, hidden = some(rank, 3), some(3), some(3)
+        own = [images(zip(*basis, strict=True), weights) for weights in some(3, rank)]
+        *rates, asked = images([*own, output], hidden)
+        found = steady_states(own, output, rates, asked)
+        assert images([*own, output], found) == (*rates, asked)
+        with pytest.raises(ParameterError, match="constant pressure"):
+            steady_states([*own, own[0]], output, [*rates, rates[0] + 1], asked)

@@ -8,9 +8,11 @@ from fractions import Fraction as F
 import control
 import numpy as np
 import pytest
+import sympy as sp
 
 from quakedesign import simulate
 from quakedesign.certificates.guarantee import Guarantee, Held, guarantee, task_of
+from quakedesign.controllers import Signals
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop import Prediction, SampledController, disturbance_estimate
@@ -129,3 +131,20 @@ def test_it_has_no_loop_in_continuous_time():
 def test_it_is_not_made_from_gains_in_order():
     with pytest.raises(UnsupportedError, match="made from its matrices"):
         SampledController.from_values(())
+
+
+def test_its_expressions_are_those_of_the_matrices():
+    """With symbols: what it asks for, the rates by which the scheme adds T_s·z′, and their units."""
+    law = HELD.controller
+    pi, d, e1, e2, x1, x2 = sp.symbols("pi d e1 e2 x1 x2")
+    signals = Signals(slip=x1, slip_rate=x2, slip_error=e1, slip_rate_error=e2, integrals=(pi, d))
+    told = sp.Matrix([pi, d, e1, e2])
+    exact = lambda rows: sp.Matrix(rows).applyfunc(lambda v: sp.Rational(v.numerator, v.denominator))  # noqa: E731
+    asked = (exact([[*LAW.output, *LAW.feedback]]) * told)[0]
+    assert sp.expand(law.pressure(signals) - asked) == 0
+    after = exact([[*own, *fed] for own, fed in zip(LAW.update, LAW.measured, strict=True)]) * told
+    found = sp.Matrix([pi, d]) + sp.Rational(23, 125) * sp.Matrix(law.integral_rates(signals))
+    assert sp.expand(found - after) == sp.zeros(2, 1)
+    assert law.sampling_time == 0.184
+    assert law.integral_units == ("-", "-")
+    assert law.gain_units == {"k1": "Pa/m", "k2": "Pa s/m", "predicted_rate": "Pa", "disturbance": "Pa"}
