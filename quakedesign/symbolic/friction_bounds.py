@@ -1,7 +1,6 @@
 """Bounds and chord slopes of a friction law that proofs may use: what it declares, checked against its expression."""
 
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -14,11 +13,11 @@ from quakedesign.fault import FrictionLaw
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic.intervals import EVERYTHING, Box
 from quakedesign.symbolic.maximum import Excess, Undecided, upper_limit
-from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, off_kinks
+from quakedesign.symbolic.signed_power import SignedPower, slope_off_kinks
 from quakedesign.symbolic.state_plant import without_overflow
 
-SLACK = Fraction(1, 10**9)  # relative; what is declared as a float may be rounded inward by less
-_DIGITS, _ROUNDING = 50, Fraction(1, 10**45)
+SLACK = Fraction(1, 10**9)  # relative; what is declared may be rounded inward by less
+_NOTHING = Fraction(0)
 _UNITS = {"slip": "m", "rate": "m/s"}
 
 
@@ -74,15 +73,15 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
     courses = list(_courses(law, exact))
     low, high = exact.bounds
     found = FrictionBounds(
-        least=-_confirmed(law, courses, "the lower of its bounds", -_outward(low, up=False), lambda c: [-c.friction]),
-        most=_confirmed(law, courses, "the upper of its bounds", _outward(high, up=True), lambda c: [c.friction]),
+        least=-_confirmed(law, courses, "the lower of its bounds", -_declared(low), lambda c: [-c.friction]),
+        most=_confirmed(law, courses, "the upper of its bounds", _declared(high), lambda c: [c.friction]),
         slip_slope=_confirmed(
-            law, courses, "slip_slope", _outward(exact.slip_slope, up=True), lambda c: [c.slip_slope, -c.slip_slope]
+            law, courses, "slip_slope", _declared(exact.slip_slope), lambda c: [c.slip_slope, -c.slip_slope]
         ),
         rate_slope=_confirmed(
-            law, courses, "rate_slope", _outward(exact.rate_slope, up=True), lambda c: [c.rate_slope, -c.rate_slope]
+            law, courses, "rate_slope", _declared(exact.rate_slope), lambda c: [c.rate_slope, -c.rate_slope]
         ),
-        weakens=all(upper_limit(c.slip_slope, c.box, Fraction(0), Fraction(0)) == 0 for c in courses),
+        weakens=all(upper_limit(c.slip_slope, c.box, _NOTHING, _NOTHING) == 0 for c in courses),
     )
     if found.least <= 0:
         raise ParameterError(
@@ -98,18 +97,20 @@ def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_Course]:
     states = sp.symbols([*law.state_names], positive=True)
     low, high = (end if abs(end) == inf else rational(end) for end in law.working_rates)
     box = {slip: (Fraction(0), inf), rate: (max(Fraction(0), low), high)}
-    ends = [[rational(value) for value in law.steady_state(end)] for end in law.working_rates] if states else []
-    box |= {state: (min(pair), max(pair)) for state, *pair in zip(states, *ends, strict=True)} if states else {}
+    ends = [[rational(value) for value in law.steady_state(end)] for end in law.working_rates]
+    box |= {state: (min(pair), max(pair)) for state, *pair in zip(states, *ends, strict=True)}
     friction = _continuous(law, exact.coefficient(slip, rate, *states))
     friction = without_overflow(friction) if states else friction
     changes = exact.state_rates(slip, rate, *states)
-    carried = sum((_slope(friction, x) * dx / rate for x, dx in zip(states, changes, strict=True)), sp.Integer(0))
-    yield _Course(friction, _slope(friction, slip) + sp.expand(carried), _slope(friction, rate), box)
+    carried = sum(
+        (slope_off_kinks(friction, x) * dx / rate for x, dx in zip(states, changes, strict=True)), sp.Integer(0)
+    )
+    yield _Course(friction, slope_off_kinks(friction, slip) + sp.expand(carried), slope_off_kinks(friction, rate), box)
     if not states:
         slip, rate = sp.symbols("slip rate", real=True)
         friction = _continuous(law, exact.extended(slip, rate))
         box = {slip: EVERYTHING, rate: EVERYTHING}
-        yield _Course(friction, _slope(friction, slip), _slope(friction, rate), box)
+        yield _Course(friction, slope_off_kinks(friction, slip), slope_off_kinks(friction, rate), box)
 
 
 def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
@@ -119,11 +120,6 @@ def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
     if signs or found.has(sp.sign, sp.Heaviside, sp.DiracDelta):
         raise UnsupportedError(f"nothing can be proved with {law.name}, whose friction may jump. Write a steep ramp.")
     return found
-
-
-def _slope(friction: sp.Expr, variable: sp.Symbol) -> sp.Expr:
-    with off_kinks() if friction.has(SignedPower, AbsolutePower) else nullcontext():
-        return friction.diff(variable)
 
 
 def _confirmed(
@@ -158,24 +154,15 @@ def _disagreement(law: FrictionLaw, what: str, declared: Fraction, answer: Exces
 
 
 def _undecided(law: FrictionLaw, what: str, declared: Fraction, answer: Undecided) -> str:
-    def told(end: Fraction | float) -> str:
-        return f"{float(min(end, Fraction(10) ** 300)):.3g}" if end < inf else "inf"
-
-    at = ", ".join(f"{x} from {told(low)} to {told(high)}" for x, (low, high) in answer.where.items())
+    at = ", ".join(f"{x} from {float(low):.3g} to {float(high):.3g}" for x, (low, high) in answer.where.items())
     return (
         f"nothing can be proved with {law.name}: {what}, declared as {float(abs(declared)):.6g}, is not confirmed for "
-        f"{at or 'any slip'}. Write the law in another form, or hold the slip with Min."
+        f"{at}. Write the law in another form, or hold the slip with Min."
     )
 
 
-def _outward(value: object, *, up: bool) -> Fraction:
-    """A declared number, rounded outwards where it is irrational."""
+def _declared(value: object) -> Fraction:
     number = sp.sympify(value)
     if number.is_Rational:
         return fraction_of(number)
-    if number.is_Float:
-        return rational(float(number))
-    if not number.is_finite:
-        raise ParameterError(f"bounds and slopes of a friction law must be finite numbers. Received {number}.")
-    near = rational(str(sp.N(number, _DIGITS)))
-    return near + abs(near) * (_ROUNDING if up else -_ROUNDING)
+    return rational(float(number) if number.is_comparable else str(number), "a bound or slope of a friction law")

@@ -25,6 +25,7 @@ EVERYTHING: Interval = (-inf, inf)
 _ZERO, _ONE = Fraction(0), Fraction(1)
 _BITS = 256
 _LONGEST = 3 * _BITS  # bits of a numerator or denominator beyond which an end is rounded
+_LARGEST = 16 * _BITS  # bits of size beyond which an end is rounded to infinity or zero, or away from them
 _RISING: dict[Any, Interval] = {  # with their limits at −inf and inf
     sp.exp: (_ZERO, inf),
     sp.log: EVERYTHING,
@@ -55,7 +56,10 @@ def interval(expression: sp.Expr, box: Box) -> Interval:
 
 
 def regular(expression: sp.Expr, box: Box) -> bool:
-    """Whether an expression has no pole and no end of its domain on a box, so that its derivatives tell how it runs."""
+    """Whether an expression has no pole, no end of its domain and no jump of a signed power on a box.
+
+    Then its derivatives off the kinks tell how it runs; at other jumps derivatives have an impulse.
+    """
     known = _intervals(expression, box)
     ends = [known[node.args[0]] for node in known if _singular_at_zero(node)]
     return all(low > 0 or high < 0 for low, high in ends)
@@ -63,8 +67,8 @@ def regular(expression: sp.Expr, box: Box) -> bool:
 
 def _singular_at_zero(node: Any) -> bool:
     if isinstance(node, sp.Pow | SignedPower | AbsolutePower):
-        return bool(node.args[1] < 0 or not node.args[1].is_Integer) and not node.is_number
-    return isinstance(node, sp.log) and not node.is_number
+        return not (node.args[1].is_Integer and node.args[1] > 0)
+    return isinstance(node, sp.log)
 
 
 def _intervals(expression: sp.Expr, box: Box) -> dict[sp.Basic, Interval]:
@@ -137,9 +141,7 @@ def _product(a: End, b: End) -> End:
 
 
 def _size(a: Interval) -> Interval:
-    if a[0] >= 0 or a[1] <= 0:
-        return a if a[0] >= 0 else negative(a)
-    return _ZERO, max(-a[0], a[1])
+    return max(a[0], -a[1], _ZERO), max(-a[0], a[1])
 
 
 def _reciprocal(a: Interval) -> Interval:
@@ -164,8 +166,8 @@ def _power(base: Interval, exponent: sp.Expr) -> Interval:
 def _root(x: End, exponent: sp.Rational, *, up: bool) -> End:
     from flint import arb, fmpq
 
-    power = arb(fmpq(int(exponent.p), int(exponent.q)))
-    return x if x == 0 or isinstance(x, float) else _end(lambda: arb(fmpq(x.numerator, x.denominator)) ** power, up=up)
+    power = fmpq(int(exponent.p), int(exponent.q))
+    return x if isinstance(x, float) else _end(lambda: arb(fmpq(x.numerator, x.denominator)) ** arb(power), up=up)
 
 
 def _signed_power(x: Interval, exponent: sp.Expr, *, signed: bool) -> Interval:
@@ -182,8 +184,8 @@ def _signed_power(x: Interval, exponent: sp.Expr, *, signed: bool) -> Interval:
 
 def _rising(function: Any, x: Interval) -> Interval:
     """Enclosure by a function that rises."""
-    if function is sp.log and x[0] <= 0:
-        return (-inf, _rise(function, x[1], up=True)) if x[0] == 0 < x[1] else EVERYTHING
+    if function is sp.log and x[0] < 0:
+        return EVERYTHING
     return _rise(function, x[0], up=False), _rise(function, x[1], up=True)
 
 
@@ -191,19 +193,25 @@ def _rise(function: Any, x: End, *, up: bool) -> End:
     from flint import arb, fmpq
 
     if isinstance(x, float):
-        return _RISING[function][x > 0]
+        return _RISING[function][x == inf]
     return _end(lambda: getattr(arb(fmpq(x.numerator, x.denominator)), function.__name__)(), up=up)
 
 
 def _end(evaluate: Callable[[], Any], *, up: bool) -> End:
-    """Upper or lower end of a ball that is evaluated with `_BITS` bits."""
+    """Upper or lower end of a ball that is evaluated with `_BITS` bits, of a size of at most 2 to ± `_LARGEST`."""
     import flint
 
     with flint.ctx.workprec(_BITS):
-        found = evaluate()
-        end = found.upper() if up else found.lower()
-        finite = found.is_finite() and end.is_finite()
-    return fraction_of(end.fmpq()) if finite else (inf if up else -inf)
+        end, large = (evaluate() if up else -evaluate()).upper(), flint.arb(2) ** _LARGEST
+        if not end < large:
+            top: End = inf
+        elif end < -large:
+            top = -(Fraction(2) ** _LARGEST)
+        elif abs(end) * large < 1:
+            top = Fraction(1 if end > 0 else 0, 2**_LARGEST)
+        else:
+            top = fraction_of(end.fmpq())
+    return top if up else -top
 
 
 def _wave(name: str) -> Callable[[list[Interval]], Interval]:
@@ -257,7 +265,7 @@ _OPERATIONS: dict[Any, Callable[[list[Interval]], Interval]] = {
     sp.sin: _wave("sin"),
     sp.cos: _wave("cos"),
     sp.cosh: lambda arguments: _rising(sp.cosh, _size(arguments[0])),
-    sp.Heaviside: lambda arguments: _step(arguments[:1]),
+    sp.Heaviside: _step,
     sp.sign: _sign,
     sp.DiracDelta: _impulse,
 }

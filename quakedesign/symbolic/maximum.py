@@ -10,7 +10,7 @@ from itertools import count
 import sympy as sp
 
 from quakedesign.symbolic.intervals import Box, End, Interval, add, interval, negative, regular, times
-from quakedesign.symbolic.signed_power import SignedPower
+from quakedesign.symbolic.signed_power import SignedPower, slope_off_kinks
 
 PIECES = 600
 FURTHEST = 10**60  # beyond it a half-line is not halved any more
@@ -72,7 +72,7 @@ def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction)
     heap: list[tuple[End, int, Box]] = []
 
     def push(part: Box) -> None:
-        heapq.heappush(heap, (-form.enclosure(part)[1], next(order), part))
+        heapq.heappush(heap, (-form.highest(part), next(order), part))
 
     push({symbol: ends for symbol, ends in box.items() if symbol in form.expression.free_symbols})
     for _ in range(PIECES):
@@ -100,7 +100,10 @@ class _Form:
 
     @cached_property
     def slopes(self) -> dict[sp.Symbol, sp.Expr]:
-        return {x: sp.factor_terms(self.expression.diff(x)) for x in sorted(self.expression.free_symbols, key=str)}
+        return {
+            x: sp.factor_terms(slope_off_kinks(self.expression, x))
+            for x in sorted(self.expression.free_symbols, key=str)
+        }
 
     @cached_property
     def jumps(self) -> bool:
@@ -109,17 +112,17 @@ class _Form:
     def slope(self, symbol: sp.Symbol, box: Box) -> Interval:
         return interval(self.slopes[symbol], box)
 
-    def enclosure(self, box: Box) -> Interval:
-        """The sharper ends of the plain enclosure and, on a bounded box, of the mean-value form."""
-        low, high = interval(self.expression, box)
+    def highest(self, box: Box) -> End:
+        """The lower of the upper ends of the plain enclosure and, on a bounded box, of the mean-value form."""
+        high = interval(self.expression, box)[1]
         if any(isinstance(end, float) for ends in box.values() for end in ends) or not regular(self.expression, box):
-            return low, high
+            return high
         point = {symbol: (x, x) for symbol, x in _centre(box).items()}
         mean = interval(self.expression, point)
         for symbol, ends in box.items():
             if ends[0] != ends[1]:
                 mean = add(mean, times(self.slope(symbol, box), add(ends, negative(point[symbol]))))
-        return max(low, mean[0]), min(high, mean[1])
+        return min(high, mean[1])
 
     def risen(self, box: Box) -> Box:
         """The face of a box on which the expression is largest, as far as the signs of its derivatives tell.
@@ -132,7 +135,7 @@ class _Form:
         for symbol, (low, high) in box.items():
             falls, rises = self.slope(symbol, found)
             end = low if rises <= 0 else high if falls >= 0 else None
-            if end is not None and not isinstance(end, float) and low != high:
+            if end is not None and not isinstance(end, float):
                 inner = _middle((low, high)) if self.jumps else end
                 found[symbol] = (min(inner, end), max(inner, end))
         return found
@@ -140,7 +143,7 @@ class _Form:
     def halves(self, box: Box) -> list[Box]:
         """Both halves of a box, across the side whose halves have the smaller largest enclosure."""
         splits = [list(_halves(box, symbol)) for symbol, (low, high) in box.items() if low != high]
-        return min(splits, key=lambda parts: max(self.enclosure(part)[1] for part in parts), default=[box])
+        return min(splits, key=lambda parts: max(map(self.highest, parts)), default=[box])
 
 
 def _halves(box: Box, symbol: sp.Symbol) -> Iterator[Box]:

@@ -1,7 +1,7 @@
 """Signed powers ⌈x⌋^a = |x|^a sign(x) and absolute powers |x|^a as SymPy functions."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from typing import Any
 
@@ -22,6 +22,12 @@ def off_kinks() -> Iterator[None]:
     finally:
         _ALLOW_KINKS.reset(token)
         clear_cache()  # SymPy remembers derivatives, and must not remember these outside
+
+
+def slope_off_kinks(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
+    """Derivative that holds where no argument of a signed power vanishes."""
+    with off_kinks() if expression.has(_Power) else nullcontext():
+        return expression.diff(variable)
 
 
 class _Power(sp.Function):

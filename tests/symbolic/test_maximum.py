@@ -6,6 +6,7 @@ from math import inf
 import pytest
 import sympy as sp
 
+from quakedesign.symbolic import AbsolutePower, SignedPower, maximum
 from quakedesign.symbolic.maximum import Excess, Undecided, upper_limit
 
 x, y = sp.symbols("x y", real=True)
@@ -21,6 +22,10 @@ REACHED = [
     (x * y - x, {x: (F(-1), F(1)), y: (F(-2), F(2))}, F(3)),
     (sp.Min(x, 1 - x) + y, {x: (F(0), F(1)), y: (F(0), F(1))}, F(3, 2)),
     (sp.Integer(2), {}, F(2)),
+    (SignedPower(x, 0), {x: (F(-3), F(1))}, F(1)),
+    (x + (1 + x**2) * SignedPower(x, 0), {x: (F(-3), F(2))}, F(7)),
+    (AbsolutePower(x, 1) - x**2, {x: (F(-3), F(1, 4))}, F(1, 4)),
+    (SignedPower(x, sp.Rational(1, 2)) - x**2, {x: (F(1, 16), F(1))}, F("0.47247039371058")),  # 3/4^{4/3}, rounded up
 ]
 
 
@@ -53,3 +58,67 @@ def test_a_half_line_without_an_enclosure_is_left_undecided():
     found = upper_limit(sp.sin(x) * x - x, {x: (F(0), inf)}, F(0), F(0))
     assert isinstance(found, Undecided)
     assert found.where[x][1] == inf
+
+
+EXACT = [
+    (x - x**2 / 4, {x: (F(0), F(1))}, F(3, 4)),  # rises
+    (x**2 - x**3 / 3, {x: (F(0), F(1))}, F(2, 3)),  # rises, with a slope of 0 at one end
+    (x**3 / 3 - x**2, {x: (F(0), F(1))}, F(0)),  # falls
+    (x / 50 - x**2 / 100 + y, {x: (F(0), F(1)), y: (F(0), F(1))}, F(101, 100)),  # rises slowly
+    (x**2 / 4 + x, {x: (F(-1), F(0))}, F(0)),
+    (x * (1 - x), {x: (F(0), F(1))}, F(1, 4)),  # at the first point that is tried
+]
+
+
+@pytest.mark.parametrize(("expression", "box", "largest"), EXACT, ids=lambda v: str(v)[:30])
+def test_a_maximum_at_a_corner_is_reached_without_slack(expression, box, largest):
+    assert upper_limit(expression, box, largest, F(0)) == largest
+
+
+def test_a_maximum_along_a_line_within_is_approached_by_slopes():
+    """Of −(x − y)² written out: plain enclosures would need thousands of pieces along the diagonal."""
+    found = upper_limit(2 * x * y - x**2 - y**2, {x: (F(0), F(1)), y: (F(0), F(1))}, F(0), F(1, 500))
+    assert 0 <= found <= F(1, 500)
+
+
+@pytest.mark.parametrize(
+    ("expression", "ends"),
+    [
+        (x * sp.exp(-x), (F(3, 4), inf)),
+        (-x * sp.exp(x), (-inf, F(0))),
+        (-x * sp.exp(x), (-inf, F(-3, 4))),
+        (-(x - 9) * sp.exp(x - 9), (-inf, F(12))),
+        (sp.exp(-1 - sp.Abs(x)), (F(-2), inf)),
+        (sp.Abs(x) * sp.exp(-sp.Abs(x)), (-inf, inf)),
+    ],
+    ids=str,
+)
+def test_half_lines_are_cut_wherever_they_end(expression, ends):
+    slack = F(1, 10**6)
+    assert INVERSE_E <= upper_limit(expression, {x: ends}, INVERSE_E, slack) <= INVERSE_E + slack
+    below = upper_limit(expression, {x: ends}, INVERSE_E - slack, F(0))
+    assert isinstance(below, Excess)
+    assert ends[0] <= below.at[x] <= ends[1]
+
+
+def test_a_maximum_that_is_not_exceeded_by_itself_is_left_undecided(monkeypatch):
+    """Enclosures around 1/3 stay above 1/3 and no value does; what is left holds the place."""
+    monkeypatch.setattr(maximum, "PIECES", 30)
+    found = upper_limit(x * (2 - 3 * x), {x: (F(0), F(1))}, F(1, 3), F(0))
+    assert isinstance(found, Undecided)
+    low, high = found.where[x]
+    assert low - F(1, 100) < F(1, 3) < high + F(1, 100)
+    assert high - low < F(1, 100)
+
+
+def test_half_lines_are_cut_up_to_a_size():
+    found = upper_limit(sp.sin(x) * x - x + y, {x: (F(0), inf), y: (F(0), F(1))}, F(1), F(0))
+    assert isinstance(found, Undecided)
+    assert 10**59 < found.where[x][0] < 10**61
+
+
+def test_a_plain_range_is_cut_where_the_enclosure_falls_most():
+    """Sines of one variable beside a line of another."""
+    expression = sp.sin(x) ** 2 + sp.cos(x) ** 2 + y * (1 - y) / 100
+    found = upper_limit(expression, {x: (F(0), F(3)), y: (F(0), F(1))}, F(401, 400), F(1, 20))
+    assert F(401, 400) <= found <= F(421, 400)
