@@ -1,9 +1,11 @@
 """What acts on the fault besides the spring, the dashpot, friction and the injected fluid."""
 
 from dataclasses import dataclass, fields
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from quakedesign.fault.checks import require_finite, require_nonnegative, require_ordinary
+from quakedesign.rationals import rational
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -59,3 +61,9 @@ class Disturbance:
     def largest_rate(self) -> float:
         """Bound on the time derivative of that part [m/s³]."""
         return self.amplitude * self.frequency
+
+    @property
+    def exact_bounds(self) -> tuple[Fraction, Fraction]:
+        """Both bounds [m/s²] and [m/s³] of the decimals given, for proofs: of floats they may be rounded inward."""
+        amplitude = rational(self.amplitude)
+        return abs(rational(self.constant)) + amplitude, amplitude * rational(self.frequency)

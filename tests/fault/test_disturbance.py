@@ -1,6 +1,7 @@
 """What else acts on the fault."""
 
 import math
+from fractions import Fraction
 from itertools import pairwise
 
 import pytest
@@ -25,6 +26,15 @@ def test_bounds_hold_and_are_reached():
     rates = [abs(b - a) * 500 for a, b in pairwise(samples)]
     assert max(rates) == pytest.approx(FULL.largest_rate, rel=1e-4)
     assert max(rates) <= FULL.largest_rate == 6.0
+
+
+def test_exact_bounds_are_those_of_the_decimals_where_floats_round_inward():
+    """0.1 + 0.7 and 0.7·0.1."""
+    given = Disturbance(constant=-0.1, amplitude=0.7, frequency=0.1)
+    assert given.largest_explicit < 0.8
+    assert given.largest_rate < 0.07
+    assert given.exact_bounds == (Fraction("0.8"), Fraction("0.07"))
+    assert FULL.exact_bounds == (Fraction(5, 2), 6)
 
 
 def test_the_real_fault_feels_what_the_paper_simulates():

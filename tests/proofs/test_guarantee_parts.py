@@ -324,7 +324,7 @@ def test_the_stress_at_rest_turns_where_friction_reaches_a_bound(growth, change,
 
 @pytest.mark.usefixtures("coarse")
 def test_a_law_of_the_state_has_two_inputs_more():
-    """ζ = (0, −1/k4) and η = (−1/k4, k3/k4²), times −k1 and −k2."""
+    """ζ = (0, −1/k4) and η = (−1/k4, k3/k4²), times −k1 and −k2; for a reference without jumps of acceleration."""
     task, read = some_tasks()[1]
     k1, k2, k3, k4 = gains = tuple(map(F, (2, 3, 5, 7)))
     claim = ContinuousPeaks(task=task, law=exact_integrals(gains, of_state=True), claims=some_claims(Random(1)))
@@ -332,3 +332,10 @@ def test_a_law_of_the_state_has_two_inputs_more():
     expected = [[0, 0, k / k4, -k * k3 / k4**2] for k in (k1, k2)]
     assert theirs.inputs[2:] == [list(ours.inputs[name]) for name in FORWARD] == expected
     assert parse_guarantee(guarantee_text(claim)) == claim
+    rough, read = some_tasks()[0]
+    for law in (replace(claim.law, of_reference=(F(1), F(0))), replace(claim.law, of_reference=(F(0), F(1)))):
+        other = replace(claim, task=rough, law=law)
+        with pytest.raises(checker.Refused, match="without acceleration"):
+            checker.read_loop(document_of(other)["loop"], read)
+        with pytest.raises(ParameterError, match="without acceleration"):
+            _ = other.loop

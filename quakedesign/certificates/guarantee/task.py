@@ -255,6 +255,7 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
     """
     fault.require_memoryless("a guarantee")
     law, given, box = friction_bounds(fault.friction), fault.disturbance, fault.box
+    amplitude, change = given.exact_bounds
     if rate_limited and given.constant:
         raise ParameterError(
             "the class rate needs a disturbance that starts at 0. Received a constant one of "
@@ -283,8 +284,8 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
         shape=tuple(fraction_of(sp.Rational(c)) for c in shape),
         target_slip=rational(fault.reference.target_slip),
         operation_time=rational(fault.reference.operation_time),
-        amplitude=rational(given.largest_explicit),
-        change=rational(given.largest_rate) if rate_limited else None,
+        amplitude=amplitude,
+        change=change if rate_limited else None,
         growths=(rational(given.slip_growth), rational(given.rate_growth)),
     )
 
@@ -307,13 +308,13 @@ def _bernstein(shape: tuple[Fraction, ...]) -> list[Fraction]:
 
 
 def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
-    """Coefficients on both halves (de Casteljau)."""
+    """Coefficients on both halves (de Casteljau), on the right one from its end."""
     left, right = [], []
     while row:
         left.append(row[0])
         right.append(row[-1])
         row = [(a + b) / 2 for a, b in pairwise(row)]
-    return left, right[::-1]
+    return left, right
 
 
 def _range_of(shape: tuple[Fraction, ...]) -> Range:

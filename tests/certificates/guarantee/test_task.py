@@ -1,16 +1,19 @@
 """Ranges of the error loop against the package's other derivation and against courses of the friction law itself."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction as F
 
 import numpy as np
 import pytest
 
+from quakedesign.certificates import matched
 from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.linear_premises import rest_pressure, sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
 from quakedesign.fault.friction import friction_law
+from quakedesign.fault.friction.exponential_slip_weakening import ExponentialSlipWeakening
+from quakedesign.symbolic import plant
 
 FAULTS = [("real-fault", None), ("lab-fault", None), ("real-fault", "ten-percent"), ("lab-fault", "ten-percent")]
 
@@ -115,6 +118,44 @@ def test_the_class_rate_needs_a_start_at_zero():
     assert task_of(fault).amplitude == F(2, 10**4)
     with pytest.raises(ParameterError, match="starts at 0"):
         task_of(fault, rate_limited=True)
+
+
+def test_bounds_of_the_disturbance_are_those_of_the_decimals():
+    """3.2e-4·0.69; and 0.1 + 0.7 and 0.7·0.1, which floats make less than 0.8 and 0.07."""
+    fault = load_fault("real-fault")
+    assert (task_of(fault).change, task_of(fault, rate_limited=True).change) == (None, F("2.208e-4"))
+    constant = fault.with_disturbance(Disturbance(constant=-0.1, amplitude=0.7))
+    assert task_of(constant).amplitude == F("0.8")
+    shaken = fault.with_disturbance(Disturbance(amplitude=0.7, frequency=0.1))
+    assert task_of(shaken, rate_limited=True).change == F("0.07")
+    assert matched.known_ranges(constant)[plant.phi] == (F("-0.8"), F("0.8"))
+    assert matched.known_ranges(shaken)[plant.phi_t] == (F("-0.07"), F("0.07"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hardening(ExponentialSlipWeakening):
+    """The exponential law with the drop as a rise: friction grows with slip."""
+
+    def coefficient(self, slip, rate, *state):
+        """Friction coefficient [-] for slip ≥ 0."""
+        return 2 * self.residual + self.drop - super(Hardening, self).coefficient(slip, rate)
+
+    @property
+    def bounds(self):
+        """At rest and after all slip."""
+        return self.residual, self.residual + self.drop
+
+
+def test_friction_that_grows_with_slip_strengthens_by_its_slope():
+    fault = load_fault("real-fault")
+    law = fault.friction
+    rising = Hardening(residual=law.residual, drop=law.drop, critical_slip=law.critical_slip)
+    assert task_of(fault).friction.strengthening == 0
+    slope = F(str(law.drop)) / F(str(law.critical_slip))
+    for one, strengthening in ((law, 0), (rising, slope)):
+        found = task_of(replace(fault, friction=one)).friction
+        assert slope <= found.weakening <= slope * (1 + F(1, 10**8))
+        assert strengthening <= found.strengthening <= strengthening * (1 + F(1, 10**8))
 
 
 def test_friction_with_a_state_is_refused():
