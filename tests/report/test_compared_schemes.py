@@ -36,7 +36,9 @@ def compared():
     laws = published("lab-fault")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("quakedesign.studies.comparison.assess", undecided)
-        patch.setattr(comparison, "published", lambda _: {name: laws[name] for name in ("cta", "elqr")})
+        patch.setattr(
+            "quakedesign.studies.comparison.published", lambda _: {name: laws[name] for name in ("cta", "elqr")}
+        )
         designs = [undecided(SHORT, laws[name]) for name in ("cta", "elqr")]
         yield compare(SHORT, designs, scheme="compensated", published_scheme="explicit")
 
