@@ -736,7 +736,7 @@ def of_class(task: Task, loop: Loop, found: list[list[list[Fraction]]]) -> tuple
         low, high = loop.root.slopes
         own.append(loop.root.remainder)
         shares.append([(high - low) / 2 / loop.step, Fraction(0), Fraction(0)])
-    if not loop.events and len(loop.inputs) == 4:
+    if len(loop.inputs) == 4:
         own += [task.reference_acceleration, task.reference_jerk]
         shares += [[Fraction(0)] * 3] * 2
     table = [
