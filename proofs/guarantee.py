@@ -819,14 +819,14 @@ def verify(document: dict[str, Any]) -> list[str]:
 
 
 def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction], small: Fraction) -> list[str]:
-    """What was verified, in ASCII; bounds on their outer side."""
+    """What was verified, in ASCII; bounds on their outer side, those of the disturbances on their inner one."""
     loop = document["loop"]
     when = "for a pressure that acts at once (continuous time), which no sampled controller has"
     if "step" in loop:
         when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s"
-    kind = f"|phi| <= {upper(task.amplitude)} m/s^2"
+    kind = f"|phi| <= {lower(task.amplitude)} m/s^2"
     if task.change is not None:
-        kind += f", |phi'| <= {upper(task.change)} m/s^3, phi(0) = 0"
+        kind += f", |phi'| <= {lower(task.change)} m/s^3, phi(0) = 0"
     implicit = " and an implicit step" if "root" in loop else ""
     return [
         f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction anything within its "

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.certificates.guarantee import task as package_task
-from quakedesign.certificates.guarantee.files import parse_guarantee
+from quakedesign.certificates.guarantee.files import guarantee_text, is_guarantee, parse_guarantee, read_guarantee
 from quakedesign.errors import CertificateError
 
 PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
@@ -111,6 +111,8 @@ LIMITS = [
      [5, [], *(many(2, "0", "0")["loop"] | {"states": names} for names in (["z", "z"], ["z", "1a"])),
       many(9, "8", "1")["loop"], many(10, "8", "0")["loop"], many(13, "0", "0")["loop"],
       HELD["loop"] | {"root": ROOT}, HELD["loop"] | {"more": "1"}]),
+    (ROOTED, ("loop", "root"), [ROOT], [ROOT | {"more": "1"}, {"pull": [TERM]}, {}, 5, None]),
+    (CONTINUOUS, ("loop",), [CONTINUOUS["loop"]], [CONTINUOUS["loop"] | {"more": "1"}, {"rates": [["0"]]}]),
     (ROOTED, ("loop", "root", "slopes"), [["0", "0"], ["1", "1"], ["0", "1"]],
      [["1/2", "1/4"], ["-1/2", "1"], ["0", "3/2"], ["0", "1", "1"], ["0"], "0"]),
     (ROOTED, ("loop", "root", "remainder"), ["0"], ["-1/2"]),
@@ -174,6 +176,33 @@ def test_files_with_other_keys_or_claims_are_refused(path, value):
         del raw["format"]
     with pytest.raises(checker.Refused, match=r"must have exactly the keys|must be a rational"):
         checker.verify(raw)
+    with pytest.raises(CertificateError):
+        read_guarantee(raw)
+
+
+def test_the_package_reads_this_format_and_kind_alone():
+    assert read_guarantee(HELD).task.name == "a fault"
+    for change in (
+        {"format": 2},
+        {"format": True},
+        {"format": 1.0},
+        {"format": "1"},
+        {"kind": "proof"},
+        {"kind": None},
+    ):
+        with pytest.raises(CertificateError, match="must be"):
+            read_guarantee(HELD | change)
+    assert is_guarantee(HELD)
+    assert is_guarantee({"kind": "guarantee"})
+    assert not any(is_guarantee(raw) for raw in ({"kind": "proof"}, {}, [], "guarantee", None))
+
+
+def test_the_text_of_a_file_has_a_line_for_every_entry_and_no_forward_part_of_zero():
+    for raw in (HELD, ROOTED, CONTINUOUS):
+        text = guarantee_text(read_guarantee(raw))
+        assert json.loads(text) == raw
+        assert text.startswith('{\n "format": 1,\n "kind": "guarantee",\n "fault": {\n  "name": "a fault",\n')
+        assert text.endswith("}\n")
 
 
 @pytest.mark.parametrize(("slip_rate", "holds"), [("1/4", True), ("1/2", False)])
@@ -191,7 +220,8 @@ def test_the_root_must_lie_between_its_lines_for_the_errors_that_are_claimed(sli
             checker.verify(raw)
 
 
-def test_the_statement_has_every_number_on_its_outer_side():
+def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_disturbance_on_the_inner():
+    """What holds for |φ| ≤ 1/3 holds for 0.3333, not for 0.3334."""
     task = checker.read_task(HELD)
     task.s, task.w, task.beta, task.b = (F(-1, 3), F(2, 3)), (F(-2, 3), F(1, 3)), (F(1), F(1, 3)), F(2, 3)
     claims = dict(zip(CLAIMS, (F(1, 3), F(2, 3), F(1, 7), F(-1, 3), F(2, 3)), strict=True))
@@ -201,7 +231,7 @@ def test_the_statement_has_every_number_on_its_outer_side():
         "continued to negative slip rates",
         "s in [-0.3334, 0.6667] 1/s^2, w in [-0.6667, 0.3334] 1/s, beta in [1, 0.3334], b = 0.6667 m^2/kg, derived",
         "law with 1 states, every 1 s, 1/3 s late, lag 2/3 s",
-        "disturbance: |phi| <= 0.3334 m/s^2, |phi'| <= 0.1429 m/s^3, phi(0) = 0; from rest, along the reference, "
+        "disturbance: |phi| <= 0.3333 m/s^2, |phi'| <= 0.1428 m/s^3, phi(0) = 0; from rest, along the reference, "
         "for ever; small gain 0.3334",
         "the slip rate of this fault never exceeds 0.1429 m/s",
         "|slip - reference| <= 0.3334 m, |slip rate - reference's| <= 0.6667 m/s",
@@ -212,7 +242,7 @@ def test_the_statement_has_every_number_on_its_outer_side():
     assert lines[0].startswith("fault gr\\xf6\\xdfe (a name")
     at_once = "for a pressure that acts at once (continuous time), which no sampled controller has"
     assert lines[2] == f"law with 1 states, {at_once}"
-    assert lines[3].startswith("disturbance: |phi| <= 0.3334 m/s^2; from rest")
+    assert lines[3].startswith("disturbance: |phi| <= 0.3333 m/s^2; from rest")
 
 
 def test_zero_has_no_sign():

@@ -161,10 +161,13 @@ class Guarantee:
 
 
 def sentence_of(task: Task, claims: Claims, when: str) -> str:
-    """What is claimed of a task, for people; `when` says how the pressure follows the law."""
-    kind = f"for every disturbance |phi| <= {UpperBound(task.amplitude):.3g} m/s^2"
+    """What is claimed of a task, for people; `when` says how the pressure follows the law.
+
+    Bounds of what is claimed are rounded up, those of the disturbances for which it is claimed down.
+    """
+    kind = f"for every disturbance |phi| <= {LowerBound(task.amplitude):.3g} m/s^2"
     if task.change is not None:
-        kind += f" that starts at 0 and changes by at most {UpperBound(task.change):.3g} m/s^3"
+        kind += f" that starts at 0 and changes by at most {LowerBound(task.change):.3g} m/s^3"
     if not task.amplitude:
         kind = "without disturbance"
     pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"

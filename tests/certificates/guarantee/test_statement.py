@@ -6,9 +6,21 @@ from fractions import Fraction as F
 import pytest
 
 from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates.guarantee import Bounds, Claims, task_of
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee import (
+    Bounds,
+    Claims,
+    Guarantee,
+    Held,
+    NoGuarantee,
+    guarantee,
+    statement,
+    task_of,
+)
 from quakedesign.certificates.guarantee.statement import _above, sentence_of
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
+from quakedesign.loop import ImplicitRoot, Power, compensated, summed_integrals
 
 TASK = task_of(load_fault("real-fault"))
 CLAIMS = Claims(
@@ -18,13 +30,18 @@ CLAIMS = Claims(
     least_pressure=LowerBound(F(-10, 3)),
     largest_pressure=UpperBound(F(20, 3)),
 )
+BOUNDS = Bounds(slip_error=F(0), slip_rate_error=F(1, 7), push=3 * TASK.authority, small_gain=F(1, 2))
+NONE = NoGuarantee(reason="none", small_gain=None)
+HELD = Held(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10))
+SIGN = ImplicitRoot(pull=(Power(factor=(F(1, 3), F(1, 3)), exponent=F(0), argument="slip"),),
+                    slopes=(F(0), F(0)), remainder=F(0))  # fmt: skip
+ROOTED = Held(law=compensated(SIGN, F(1, 2), F(1)), step=F(1))
 NAMES = tuple(Claims.__dataclass_fields__)
 
 
 def test_claims_are_the_bounds_of_the_errors_beside_the_reference_and_the_pressure_at_rest():
-    bounds = Bounds(slip_error=F(1, 3), slip_rate_error=F(1, 7), push=3 * TASK.authority, small_gain=F(1, 2))
-    found = Claims.of(TASK, bounds)
-    assert (found.slip_error, found.slip_rate_error) == (F(1, 3), F(1, 7))
+    found = Claims.of(TASK, BOUNDS)
+    assert (found.slip_error, found.slip_rate_error) == (0, F(1, 7))
     assert found.peak_slip_rate == F(1, 7) + TASK.reference_rates[0]
     assert (found.least_pressure, found.largest_pressure) == (TASK.rest_pressure[0] - 3, TASK.rest_pressure[1] + 3)
 
@@ -58,11 +75,87 @@ def test_four_digits_are_not_below(value, rounded):
         (
             F("0.00032"),
             F("0.0002208"),
-            "|phi| <= 0.00032 m/s^2 that starts at 0 and changes by at most 0.000221 m/s^3, for",
+            "|phi| <= 0.00032 m/s^2 that starts at 0 and changes by at most 0.00022 m/s^3, for",
         ),
+        (F(1, 3), F(2, 3), "|phi| <= 0.333 m/s^2 that starts at 0 and changes by at most 0.666 m/s^3, for"),
         (F(0), None, "held over 1 s, without disturbance, for all friction"),
         (F(0), F(0), "held over 1 s, without disturbance, for all friction"),
     ],
 )
-def test_a_sentence_says_which_disturbances(amplitude, change, said):
+def test_a_sentence_says_which_disturbances_and_none_that_are_larger(amplitude, change, said):
     assert said in sentence_of(replace(TASK, amplitude=amplitude, change=change), CLAIMS, "held over 1 s")
+
+
+def test_claims_are_shown_as_the_exact_numbers():
+    assert CLAIMS.to_dict() == {
+        "slip_error": "1/3", "slip_rate_error": "1/7", "peak_slip_rate": "2/7", "pressure": ["-10/3", "20/3"],
+    }  # fmt: skip
+
+
+def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
+    held = Held(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
+    said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
+    assert said.startswith("from rest, held over 0.1 s, 0.02 s late, through a lag of 0.03 s, for every disturbance")
+    assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith("from rest, held over 0.1 s, for every")
+    assert "never exceeds 0.286 m/s, the slip stays within 0.334 m of the reference" in said
+    assert "the pressure between -3.34 Pa and 6.67 Pa" in said
+
+
+def test_a_law_with_an_implicit_root_has_no_explicit_run():
+    assert (HELD.controller.law, HELD.controller.step) == (HELD.law, F(1, 10))
+    with pytest.raises(UnsupportedError, match="no explicit run"):
+        _ = ROOTED.controller
+
+
+@pytest.mark.parametrize(
+    ("held", "found", "verdict"),
+    [
+        (HELD, BOUNDS, Verdict.PROVED),
+        (HELD, replace(BOUNDS, push=4 * TASK.authority), Verdict.UNDECIDED),
+        (HELD, NONE, Verdict.UNDECIDED),
+        (ROOTED, BOUNDS, Verdict.PROVED),
+        (ROOTED, replace(BOUNDS, push=4 * TASK.authority), Verdict.UNDECIDED),
+    ],
+)
+def test_claims_are_proved_where_the_bounds_give_them_and_the_root_is_as_said(held, found, verdict, monkeypatch):
+    monkeypatch.setattr(statement, "certified_bounds", lambda *_: found)
+    assert Guarantee(task=TASK, held=held, claims=Claims.of(TASK, BOUNDS)).check() is verdict
+
+
+def test_a_root_beyond_its_lines_at_the_claims_is_undecided(monkeypatch):
+    """w = e2 − sign(e1 + w)/3 is 0 for e1 = 0 where |e2| ≤ 1/3."""
+    wide = replace(BOUNDS, slip_rate_error=F(1, 2))
+    monkeypatch.setattr(statement, "certified_bounds", lambda *_: wide)
+    assert Guarantee(task=TASK, held=ROOTED, claims=Claims.of(TASK, wide)).check() is Verdict.UNDECIDED
+    assert Guarantee(task=TASK, held=HELD, claims=Claims.of(TASK, wide)).check() is Verdict.PROVED
+    none = guarantee(TASK, ROOTED)
+    assert isinstance(none, NoGuarantee)
+    assert "leaves its range at errors up to 0 m and 0.501 m/s" in none.reason
+
+
+def test_a_guarantee_claims_the_bounds_a_little_wider_or_has_none(monkeypatch):
+    for held in (HELD, ROOTED):
+        monkeypatch.setattr(statement, "certified_bounds", lambda *_: BOUNDS)
+        claims = Claims.of(TASK, BOUNDS).rounded()
+        assert guarantee(TASK, held) == Guarantee(task=TASK, held=held, claims=claims)
+        monkeypatch.setattr(statement, "certified_bounds", lambda *_: NONE)
+        assert guarantee(TASK, held) is NONE
+
+
+def test_a_loop_that_is_not_seen_to_be_stable_has_no_guarantee(monkeypatch):
+    def refuse(*_):
+        raise ParameterError("not stable.")
+
+    monkeypatch.setattr(statement, "certified_bounds", refuse)
+    found = guarantee(TASK, HELD)
+    assert found.reason == "held over 0.1 s even the nominal loop is not stable, or too slow to be seen so"
+
+
+def test_bounds_are_asked_for_the_loop_and_its_root(monkeypatch):
+    asked = []
+    monkeypatch.setattr(statement, "certified_bounds", lambda *given: asked.append(given) or NONE)
+    late = replace(ROOTED, delay=F(1, 3), lag=F(1, 5))
+    claim = Guarantee(task=TASK, held=late, claims=CLAIMS)
+    assert claim.bounds() is NONE
+    assert asked == [(TASK, claim.loop, SIGN)]
+    assert [segment.duration for segment in claim.loop.segments] == [F(1, 3), F(2, 3)]
