@@ -253,9 +253,11 @@ def test_numbers_of_an_absurd_size_are_refused(rows):
     assert checker.bounded(checker.Fixed([[checker.LARGEST]], checker.LARGEST)).error == checker.LARGEST
 
 
+@pytest.mark.parametrize("bits", [24, 25, 32, 192])
 @pytest.mark.parametrize("time", ["1/2", "1", "3", "40"])
-def test_exponentials_of_matrices_enclose_their_closed_forms(time):
-    """e^{−t}, a rotation by 2t, and the chain 1, t, t²/2."""
+def test_exponentials_of_matrices_enclose_their_closed_forms(time, bits, monkeypatch):
+    """e^{−t}, a rotation by 2t, the chain 1, t, t²/2, and a fast state beside a slow one, in few bits as well."""
+    monkeypatch.setattr(checker, "BITS", bits)
     with mp.workdps(150):
         t = mp.mpf(F(time).numerator) / F(time).denominator
         cases = [
@@ -266,9 +268,9 @@ def test_exponentials_of_matrices_enclose_their_closed_forms(time):
         ]
         for flow, exact in cases:
             found = checker.exponential([list(map(F, line)) for line in flow], F(time))
-            assert found.error < 2**60
+            assert found.error < 2**40
             for line, expected in zip(found.rows, exact, strict=True):
-                assert all(abs(e * UNIT - v) <= found.error for v, e in zip(line, expected, strict=True))
+                assert all(abs(e * 2**bits - v) <= found.error for v, e in zip(line, expected, strict=True))
 
 
 def test_a_flow_that_changes_by_an_absurd_factor_is_refused():
@@ -436,6 +438,34 @@ def test_what_is_left_of_a_past_of_few_units_is_a_small_share_to_the_last_one(en
     assert left * 255 >= total * 256
     assert far * total * 256 <= total * UNIT
     assert total >= sum(entry * F(decay) ** n for n in range(len(found.columns.rows[0])))
+
+
+@pytest.mark.parametrize("bits", [24, 27, 32])
+@pytest.mark.parametrize("sudden", [False, True])
+def test_gains_in_few_bits_are_bounds_of_the_same_sums(bits, sudden, monkeypatch):
+    """Areas of 8σ − σ²/2, or its heights, kept by the jump and halved: what is rounded is rounded outward."""
+    monkeypatch.setattr(checker, "BITS", bits)
+    flow, keep = [list(map(F, line)) for line in chain(3)], [[F(1, 2), F(0), F(0)], [F(0)] * 3, [F(0)] * 3]
+    loop = checker.Loop(flow, [(keep, F(8))], [[F(1), F(0), F(0)]] * 3, [], None, F(8))
+    found = checker.gains(loop, [F(0), F(8), F(-1)], sudden)
+    if sudden:
+        heights = [8 * t - F(t**2, 2) for t in range(9)]
+        sums = [heights[8] + max(heights[i : i + 2]) + F(1, 8) for i in range(8)]
+    else:
+        areas = [4 * t**2 - F(t**3, 6) for t in range(9)]
+        sums = [areas[8] + areas[i + 1] + F(8 - i + 1, 8) for i in range(8)]
+    for line in found:
+        assert all(e <= v <= e * F(1001, 1000) + F(2**31, 2**bits) for v, e in zip(line, sums, strict=True))
+
+
+@pytest.mark.parametrize("bits", [24, 27, 32])
+def test_gains_in_continuous_time_in_few_bits_are_bounds(bits, monkeypatch):
+    """∫ t·e^{−t} dt = 1 and ∫ |1 − t|e^{−t} dt = 2/e."""
+    monkeypatch.setattr(checker, "BITS", bits)
+    flow = [[F(0), F(1)], [F(-1), F(-2)]]
+    found = checker.gains(checker.Loop(flow, [], [[F(1), F(0)], [F(0), F(1)]], [], None, F(0)), [F(0), F(1)], False)
+    for (gain,), exact in zip(found, (1, 2 / np.e), strict=True):
+        assert exact <= gain <= exact * 1.001 + 2.0 ** (20 - bits)
 
 
 # ---------------------------------------------------------------- elimination

@@ -96,7 +96,9 @@ def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     held = Held(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
     said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
     assert said.startswith("from rest, held over 0.1 s, 0.02 s late, through a lag of 0.03 s, for every disturbance")
-    assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith("from rest, held over 0.1 s, for every")
+    prompt = Held(law=HELD.law, step=F(1, 10))
+    assert (prompt.delay, prompt.lag) == (0, 0)
+    assert Guarantee(task=TASK, held=prompt, claims=CLAIMS).sentence().startswith("from rest, held over 0.1 s, for ev")
     assert "never exceeds 0.286 m/s, the slip stays within 0.334 m of the reference" in said
     assert "the pressure between -3.34 Pa and 6.67 Pa" in said
 
