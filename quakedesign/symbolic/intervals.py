@@ -177,8 +177,6 @@ def _signed_power(x: Interval, exponent: sp.Expr, *, signed: bool) -> Interval:
         return _power(_size(x), exponent)
     if x[1] <= 0:
         return negative(_power(negative(x), exponent))
-    if exponent < 0:
-        return EVERYTHING
     return negative(_power((_ZERO, -x[0]), exponent))[0], _power((_ZERO, x[1]), exponent)[1]
 
 

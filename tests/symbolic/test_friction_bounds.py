@@ -169,18 +169,47 @@ def test_constant_friction_counts_everywhere():
         friction_bounds(shape((0.4, 0.45, 0, 0))(lambda s, _: sp.Integer(1))())
 
 
-def test_slow_slip_counts():
-    """Friction that exceeds its bound below 1 m/s only, where the continuation says nothing."""
+@pytest.mark.parametrize("axis", ["slip", "rate"])
+def test_slow_and_short_slip_counts(axis):
+    """Friction that exceeds its bound below 1 m/s or 1 m only, where the continuation says nothing."""
 
-    class Slow(hyperbolic):
+    class Raised(hyperbolic):
         def coefficient(self, slip, rate):
-            return sp.Rational(2, 5) + sp.Max(0, 1 - rate)
+            return sp.Rational(2, 5) + sp.Max(0, 1 - {"slip": slip, "rate": rate}[axis])
 
         def extended(self, slip, rate):
             return sp.Rational(2, 5)
 
-    with pytest.raises(ParameterError, match=r"upper of its bounds .* but at rate .* m/s it is 1\."):
-        friction_bounds(Slow(rate_slope=1.0))
+    with pytest.raises(ParameterError, match=rf"upper of its bounds .* but at {axis} .* it is 1\."):
+        friction_bounds(Raised(rate_slope=1.0))
+
+
+@pytest.mark.parametrize("declared", [0.15, 0.1499])
+def test_a_state_adds_its_own_slope_to_that_of_slip(declared):
+    """Of 0.4 + m/10 + (1/10)/(1 + s), m′ = −v·m with m from 1/4 to 1/2: at most 1/10 + 1/20 per metre, at s = 0."""
+
+    class Remembering(hyperbolic):
+        state_names = ("memory",)
+        state_units = ("",)
+        working_rates = (1.0, 3.0)
+
+        def coefficient(self, slip, rate, memory):
+            return sp.Rational(2, 5) + memory / 10 + 1 / (1 + slip) / 10
+
+        def state_rates(self, slip, rate, memory):
+            return (-rate * memory,)
+
+        def steady_state(self, rate):
+            return (1 / (1 + rate),)
+
+    law = Remembering(high=0.55, low=0.425, slip_slope=declared)
+    if declared < 0.15:
+        with pytest.raises(ParameterError, match="slip_slope of own-law"):
+            friction_bounds(law)
+    else:
+        found = friction_bounds(law)
+        assert (found.least, found.most, found.slip_slope) == (F(17, 40), F(11, 20), F(3, 20))
+        assert found.weakens
 
 
 @pytest.mark.parametrize("name", ["rate-and-state-aging", "rate-and-state-slip"])

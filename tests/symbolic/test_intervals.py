@@ -244,6 +244,7 @@ def test_large_numbers_are_less_than_infinite():
     assert add((-inf, -large), (-large, -large)) == (-inf, -2 * large)
     assert times((large, inf), (-1 / large, large)) == (-inf, inf)
     assert times((1 / large, large), (large, inf)) == (1, inf)
+    assert times((F(0), large), (F(1), inf)) == times((F(1), inf), (F(0), large)) == (0, inf)
     assert negative((-inf, large)) == (-large, inf)
     assert interval(sp.exp(sp.exp(x)), {x: (F(100), F(200))})[1] == inf
     assert interval(-sp.exp(sp.exp(x)), {x: (F(100), F(200))})[0] == -inf
@@ -273,6 +274,7 @@ def test_ends_beyond_a_size_become_infinite_or_zero_or_stay_at_it():
     assert interval(x, {x: (-size, size)}) == (-size, size)
     assert interval(2 * x, {x: (size / 2, 1.0)})[0] == size
     assert interval(x / 2, {x: (F(-2) / size, F(2) / size)}) == (-1 / size, 1 / size)
+    assert interval(x / 2, {x: (F(-3) / size, F(3) / size)}) == (F(-3, 2) / size, F(3, 2) / size)
     assert interval(x / 2, {x: (F(-4) / size, F(4) / size)}) == (-2 / size, 2 / size)
 
 
