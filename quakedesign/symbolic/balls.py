@@ -11,7 +11,8 @@ from typing import Any
 import sympy as sp
 
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.rationals import fraction_of, rational
+from quakedesign.rationals import rational
+from quakedesign.symbolic.intervals import upper_end
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 Box = Mapping[sp.Symbol, tuple[Fraction, Fraction]]
@@ -282,16 +283,8 @@ def _halves(operations: _Operations, box: dict, values: list[Any]) -> list[tuple
 
 
 def _upper(enclosure: Any) -> Any:
-    enclosure = abs(enclosure)
-    if not enclosure.is_finite():
-        return float("inf")
-    top = enclosure.upper().fmpq()
-    return fraction_of(top)
+    return upper_end(abs(enclosure))
 
 
-def _lower(enclosure: Any) -> Fraction:
-    enclosure = abs(enclosure)
-    if not enclosure.is_finite():
-        return Fraction(0)
-    bottom = enclosure.abs_lower().fmpq()
-    return fraction_of(bottom)
+def _lower(enclosure: Any) -> Any:
+    return max(Fraction(0), -upper_end(-abs(enclosure)))

@@ -196,20 +196,26 @@ def _rise(function: Any, x: End, *, up: bool) -> End:
 
 
 def _end(evaluate: Callable[[], Any], *, up: bool) -> End:
-    """Upper or lower end of a ball that is evaluated with `_BITS` bits, of a size of at most 2 to ± `_LARGEST`."""
+    """Upper or lower end of a ball that is evaluated with `_BITS` bits."""
     import flint
 
     with flint.ctx.workprec(_BITS):
-        end, large = (evaluate() if up else -evaluate()).upper(), flint.arb(2) ** _LARGEST
-        if not end < large:
-            top: End = inf
-        elif end < -large:
-            top = -(Fraction(2) ** _LARGEST)
-        elif abs(end) * large < 1:
-            top = Fraction(1 if end > 0 else 0, 2**_LARGEST)
-        else:
-            top = fraction_of(end.fmpq())
-    return top if up else -top
+        return upper_end(evaluate()) if up else -upper_end(-evaluate())
+
+
+def upper_end(ball: Any) -> End:
+    """Rational at or above a ball of python-flint, of a size between 2 to ± `_LARGEST`; zero, or infinite.
+
+    Numbers of any size have balls, but as rationals the largest and the smallest would fill the memory.
+    """
+    end, large = ball.upper(), type(ball)(2) ** _LARGEST
+    if not end < large:
+        return inf
+    if end < -large:
+        return -(Fraction(2) ** _LARGEST)
+    if abs(end) * large < 1:
+        return Fraction(1 if end > 0 else 0, 2**_LARGEST)
+    return fraction_of(end.fmpq())
 
 
 def _wave(name: str) -> Callable[[list[Interval]], Interval]:

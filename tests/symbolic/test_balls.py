@@ -8,7 +8,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quakedesign.errors import UnsupportedError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.symbolic import AbsolutePower, SignedPower
 from quakedesign.symbolic.balls import ball, enclose, upper_bound
 
@@ -332,3 +332,12 @@ def test_the_sign_at_an_end_that_is_zero_exactly_is_any(expression):
 
 def test_the_first_power_is_no_reciprocal():
     assert float(enclose(sp.Pow(x, 1, evaluate=False), {x: (F(4), F(4))})) == 4
+
+
+def test_bounds_beyond_a_size_are_zero_or_none():
+    """Such numbers have balls, but as rationals they would fill the memory."""
+    far = {x: (F(10**6), F(2 * 10**6))}
+    assert upper_bound(sp.exp(-x), far, pieces=3) == F(1, 2**4096)
+    assert upper_bound(1 + sp.exp(-x), far) <= 1 + F(1, 2**50)
+    with pytest.raises(ParameterError, match="no finite bound"):
+        upper_bound(sp.exp(x), far, pieces=3)

@@ -66,6 +66,8 @@ EXACT = [
     (x**3 / 3 - x**2, {x: (F(0), F(1))}, F(0)),  # falls
     (x / 50 - x**2 / 100 + y, {x: (F(0), F(1)), y: (F(0), F(1))}, F(101, 100)),  # rises slowly
     (x**2 / 4 + x, {x: (F(-1), F(0))}, F(0)),
+    (sp.Abs(x) - 2 * sp.sinh(sp.Abs(x)), {x: (F(-2), inf)}, F(0)),  # at the first cut
+    (sp.Abs(x) - 2 * sp.sinh(sp.Abs(x)), {x: (-inf, F(2))}, F(0)),
     (x * (1 - x), {x: (F(0), F(1))}, F(1, 4)),  # at the first point that is tried
 ]
 
