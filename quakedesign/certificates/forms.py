@@ -12,7 +12,6 @@ from fractions import Fraction
 from functools import cache, lru_cache
 from itertools import combinations, count, pairwise, product
 from math import factorial, lcm, prod
-from typing import Any
 
 from flint import arb, fmpq
 
@@ -47,13 +46,13 @@ class Form:
     variables, degree : int
     coefficients : tuple of int
         In the order of `_exponents`.
-    scale : Fraction
+    scale : flint.fmpq
     """
 
     variables: int
     degree: int
     coefficients: tuple[int, ...]
-    scale: Fraction
+    scale: fmpq
 
     @classmethod
     def of(cls, polynomial: Polynomial, variables: int, degree: int, sizes: Sequence[Fraction]) -> "Form":
@@ -64,7 +63,7 @@ class Form:
             values.append(polynomial.get(e, Fraction(0)) * prod(s**k for s, k in zip(sizes, e, strict=True)) * ways)
         common = lcm(*(v.denominator for v in values))
         whole = tuple(int(v * common) for v in values)
-        return cls(variables, degree, whole, Fraction(1, common))
+        return cls(variables, degree, whole, fmpq(1, common))
 
     def bisected(self, edge: Edge) -> "tuple[Form, Form]":
         """Forms on the two halves; the first keeps the first end of the edge."""
@@ -80,18 +79,18 @@ class Form:
         first, second = (Form(self.variables, self.degree, c, scale) for c in halves)
         return first, second
 
-    def least(self) -> Fraction:
+    def least(self) -> fmpq:
         """Lower bound."""
         return min(self.coefficients) * self.scale
 
-    def largest(self) -> Fraction:
+    def largest(self) -> fmpq:
         """Upper bound on the absolute value."""
         return max(abs(c) for c in self.coefficients) * self.scale
 
-    def at_corners(self) -> list[Fraction]:
-        """Values at the corners of the simplex."""
+    def at_corners(self) -> list[float]:
+        """Values at the corners of the simplex, rounded to nearest."""
         places = _corners(self.variables, self.degree)
-        return [self.coefficients[i] * self.scale for i in places]
+        return [float(self.coefficients[i] * self.scale) for i in places]
 
 
 Problem = tuple[tuple[Form, ...], tuple[Fraction, ...]]
@@ -156,17 +155,18 @@ def _bound(forms: Sequence[Form], exponents: Sequence[Fraction]) -> float:
         value = form.largest() if a > 0 else form.least()
         if a < 0 and value <= 0:
             return float("inf")
-        total *= _ball(value) ** _ball(a)
+        total *= arb(value) ** _power(a)
     return float_above(fraction_of(total.upper().fmpq()))
 
 
-def _ball(value: Fraction) -> Any:
+@cache
+def _power(value: Fraction) -> arb:
     return arb(fmpq(value.numerator, value.denominator))
 
 
 def _attained(forms: Sequence[Form], exponents: Sequence[Fraction]) -> float:
     """Largest value at the corners of a piece; only decides when to stop."""
-    values = [[abs(float(v)) for v in f.at_corners()] for f in forms]
+    values = [[abs(v) for v in f.at_corners()] for f in forms]
     return max(
         prod(v[i] ** float(a) if v[i] else 0.0 for v, a in zip(values, exponents, strict=True))
         for i in range(forms[0].variables)

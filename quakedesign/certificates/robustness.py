@@ -142,8 +142,10 @@ def robustness(certificate: Certificate, model: LoopField | None = None) -> Robu
         source = "bisection of the cells"
     except (CertificateError, KinkError):
         kappa = _claimed(certificate)
+        if kappa is None:
+            return None
         largest = [largest_ratio(_against_function(cells, slope, index)) for index in (0, _PUSHED)]
-        found = [None if kappa is None or v is None else v / kappa for v in largest]
+        found = [None if v is None else v / kappa for v in largest]
         source = "claimed decay"
     slip, rate = found
     if slip is None or rate is None:
