@@ -143,15 +143,18 @@ def hull(function, *boxes):
 
 
 def is_hull(found, expected):
-    """Ends are fractions or infinite, not inside of the hull, and at most 1e-40 outside."""
-    assert all(type(end) is F or abs(end) == inf for end in found)
+    """Whether ends are fractions or infinite, not inside of the hull, and at most 1e-40 outside."""
+    return all(type(end) is F or abs(end) == inf for end in found) and all(
+        _is_end(end, other, outer) for end, other, outer in zip(found, expected, (-1, 1), strict=True)
+    )
+
+
+def _is_end(end, other, outer):
+    if isinstance(end, float) or isinstance(other, float):
+        return end == other
     with mpmath.workdps(60):
-        for end, other, outer in zip(found, expected, (-1, 1), strict=True):
-            if isinstance(end, float) or isinstance(other, float):
-                assert end == other
-            else:
-                beyond = outer * (mpmath.mpf(end.numerator) / end.denominator - other)
-                assert -1e-55 * (1 + abs(other)) <= beyond <= 1e-40 * (1 + abs(other))
+        beyond = outer * (mpmath.mpf(end.numerator) / end.denominator - other)
+        return -1e-55 * (1 + abs(other)) <= beyond <= 1e-40 * (1 + abs(other))
 
 
 def signed(exponent):
@@ -185,7 +188,7 @@ FUNCTIONS = {
 @pytest.mark.parametrize("expression", FUNCTIONS, ids=str)
 def test_functions_that_run_one_way_on_each_side_of_zero_have_their_hull(expression):
     for box in BOXES:
-        is_hull(interval(expression, {x: box}), hull(FUNCTIONS[expression], box))
+        assert is_hull(interval(expression, {x: box}), hull(FUNCTIONS[expression], box))
 
 
 @pytest.mark.parametrize(
@@ -205,7 +208,7 @@ def test_pairs_of_intervals_have_their_hull(expression, function):
         expected = hull(function, one, other)
         if expression == x * y + x:
             expected = add(times(one, other), one)
-        is_hull(interval(expression, {x: one, y: other}), expected)
+        assert is_hull(interval(expression, {x: one, y: other}), expected)
 
 
 def test_cube_roots_are_enclosed_to_the_same_digits():
