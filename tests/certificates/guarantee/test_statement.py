@@ -96,15 +96,15 @@ def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     held = Held(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
     said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
     assert said.startswith("from rest, held over 0.1 s, 0.02 s late, through a lag of 0.03 s, for every disturbance")
-    prompt = Held(law=HELD.law, step=F(1, 10))
-    assert (prompt.delay, prompt.lag) == (0, 0)
-    assert Guarantee(task=TASK, held=prompt, claims=CLAIMS).sentence().startswith("from rest, held over 0.1 s, for ev")
+    assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith("from rest, held over 0.1 s, for every")
     assert "never exceeds 0.286 m/s, the slip stays within 0.334 m of the reference" in said
     assert "the pressure between -3.34 Pa and 6.67 Pa" in said
 
 
-def test_a_law_with_an_implicit_root_has_no_explicit_run():
-    assert (HELD.controller.law, HELD.controller.step) == (HELD.law, F(1, 10))
+def test_a_law_runs_once_a_step_without_delay_and_lag_unless_it_has_an_implicit_root():
+    held = Held(law=HELD.law, step=F(1, 10))
+    assert (held.delay, held.lag) == (0, 0)
+    assert (held.controller.law, held.controller.step) == (held.law, F(1, 10))
     with pytest.raises(UnsupportedError, match="no explicit run"):
         _ = ROOTED.controller
 
