@@ -322,8 +322,9 @@ def root_within(root: Root, step: Fraction, slip: Fraction, rate: Fraction) -> b
 class Loop:
     """Flow x' = Ax, then events (map, time until the next one; none in continuous time), inputs, the implicit step.
 
-    The first two inputs flow, the third, if there is an implicit step, enters with the first event. Without events
-    there may be two more, the second and third derivatives of the reference.
+    The first two inputs flow; those of the implicit step and of the noise, if there are any, enter with the first
+    event. `noise` bounds what the measured e1 and e2 are off, an input each where it is not 0. Without events there may
+    be two inputs more, the second and third derivatives of the reference.
     """
 
     flow: list[Row]
@@ -332,21 +333,25 @@ class Loop:
     inputs: list[Row]
     root: Root | None
     step: Fraction
+    noise: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
 
 
 def read_loop(value: Any, task: Task) -> Loop:
     """Build the error loop: e1, e2, the law's states, pressures on their way, valve, with a lag the fault's."""
     if type(value) is dict and "rates" in value:
         return read_continuous(value, task)
-    implicit = type(value) is dict and "root" in value
+    more = [k for k in ("root", "noise") if type(value) is dict and k in value]
     parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
-    given = keys(value, "loop", *parts, *(["root"] if implicit else []))
+    given = keys(value, "loop", *parts, *more)
+    implicit = "root" in more
     root = read_root(given["root"]) if implicit else None
     step, delay, lag = (number(given[k], k) for k in ("step", "delay", "lag"))
     need(step > 0 and 0 <= delay <= MAX_PERIODS * step and lag >= 0, "step > 0, delay of 0 to 8 steps, lag >= 0")
     n = count_states(given["states"])
     update, seen = matrix(given["update"], "update", n, n), matrix(given["measured"], "measured", n, 2 + implicit)
     output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2 + implicit)
+    noise = read_noise(given["noise"]) if "noise" in more else (Fraction(0), Fraction(0))
+    need(implicit or not noise[1] or uses_rate(seen, feedback), "noise of the slip rate needs a law that measures it")
     whole, part = delay // step, delay % step
     waiting = int(whole) + (part > 0)
     size = 2 + n + waiting + (lag > 0) + 1
@@ -384,7 +389,21 @@ def read_loop(value: Any, task: Task) -> Loop:
     events = [([[line[0] - slope * line[size], *line[1:size]] for line in sample], part or step)]
     events += [(arrival, step - part)] if part else []
     inputs = [unit(size)[1], drift, *([[line[size] for line in sample]] if root else [])]
-    return Loop(flow, events, [unit(size)[0], unit(size)[1], push], inputs, root, step)
+    told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
+    inputs += [entry for entry, off in zip(told, noise, strict=True) if off]
+    return Loop(flow, events, [unit(size)[0], unit(size)[1], push], inputs, root, step, noise)
+
+
+def read_noise(value: Any) -> tuple[Fraction, Fraction]:
+    """Bounds of what the measured slip and slip rate are off."""
+    slip, rate = numbers(value, "noise", "slip", "rate").values()
+    need(slip >= 0 and rate >= 0, "bounds of the noise must be >= 0")
+    return slip, rate
+
+
+def uses_rate(measured: list[Row], feedback: Row) -> bool:
+    """Whether a law without an implicit step does anything with the slip rate."""
+    return any(line[1] for line in (*measured, feedback))
 
 
 def read_continuous(value: Any, task: Task) -> Loop:
@@ -715,7 +734,7 @@ def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:
 
 def bounds(task: Task, loop: Loop) -> tuple[Row, Fraction]:
     """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee); the best of both classes."""
-    found = [gains(loop, entry, place == 2) for place, entry in enumerate(loop.inputs)]
+    found = [gains(loop, entry, place > 1) for place, entry in enumerate(loop.inputs)]
     proved, refusals = [], []
     for one in [task] if task.change is None else [task, replace(task, change=None)]:
         try:
@@ -734,9 +753,13 @@ def of_class(task: Task, loop: Loop, found: list[list[list[Fraction]]]) -> tuple
     own, shares = [force, drift], [half, [Fraction(0), coupling, Fraction(0)]]
     if loop.root:
         low, high = loop.root.slopes
-        own.append(loop.root.remainder)
-        shares.append([(high - low) / 2 / loop.step, Fraction(0), Fraction(0)])
-    if len(loop.inputs) == 4:
+        wide = (high - low) / 2 / loop.step
+        own.append(loop.root.remainder + wide * loop.noise[0])
+        shares.append([wide, Fraction(0), Fraction(0)])
+    noise = [off for off in loop.noise if off]
+    own += noise
+    shares += [[Fraction(0)] * 3] * len(noise)
+    if not loop.events and len(loop.inputs) == 4:
         own += [task.reference_acceleration, task.reference_jerk]
         shares += [[Fraction(0)] * 3] * 2
     table = [
@@ -806,7 +829,7 @@ def verify(document: dict[str, Any]) -> list[str]:
     claims = numbers(document["claims"], "claims", *CLAIMS)
     task = read_task(document)
     loop = read_loop(document["loop"], task)
-    errors = claims["slip_error"], claims["slip_rate_error"]
+    errors = [claims[name] + off for name, off in zip(CLAIMS[:2], loop.noise, strict=True)]
     within = loop.root is None or root_within(loop.root, loop.step, *errors)
     need(within, "the root of the implicit step must lie between its lines for all errors that are claimed")
     (slip, rate, push), small = bounds(task, loop)
@@ -828,12 +851,18 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
     if task.change is not None:
         kind += f", |phi'| <= {lower(task.change)} m/s^3, phi(0) = 0"
     implicit = " and an implicit step" if "root" in loop else ""
+    alone = "root" not in loop and not any(line[1] != "0" for line in (*loop["measured"], loop["feedback"]))
+    told = " of the slip alone" if alone else ""
+    off = ""
+    if "noise" in loop:
+        rate = "" if alone else f", slip rate within {loop['noise']['rate']} m/s"
+        off = f", measured slip within {loop['noise']['slip']} m of the true one{rate}"
     return [
         f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction anything within its "
         "bounds and slopes, continued to negative slip rates",
         f"s in [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, w in [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, "
         f"beta in [1, {upper(task.beta[1])}], b = {upper(task.b)} m^2/kg, derived",
-        f"law with {len(loop['states'])} states{implicit}, {when}",
+        f"law with {len(loop['states'])} states{implicit}{told}, {when}{off}",
         f"disturbance: {kind}; from rest, along the reference, for ever; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",
         f"|slip - reference| <= {upper(claims['slip_error'])} m, "

@@ -5,7 +5,18 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import ExactSeconds, Force, Gains, Json, app, new_file, print_json, print_lines
+from quakedesign.cli.shared import (
+    ExactMetres,
+    ExactMetresPerSecond,
+    ExactSeconds,
+    Force,
+    Gains,
+    Json,
+    app,
+    new_file,
+    print_json,
+    print_lines,
+)
 from quakedesign.rationals import rational
 
 
@@ -21,6 +32,9 @@ def guarantee(
     step: ExactSeconds | None = None,
     delay: ExactSeconds = "0",
     lag: ExactSeconds = "0",
+    measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
+    slip_noise: ExactMetres = "0",
+    rate_noise: ExactMetresPerSecond = "0",
     disturbance_class: Annotated[Literal["amplitude", "rate"], Parameter(name="--class")] = "amplitude",
     box: str | None = None,
     out: Path | None = None,
@@ -51,6 +65,12 @@ def guarantee(
         From the measurement to the pressure at the valve.
     lag
         Time constant between the valve and the fault.
+    measured
+        What the designed e-LQR is told: slip-and-rate, or slip, from which it estimates the slip rate.
+    slip_noise
+        Bound of the error of the measured slip, whatever its course, such as '1 um'; q/2 for readings in steps of q.
+    rate_noise
+        The same of the measured slip rate.
     disturbance_class
         amplitude: any disturbance as large as the fault's; rate: one that starts at 0 and is no faster either.
     box
@@ -80,6 +100,9 @@ def guarantee(
         step=None if step is None else rational(step, "step"),
         delay=rational(delay, "delay"),
         lag=rational(lag, "lag"),
+        measured=measured,
+        slip_noise=rational(slip_noise, "slip noise"),
+        rate_noise=rational(rate_noise, "rate noise"),
         disturbance_class=disturbance_class,
     )
     if out is not None and isinstance(found.found, Guarantee):

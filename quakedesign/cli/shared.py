@@ -43,14 +43,18 @@ def _whole(_type: Any, tokens: Sequence[Any]) -> int:
         raise ParameterError(f"{name} must be a whole number. Received {text!r}. Write for example 8.") from None
 
 
-def _exact_seconds(_type: Any, tokens: Sequence[Any]) -> str:
-    """Number as it is written, p/q among them, or that of a text with a unit."""
-    text = tokens[0].value
-    try:
-        rational(text)
-    except ParameterError:
-        return repr(_with_unit(text, "s", "step"))
-    return text
+def _exact_reader(unit: str) -> Callable[[Any, Sequence[Any]], str]:
+    """Converter to a number as it is written, p/q among them, or that of a text with a unit."""
+
+    def read(_type: Any, tokens: Sequence[Any]) -> str:
+        text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
+        try:
+            rational(text)
+        except ParameterError:
+            return repr(_with_unit(text, unit, name))
+        return str(text)
+
+    return read
 
 
 def _with_unit(text: str, unit: str, name: str) -> float:
@@ -70,7 +74,9 @@ Pascals = Annotated[float, Parameter(converter=_reader("Pa"))]
 PascalsPerSecond = Annotated[float, Parameter(converter=_reader("Pa/s"))]
 SquareMetresPerSecond = Annotated[float, Parameter(converter=_reader("m^2/s"))]
 CubicMetresPerPascal = Annotated[float, Parameter(converter=_reader("m^3/Pa"))]
-ExactSeconds = Annotated[str, Parameter(converter=_exact_seconds)]
+ExactSeconds = Annotated[str, Parameter(converter=_exact_reader("s"))]
+ExactMetres = Annotated[str, Parameter(converter=_exact_reader("m"))]
+ExactMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m/s"))]
 Whole = Annotated[int, Parameter(converter=_whole)]
 Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
 

@@ -5,12 +5,22 @@ from quakedesign.loop.compensation import compensated
 from quakedesign.loop.continuous import ContinuousLaw, continuous_loop, exact_integrals
 from quakedesign.loop.held import held_loop
 from quakedesign.loop.implicit_root import ImplicitRoot, Power
-from quakedesign.loop.laws import LinearLaw, Model, Prediction, disturbance_estimate, summed_integrals
+from quakedesign.loop.laws import (
+    NOISES,
+    LinearLaw,
+    Model,
+    Prediction,
+    disturbance_estimate,
+    summed_integrals,
+)
+from quakedesign.loop.observer import ErrorPrediction, slip_observer
 from quakedesign.loop.periodic import PeriodicLoop, Segment
 from quakedesign.loop.running import SampledController
 
 __all__ = [
+    "NOISES",
     "ContinuousLaw",
+    "ErrorPrediction",
     "ImplicitRoot",
     "LinearLaw",
     "Model",
@@ -24,6 +34,7 @@ __all__ = [
     "disturbance_estimate",
     "exact_integrals",
     "held_loop",
+    "slip_observer",
     "summed_integrals",
 ]
 

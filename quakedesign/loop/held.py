@@ -1,9 +1,10 @@
 """A linear law around a fault: sample, hold, delay and lag."""
 
+from collections.abc import Collection
 from fractions import Fraction
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop.laws import LinearLaw, Matrix, Model, Row
+from quakedesign.loop.laws import NOISES, LinearLaw, Matrix, Model, Row
 from quakedesign.loop.periodic import PeriodicLoop, Segment
 
 MOST_PERIODS = 8
@@ -17,6 +18,7 @@ def held_loop(
     *,
     delay: Fraction = Fraction(0),
     lag: Fraction = Fraction(0),
+    noisy: Collection[str] = (),
 ) -> PeriodicLoop:
     """The error loop of a fault about p*, the pressure that holds it at rest at the reference.
 
@@ -27,7 +29,9 @@ def held_loop(
 
     Inputs: ``acceleration`` a in e2' = s·e1 − w·e2 + βb(p − p*) + a [m/s²]; ``drift`` b·dp*/dt [m/s³]. Outputs:
     ``slip_error`` [m], ``slip_rate_error`` [m/s], ``push`` b·(p − p*) [m/s²]. With an implicit root the loop has w =
-    −γe1/T_s with the middle of its slopes, and w + γe1/T_s [m/s] is the sampled input ``root``.
+    −γe1/T_s with the middle of its slopes, and w + γe1/T_s [m/s] is the sampled input ``root``. If asked for, what the
+    measured e1 and e2 are more than the true ones are the sampled inputs ``slip_noise`` [m] and ``rate_noise`` [m/s]:
+    the law does with them what it does with e1 and e2, w included.
 
     Parameters
     ----------
@@ -38,6 +42,8 @@ def held_loop(
         b [m²/kg].
     step, delay, lag : Fraction
         [s]; the delay at most 8 periods.
+    noisy : collection of str
+        Which of ``slip_noise`` and ``rate_noise`` are inputs.
 
     Raises
     ------
@@ -59,6 +65,10 @@ def held_loop(
     sample, arrival = _events(law, authority, n, waiting, valve, part > 0)
     slope = Fraction(0) if law.root is None else law.root.middle / step
     jump = tuple((row[0] - slope * row[n], *row[1:n]) for row in sample)
+    sampled = {} if law.root is None else {"root": tuple(row[n] for row in sample)}
+    for k, name in enumerate(NOISES):
+        if name in noisy:
+            sampled[name] = tuple(row[k] - (i == k) for i, row in enumerate(jump))
     return PeriodicLoop(
         states=names,
         flow=_flow(n, model.slip, model.rate, model.gain / authority, valve, lag),
@@ -75,7 +85,7 @@ def held_loop(
             "slip_rate_error": tuple(Fraction(i == 1) for i in range(n)),
             "push": tuple(Fraction(i >= valve) for i in range(n)),
         },
-        sampled={} if law.root is None else {"root": tuple(row[n] for row in sample)},
+        sampled=sampled,
     )
 
 

@@ -10,6 +10,7 @@ Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
 
 MEASURED = ("slip_error", "slip_rate_error")
+NOISES = ("slip_noise", "rate_noise")
 MOST_STATES = 12
 
 
@@ -50,6 +51,11 @@ class LinearLaw:
     def __post_init__(self) -> None:
         seen = len(MEASURED) + (self.root is not None)
         require_sizes(self.states, self.update, self.measured, self.output, self.feedback, seen)
+
+    @property
+    def of_slip_alone(self) -> bool:
+        """Whether it does without the slip rate."""
+        return self.root is None and not any(row[1] for row in (*self.measured, self.feedback))
 
 
 def require_sizes(
@@ -179,25 +185,52 @@ def disturbance_estimate(
     gain : Fraction
         β·b of the model [m²/kg], positive.
     """
-    if gain <= 0:
-        raise ParameterError(f"the gain of a model must be positive. Received {float(gain):.4g} m²/kg. Check its sign.")
+    require_gain(gain)
     late = len(prediction.ahead_of_pushes)
     size = 4 + late  # rows act on (π, d, p_1 …) and then on (e1, e2)
-    share = weight / sum(prediction.of_pushes)
-    level = _row(size, {0: -share, 1: Fraction(1), size - 1: share})
-    expected = [_row(size, {size - 2: of_slip, size - 1: of_rate}) for of_slip, of_rate in prediction.ahead]
-    for j, added in enumerate(prediction.ahead_of_pushes):
-        push = _sum((gain, _row(size, {2 + j: Fraction(1)})), (Fraction(1), level))
-        expected = [_sum((Fraction(1), row), (v, push)) for row, v in zip(expected, added, strict=True)]
-    asked = _sum((-gains[0], expected[0]), (-gains[1], expected[1]), (-1 / gain, level))
-    pressures = [asked, *(_row(size, {2 + j: Fraction(1)}) for j in range(late))]
-    pushes = [
-        (v, _sum((gain, row), (Fraction(1), level))) for v, row in zip(prediction.of_pushes, pressures, strict=True)
+    share, one = weight / sum(prediction.of_pushes), Fraction(1)
+    level = unit_row(size, {0: -share, 1: one, size - 1: share})
+    errors = unit_row(size, {size - 2: one}), unit_row(size, {size - 1: one})
+    waiting = [unit_row(size, {2 + j: one}) for j in range(late)]
+    asked, pushes = answered(gains, gain, errors, level, waiting, prediction.ahead, prediction.ahead_of_pushes)
+    own = unit_row(size, {size - 2: prediction.of_slip, size - 1: prediction.of_rate})
+    predicted = combined((one, own), *zip(prediction.of_pushes, pushes, strict=True))
+    return law_of_rows(("predicted_rate", "disturbance"), [predicted, level], asked, waiting)
+
+
+def require_gain(gain: Fraction) -> None:
+    """Refuse a model whose pressure does nothing, or the wrong thing."""
+    if gain <= 0:
+        raise ParameterError(f"the gain of a model must be positive. Received {float(gain):.4g} m²/kg. Check its sign.")
+
+
+def answered(
+    gains: tuple[Fraction, Fraction],
+    gain: Fraction,
+    errors: tuple[Row, Row],
+    level: Row,
+    waiting: list[Row],
+    ahead: Matrix,
+    ahead_of_pushes: Matrix,
+) -> tuple[Row, list[Row]]:
+    """The pressure asked for, and βb·p_j + d for it and every one that waits."""
+    one = Fraction(1)
+    before = [combined((gain, row), (one, level)) for row in waiting]
+    expected = [
+        combined(
+            *zip(row, errors, strict=True), *((v[i], push) for v, push in zip(ahead_of_pushes, before, strict=True))
+        )
+        for i, row in enumerate(ahead)
     ]
-    own = _row(size, {size - 2: prediction.of_slip, size - 1: prediction.of_rate})
-    rows = [_sum((Fraction(1), own), *pushes), level, *pressures[:late]]
+    asked = combined((-gains[0], expected[0]), (-gains[1], expected[1]), (-1 / gain, level))
+    return asked, [combined((gain, asked), (one, level)), *before]
+
+
+def law_of_rows(names: tuple[str, ...], own: list[Row], asked: Row, waiting: list[Row]) -> LinearLaw:
+    """Law of rows that act on its states and then on e1 and e2; pressures on their way move one place on."""
+    rows = [*own, *[asked, *waiting][: len(waiting)]]
     return LinearLaw(
-        states=("predicted_rate", "disturbance", *(f"asked_{j + 1}_ago" for j in range(late))),
+        states=(*names, *(f"asked_{j + 1}_ago" for j in range(len(waiting)))),
         update=tuple(row[:-2] for row in rows),
         measured=tuple(row[-2:] for row in rows),
         output=asked[:-2],
@@ -205,10 +238,11 @@ def disturbance_estimate(
     )
 
 
-def _row(size: int, entries: dict[int, Fraction]) -> Row:
+def unit_row(size: int, entries: dict[int, Fraction]) -> Row:
+    """Row of zeros but for these entries."""
     return tuple(entries.get(i, Fraction(0)) for i in range(size))
 
 
-def _sum(*parts: tuple[Fraction, Row]) -> Row:
+def combined(*parts: tuple[Fraction, Row]) -> Row:
     """Combination of rows."""
     return tuple(sum((factor * row[i] for factor, row in parts), Fraction(0)) for i in range(len(parts[0][1])))

@@ -2,6 +2,7 @@
 
 import json
 from fractions import Fraction as F
+from importlib import import_module
 
 import pytest
 
@@ -124,3 +125,49 @@ def test_what_cannot_be_understood_is_one_line(call, arguments, words):
     code, out, err = call(*arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
+
+
+@pytest.fixture
+def unattacked(monkeypatch):
+    """Without the search for the worst, which has tests of its own."""
+    module = import_module("quakedesign.synthesis.guaranteed.answer")  # its function has the same name
+    monkeypatch.setattr(module, "worst_found", lambda *_, **__: None)
+
+
+@pytest.mark.usefixtures("unattacked")
+def test_the_slip_alone_with_noise_and_its_file(call, tmp_path):
+    path = tmp_path / "slip.json"
+    line = ("--measured", "slip", "--slip-noise", "1 um", "--objective", "peak", "--json", "--out", str(path))
+    code, out, _ = call("real-fault", *line)
+    found = json.loads(out)
+    assert (code, found["verdict"]) == (0, "proved")
+    assert (
+        "with the slip alone measured, with any noise of at most 1e-06 m in the measured slip, for"
+        in found["guarantee"]
+    )
+    assert F(found["slip_rate_error"]) <= F(4, 10**4)
+    assert json.loads(path.read_text())["loop"]["noise"] == {"slip": "1/1000000", "rate": "0"}
+    assert check_files([path], "real-fault")[str(path)][0] == "proved"
+
+
+@pytest.mark.usefixtures("unattacked")
+def test_noise_in_given_gains_and_in_a_sliding_mode(call):
+    noise = ("--slip-noise", "1e-6", "--rate-noise", "1/1000000")
+    said = "with any noise of at most 1e-06 m in the measured slip, with any noise of at most 1e-06 m/s in the measured"
+    for more in (("--gains", *GAINS), ("--controller", "cta")):
+        code, out, _ = call("real-fault", *more, *noise)
+        assert (code, said in out) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--slip-noise", "1 s"), "slip noise"),
+        (("--rate-noise", "-1e-6"), "a bound of noise must be 0 or more"),
+        (("--measured", "rate"), "measured"),
+    ],
+)
+def test_noise_that_is_none_is_refused_in_a_line(call, options, said):
+    code, _, err = call("real-fault", *options)
+    assert code == 2
+    assert said in err

@@ -9,6 +9,8 @@ from scipy.linalg import expm
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop import (
+    NOISES,
+    ErrorPrediction,
     ImplicitRoot,
     LinearLaw,
     Model,
@@ -17,6 +19,7 @@ from quakedesign.loop import (
     compensated,
     disturbance_estimate,
     held_loop,
+    slip_observer,
     summed_integrals,
 )
 from quakedesign.loop.held import steady_states
@@ -27,6 +30,12 @@ AUTHORITY = F(2)
 PROPORTIONAL = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(F(-3), F(-2)))
 ESTIMATE = disturbance_estimate(
     (F(4), F(2)), F(2, 5), Prediction(of_slip=F(1, 12), of_rate=F(3, 4), of_pushes=(F(1, 6),)), F(2)
+)
+OBSERVER = slip_observer(
+    (F(4), F(2)),
+    (F("0.9"), F(4), F(2)),
+    ErrorPrediction(of_errors=((F("1.01"), F("0.17")), (F("0.09"), F("0.75"))), of_pushes=((F("0.018"), F("0.17")),)),
+    F(2),
 )
 INTEGRALS = summed_integrals((F(4), F(2), F(1), F(1, 10)), STEP)
 
@@ -45,7 +54,7 @@ def run_matrices(loop, periods, push):
     return np.array(found)
 
 
-def run_by_hand(law, periods, push, delay, lag, step=float(STEP), fine=4000):
+def run_by_hand(law, periods, push, delay, lag, step=float(STEP), fine=4000, noise=None):
     """The same by small Euler–midpoint steps and a list of times at which pressures arrive."""
     s, w, gain = float(MODEL.slip), float(MODEL.rate), float(MODEL.gain)
     c, d = np.array(law.output, float), np.array(law.feedback, float)
@@ -53,8 +62,9 @@ def run_by_hand(law, periods, push, delay, lag, step=float(STEP), fine=4000):
     e, z, valve, fault, arrivals, found = np.zeros(2), np.zeros(len(c)), 0.0, 0.0, [], []
     h = step / fine
     for k in range(periods):
-        asked = c @ z + d @ e
-        z = f @ z + g @ e
+        told = e if noise is None else e + noise[k]
+        asked = c @ z + d @ told
+        z = f @ z + g @ told
         arrivals.append((k * fine + round(delay / h), asked))
         for i in range(k * fine, (k + 1) * fine):
             while arrivals and arrivals[0][0] <= i:
@@ -68,7 +78,9 @@ def run_by_hand(law, periods, push, delay, lag, step=float(STEP), fine=4000):
     return np.array(found)
 
 
-@pytest.mark.parametrize("law", [PROPORTIONAL, ESTIMATE, INTEGRALS], ids=["proportional", "estimate", "integrals"])
+@pytest.mark.parametrize(
+    "law", [PROPORTIONAL, ESTIMATE, INTEGRALS, OBSERVER], ids=["proportional", "estimate", "integrals", "observer"]
+)
 @pytest.mark.parametrize(("delay", "lag"), [("0", "0"), ("1/5", "0"), ("3/20", "0"), ("27/100", "1/10"), ("0", "1/4")])
 def test_matrices_do_what_the_schedule_says(law, delay, lag):
     with_integral = law if law.states else INTEGRALS
@@ -91,13 +103,14 @@ def test_a_step_of_p_star_is_a_jump_of_the_states_by_their_steady_values(law, de
     assert np.allclose(found, run_by_hand(law, 8, -float(MODEL.gain), float(F(delay)), 0.0), rtol=1e-5, atol=1e-8)
 
 
-def run_implicit(law, periods, push, delay, ends, fine=2000):
+def run_implicit(law, periods, push, delay, ends, noise, fine=2000):
     """By hand with y = (e1, e2, w), w by a rule of e1, e2 and the number of the sample."""
     s, w, gain, step = float(MODEL.slip), float(MODEL.rate), float(MODEL.gain), float(STEP)
     c, d, f, g = (np.array(v, float) for v in (law.output, law.feedback, law.update, law.measured))
     e, z, valve, arrivals, found, h = np.zeros(2), np.zeros(len(c)), 0.0, [], [], step / fine
     for k in range(periods):
-        y = np.array([*e, ends(e, k)])
+        told = e + noise[k]
+        y = np.array([*told, ends(told, k)])
         arrivals.append((k * fine + round(delay / h), c @ z + d @ y))
         z = f @ z + g @ y
         for i in range(k * fine, (k + 1) * fine):
@@ -109,27 +122,55 @@ def run_implicit(law, periods, push, delay, ends, fine=2000):
     return np.array(found)
 
 
+@pytest.mark.parametrize("law", [ESTIMATE, OBSERVER], ids=["estimate", "observer"])
+@pytest.mark.parametrize(("delay", "lag"), [("0", "0"), ("1/5", "0"), ("3/20", "0"), ("27/100", "1/10")])
+def test_what_is_measured_may_be_off(law, delay, lag):
+    """The law is told e + n: by hand, and by two sampled inputs."""
+    random = np.random.default_rng(5)
+    noise = random.standard_normal((6, 2))
+    loop = held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag), noisy=NOISES)
+    assert tuple(loop.sampled) == NOISES
+    flow, heard = np.array(loop.flow, float), np.array([loop.sampled[name] for name in NOISES], float)
+    state, found = np.zeros(len(flow)), []
+    for off in noise:
+        for number, segment in enumerate(loop.segments):
+            state = np.array(segment.jump, float) @ state + (off @ heard if number == 0 else 0)
+            state = expm(flow * float(segment.duration)) @ state
+        found.append(state[:2])
+    by_hand = run_by_hand(law, 6, 0.0, float(F(delay)), float(F(lag)), noise=noise)
+    assert np.allclose(found, by_hand, rtol=1e-5, atol=1e-7)
+
+
+def test_only_the_noise_that_is_asked_for_is_an_input():
+    loop = held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, noisy=("rate_noise",))
+    assert tuple(loop.sampled) == ("rate_noise",)
+    assert held_loop(ESTIMATE, MODEL, AUTHORITY, STEP).sampled == {}
+
+
 ROOT = ImplicitRoot(
     pull=(Power(factor=(F(1), F(1)), exponent=F(0), argument="slip"),), slopes=(F("0.8"), F(1)), remainder=F(1, 10)
 )
 
 
 @pytest.mark.parametrize("delay", ["0", "1/5", "3/20", "27/100"])
-def test_the_end_of_an_implicit_step_is_a_line_and_a_sampled_input(delay):
-    """w = −0.9·e1/T_s + v_k with any v_k: by matrices and by hand."""
+@pytest.mark.parametrize("noisy", [(), NOISES], ids=["quiet", "noisy"])
+def test_the_end_of_an_implicit_step_is_a_line_and_a_sampled_input(delay, noisy):
+    """w = −0.9(e1 + n1)/T_s + v_k with any v_k, e2 + n2 measured: by matrices and by hand."""
     law, random = compensated(ROOT, F(2, 5), F(1, 4)), np.random.default_rng(4)
-    kicks, slope = random.standard_normal(6), 0.9 / float(STEP)
-    loop = held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay))
+    kicks, slope, noise = random.standard_normal(6), 0.9 / float(STEP), random.standard_normal((6, 2)) * len(noisy)
+    loop = held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay), noisy=noisy)
+    heard = np.array([loop.sampled[name] for name in noisy], float).reshape(len(noisy), len(loop.flow))
     flow, entry = np.array(loop.flow, float), np.array(loop.sampled["root"], float)
     whole = np.zeros((len(flow) + 1, len(flow) + 1))
     whole[:-1, :-1], whole[:-1, -1] = flow, 0.3 * np.array(loop.inputs["acceleration"], float)
     state, found = np.r_[np.zeros(len(flow)), 1.0], []
-    for kick in kicks:
+    for kick, off in zip(kicks, noise, strict=True):
         for number, segment in enumerate(loop.segments):
-            state[:-1] = np.array(segment.jump, float) @ state[:-1] + (kick * entry if number == 0 else 0)
+            sudden = kick * entry + off[: len(noisy)] @ heard
+            state[:-1] = np.array(segment.jump, float) @ state[:-1] + (sudden if number == 0 else 0)
             state = expm(whole * float(segment.duration)) @ state
         found.append(state[:2].copy())
-    by_hand = run_implicit(law, 6, 0.3, float(F(delay)), lambda e, k: -slope * e[0] + kicks[k])
+    by_hand = run_implicit(law, 6, 0.3, float(F(delay)), lambda e, k: -slope * e[0] + kicks[k], noise)
     assert np.allclose(found, by_hand, rtol=1e-5, atol=1e-7)
 
 

@@ -27,6 +27,7 @@ from quakedesign.certificates.guarantee.task import Friction
 from quakedesign.certificates.guarantee.theorem import bounds_from, certified_bounds, channels_of
 from quakedesign.errors import ParameterError
 from quakedesign.loop import (
+    NOISES,
     ContinuousLaw,
     ImplicitRoot,
     LinearLaw,
@@ -124,7 +125,10 @@ def some_held(random):
         root=root,
     )
     delay = step * random.choice([F(0), F(0), F(1, 3), F(1), F(5, 2), F(8)])
-    return Held(law=law, step=step, delay=delay, lag=random.choice([F(0), F(1, 3)]))
+    noise = {f"{name}_noise": random.choice([F(0), some(random, 0, 9, 4)]) for name in ("slip", "rate")}
+    if law.of_slip_alone:
+        noise["rate_noise"] = F(0)
+    return Held(law=law, step=step, delay=delay, lag=random.choice([F(0), F(1, 3)]), **noise)
 
 
 def some_continuous(random):
@@ -220,6 +224,7 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             entries = [ours.inputs["acceleration"], ours.inputs["drift"], *ours.sampled.values()]
             assert theirs.inputs == list(map(list, entries))
             assert (theirs.step, theirs.root is None) == (ours.period, held.law.root is None)
+            assert theirs.noise == (held.slip_noise, held.rate_noise)
             assert len(ours.states) == len(set(ours.states)) == len(ours.flow)
             if theirs.root:
                 given = plain(held.law.root.pull), list(held.law.root.slopes), held.law.root.remainder
@@ -252,17 +257,22 @@ def test_both_build_the_same_loop_in_continuous_time():
 
 
 FORWARD = ("reference_acceleration", "reference_jerk")
+HEARD = (NOISES, NOISES[:1], NOISES[1:], ("root", *NOISES), ("root", "slip_noise"))
 
 
 @pytest.mark.usefixtures("coarse")
-@pytest.mark.parametrize(("more", "held"), [((), True), (("root",), True), (FORWARD, False), ((), False)])
+@pytest.mark.parametrize(
+    ("more", "held"),
+    [((), True), (("root",), True), (FORWARD, False), ((), False), *((more, True) for more in HEARD)],
+)
 def test_both_draw_the_same_bounds_from_the_same_gains(more, held, monkeypatch):
     """Three parts of a period, of which another one is the worst for every output; the better of both classes."""
     random, proved, entered = Random(4), 0, []
     names, parts = ("acceleration", "drift", *more), 3 if held else 1
     for i in range(8):
         (task, read), step = some_tasks()[1 if more == FORWARD else i % 4], some(random, 1, 9, 4)
-        root = some_root(random) if more == ("root",) else None
+        root = some_root(random) if "root" in more else None
+        noise = {name: some(random, 1, 9, 4) for name in more if name in NOISES}
         table = {(y, k): tuple(some(random, 0, 9, 900 >> i) for _ in range(parts)) for y in OUTPUTS for k in names}
         answers = iter([[list(table[y, k]) for y in OUTPUTS] for k in names])
         events = [([], step)] if held else []
@@ -271,9 +281,11 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, monkeypatch):
         )
         monkeypatch.setattr(theorem, "norms" if held else "flow_norms", lambda _, known=table: known)
         given = checker.Root([], list(root.slopes), root.remainder) if root else None
-        loop = checker.Loop([], events, [], [[] for _ in names], given, step)
+        off = tuple(noise.get(name, F(0)) for name in NOISES)
+        loop = checker.Loop([], events, [], [[] for _ in names], given, step, off)
         segments = tuple(Segment(jump=(), duration=step) for _ in events)
-        found = certified_bounds(task, PeriodicLoop(states=(), flow=(), segments=segments, inputs={}, outputs={}), root)
+        ours = PeriodicLoop(states=(), flow=(), segments=segments, inputs={}, outputs={})
+        found = certified_bounds(task, ours, root, noise)
         theirs = unless(checker.Refused, checker.bounds, read, loop)
         assert (theirs is None) == (not isinstance(found, Bounds))
         if theirs:
@@ -281,7 +293,7 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, monkeypatch):
             assert theirs[0] == [found.slip_error, found.slip_rate_error, found.push]
             assert abs(theirs[1] - found.small_gain) <= max(found.small_gain / 2**19, F(1, 2**40))
     assert 2 < proved < 8
-    assert not held or entered == 8 * [name == "root" for name in names]  # with the sample alone
+    assert not held or entered == 8 * [name in ("root", *NOISES) for name in names]  # with the sample alone
 
 
 @pytest.mark.parametrize(

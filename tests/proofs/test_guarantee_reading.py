@@ -66,6 +66,10 @@ CONTINUOUS = changed(
 )
 
 
+NOISY = changed(HELD, (("loop", "noise"), {"slip": "1/9", "rate": "1/7"}), (("loop", "feedback"), ["1", "0"]))
+ALONE = changed(NOISY, (("loop", "measured"), [["1", "0"]]), (("loop", "noise", "rate"), "0"))
+
+
 def many(states, delay, lag):
     """A law of so many states, all integrals."""
     rows = [[str(int(i == j)) for j in range(states)] for i in range(states)]
@@ -113,6 +117,16 @@ LIMITS = [
       HELD["loop"] | {"root": ROOT}, HELD["loop"] | {"more": "1"}]),
     (ROOTED, ("loop", "root"), [ROOT], [ROOT | {"more": "1"}, {"pull": [TERM]}, {}, 5, None]),
     (CONTINUOUS, ("loop",), [CONTINUOUS["loop"]], [CONTINUOUS["loop"] | {"more": "1"}, {"rates": [["0"]]}]),
+    (CONTINUOUS, ("loop", "noise"), [], [{"slip": "0", "rate": "0"}]),
+    (NOISY, ("loop", "noise"), [{"slip": "0", "rate": "0"}, {"slip": "0", "rate": "1/9"}],
+     [{"slip": "1"}, {"rate": "1"}, {"slip": "1", "rate": "1", "time": "1"}, {"slip": "-1/9", "rate": "0"},
+      {"slip": "0", "rate": "-1/9"}, {"slip": "0", "rate": 0}, [], "1", None]),
+    (NOISY, ("loop", "measured"), [[["1", "1"]]], [[["1", "0"]]]),
+    (NOISY, ("loop", "noise", "rate"), ["0", "5"], ["-5"]),
+    (ALONE, ("loop", "noise", "rate"), ["0"], ["1/9"]),
+    (changed(ALONE, (("loop", "noise", "rate"), "1/9")), ("loop", "feedback"), [["0", "-1"]], [["1", "0"]]),
+    (changed(ROOTED, (("loop", "measured"), [["1", "0", "1"]]), (("loop", "feedback"), ["1", "0", "1"])),
+     ("loop",), [dict(ROOTED["loop"], noise={"slip": "0", "rate": "1"}, measured=[["1", "0", "1"]])], []),
     (ROOTED, ("loop", "root", "slopes"), [["0", "0"], ["1", "1"], ["0", "1"]],
      [["1/2", "1/4"], ["-1/2", "1"], ["0", "3/2"], ["0", "1", "1"], ["0"], "0"]),
     (ROOTED, ("loop", "root", "remainder"), ["0"], ["-1/2"]),

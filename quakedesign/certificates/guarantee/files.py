@@ -21,6 +21,7 @@ _ROCK = ("density", "shear_modulus", "length", "damping", "normal_stress")
 _SPREADS = ("stiffness", "damping", "authority")
 _FRICTION = ("static", "least", "largest", "weakening", "strengthening", "rate_slope")
 _TIMES = ("step", "delay", "lag")
+_NOISE = ("slip", "rate")
 _LAW = ("states", "measured", "output", "feedback")
 _FAULT = re.compile(r"\w[\w .+-]{0,59}")
 _MOST_COEFFICIENTS = 13
@@ -72,6 +73,8 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         own = {"update": [_texts(row) for row in claim.held.law.update]}
         root = claim.held.law.root
         own |= {} if root is None else {"root": _root_document(root)}
+        noise = claim.held.noise
+        own |= {"noise": {name: str(noise.get(f"{name}_noise", 0)) for name in _NOISE}} if noise else {}
     return {
         **times,
         "states": list(law.states),
@@ -139,11 +142,13 @@ def _task(raw: dict[str, Any]) -> Task:
 
 
 def _held(raw: Any) -> Held:
-    implicit = isinstance(raw, dict) and "root" in raw
-    with_keys(raw, {*_TIMES, "update", *_LAW} | ({"root"} if implicit else set()))
-    root = _read_root(raw["root"]) if implicit else None
+    given = {"root", "noise"} & set(raw) if isinstance(raw, dict) else set[str]()
+    with_keys(raw, {*_TIMES, "update", *_LAW} | given)
+    root = _read_root(raw["root"]) if "root" in given else None
     law = LinearLaw(update=_square(raw, "update"), root=root, **_rest(raw))
-    return Held(law=law, **{name: read_rational(raw[name]) for name in _TIMES})
+    noise = with_keys(raw["noise"], set(_NOISE)) if "noise" in given else {}
+    bounds = {f"{name}_noise": read_rational(value) for name, value in noise.items()}
+    return Held(law=law, **{name: read_rational(raw[name]) for name in _TIMES}, **bounds)
 
 
 def _continuous(raw: Any) -> ContinuousLaw:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, log10
-from typing import Any
+from typing import Any, TypedDict
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
@@ -11,27 +11,71 @@ from quakedesign.certificates.guarantee import sector
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.loop import LinearLaw, PeriodicLoop, SampledController, held_loop
+from quakedesign.loop import NOISES, LinearLaw, PeriodicLoop, SampledController, held_loop
 
 _DIGITS = 4
+_NOISE_WORDS = {
+    "slip_noise": "with any noise of at most {:.6g} m in the measured slip",
+    "rate_noise": "with any noise of at most {:.6g} m/s in the measured slip rate",
+}
 _MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
+
+
+class Around(TypedDict, total=False):
+    """What `Held` has besides the law and T_s; what is left out is 0."""
+
+    delay: Fraction
+    lag: Fraction
+    slip_noise: Fraction
+    rate_noise: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Held:
-    """A law as it runs: once every T_s, its pressure held, after a delay, through a lag.
+    """A law as it runs: once every T_s, its pressure held, after a delay, through a lag; what it measures may be off.
 
     Attributes
     ----------
     law : LinearLaw
     step, delay, lag : Fraction
         [s].
+    slip_noise, rate_noise : Fraction
+        Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
+
+    Raises
+    ------
+    ParameterError
+        For a negative bound, or noise of a slip rate that the law does not measure.
     """
 
     law: LinearLaw
     step: Fraction
     delay: Fraction = Fraction(0)
     lag: Fraction = Fraction(0)
+    slip_noise: Fraction = Fraction(0)
+    rate_noise: Fraction = Fraction(0)
+
+    def __post_init__(self) -> None:
+        if min(self.slip_noise, self.rate_noise) < 0:
+            raise ParameterError(
+                "a bound of noise must be 0 or more. Received "
+                f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s. Check their signs."
+            )
+        if self.rate_noise and self.law.of_slip_alone:
+            raise ParameterError(
+                "noise of the slip rate needs a law that measures it. Received "
+                f"{float(self.rate_noise):.4g} m/s and a law of the slip alone. Leave it out."
+            )
+
+    @property
+    def around(self) -> Around:
+        """All but law and T_s."""
+        return Around(delay=self.delay, lag=self.lag, slip_noise=self.slip_noise, rate_noise=self.rate_noise)
+
+    @property
+    def noise(self) -> dict[str, Fraction]:
+        """Bounds of the noise that there is, by its input of the loop."""
+        return {name: bound for name in NOISES if (bound := getattr(self, name))}
 
     @property
     def controller(self) -> SampledController:
@@ -48,7 +92,9 @@ class Held:
 
     def loop(self, task: Task) -> PeriodicLoop:
         """Nominal error loop on a task."""
-        return held_loop(self.law, task.model, task.authority, self.step, delay=self.delay, lag=self.lag)
+        return held_loop(
+            self.law, task.model, task.authority, self.step, delay=self.delay, lag=self.lag, noisy=self.noise
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,6 +203,9 @@ class Guarantee:
         when = f"held over {_seconds(held.step)}"
         when += f", {_seconds(held.delay)} late" if held.delay else ""
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
+        when += ", with the slip alone measured" if held.law.of_slip_alone else ""
+        for name, bound in held.noise.items():
+            when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
         return sentence_of(self.task, self.claims, when)
 
 
@@ -200,12 +249,13 @@ def guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
 def _root_within(held: Held, claims: Claims) -> bool:
     """Whether an implicit root, if there is one, is as said wherever the claims hold."""
     root = held.law.root
-    return root is None or sector.holds(root, held.step, claims.slip_error, claims.slip_rate_error)
+    errors = claims.slip_error + held.slip_noise, claims.slip_rate_error + held.rate_noise
+    return root is None or sector.holds(root, held.step, *errors)
 
 
 def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
     try:
-        return certified_bounds(task, loop, held.law.root)
+        return certified_bounds(task, loop, held.law.root, held.noise)
     except ParameterError:
         reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
         return NoGuarantee(reason=reason, small_gain=None)

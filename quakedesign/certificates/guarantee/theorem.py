@@ -21,16 +21,22 @@ largest slope μ′, so |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b,
 as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0. A disturbance of this
 class is one of the class amplitude too, so the smaller of both bounds holds for every output.
 
+**Noise.** A law that is told e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples has two sampled inputs
+more, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c; nothing else is said of their courses. Readings in
+steps of q are off by at most q/2.
+
 **Implicit root.** A law that uses the end w of an implicit step is linear but for the sampled input ``root``, w_k +
 γe1/T_s at the samples, γ the middle of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤ R
 (`sector`). E and R are the claims themselves. Let the claims follow from these bounds of the inputs. If e was within
 them at the samples before kT_s, then the inputs up to kT_s, which these samples alone decide, obey the bounds, so e is
-within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do. ∎
+within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do. With
+noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places of E and R, and ε gains δγN1/T_s. ∎
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
+from types import MappingProxyType
 from typing import Any
 
 from quakedesign.bounds import UpperBound
@@ -41,6 +47,7 @@ from quakedesign.certificates.guarantee.task import Task
 from quakedesign.loop import ImplicitRoot, PeriodicLoop
 
 _ZERO = Fraction(0)
+NOISELESS: Mapping[str, Fraction] = MappingProxyType({})
 OUTPUTS = ("slip_error", "slip_rate_error", "push")
 _WORDS = {
     ("acceleration", "slip_error"): "range of friction's slope in slip",
@@ -116,8 +123,12 @@ class NoGuarantee:
         return f"none: {self.reason}"
 
 
-def certified_bounds(task: Task, loop: PeriodicLoop, root: ImplicitRoot | None = None) -> Bounds | NoGuarantee:
+def certified_bounds(
+    task: Task, loop: PeriodicLoop, root: ImplicitRoot | None = None, noise: Mapping[str, Fraction] = NOISELESS
+) -> Bounds | NoGuarantee:
     """Bounds of the theorem for the loop of `held_loop` or `continuous_loop` with the task's model.
+
+    `noise` has the bounds of those inputs of the loop that are noise, in SI units.
 
     Raises
     ------
@@ -126,7 +137,7 @@ def certified_bounds(task: Task, loop: PeriodicLoop, root: ImplicitRoot | None =
     """
     gains = norms(loop) if loop.segments else flow_norms(loop)
     classes = [task] if task.change is None else [task, replace(task, change=None)]
-    found = [bounds_from(one, gains, root, loop.period) for one in classes]
+    found = [bounds_from(one, gains, root, loop.period, noise) for one in classes]
     proved = [bounds for bounds in found if isinstance(bounds, Bounds)]
     if not proved:
         return found[0]
@@ -134,10 +145,14 @@ def certified_bounds(task: Task, loop: PeriodicLoop, root: ImplicitRoot | None =
 
 
 def bounds_from(
-    task: Task, gains: Mapping[tuple[str, str], tuple[Any, ...]], root: ImplicitRoot | None, step: Fraction
+    task: Task,
+    gains: Mapping[tuple[str, str], tuple[Any, ...]],
+    root: ImplicitRoot | None,
+    step: Fraction,
+    noise: Mapping[str, Fraction] = NOISELESS,
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
-    channels = (*channels_of(task, root, step), *_fed_forward(task, {name for _, name in gains}))
+    channels = (*channels_of(task, root, step, noise), *_fed_forward(task, {name for _, name in gains}))
     loops = [
         [
             max(sum((c * gains[y, k.name][j] for y, c in i.shares.items()), _ZERO) for j in _parts(gains))
@@ -163,18 +178,21 @@ def bounds_from(
     )
 
 
-def channels_of(task: Task, root: ImplicitRoot | None, step: Fraction) -> tuple[Channel, ...]:
-    """Inputs of the loop of a task, of a law with an implicit root or without."""
+def channels_of(
+    task: Task, root: ImplicitRoot | None, step: Fraction, noise: Mapping[str, Fraction] = NOISELESS
+) -> tuple[Channel, ...]:
+    """Inputs of the loop of a task, of a law with an implicit root or without, with noise or without."""
     force, drift, coupling = _task_inputs(task)
-    implicit = (
-        []
-        if root is None
-        else [Channel(name="root", own=root.remainder, shares={"slip_error": root.half_range / step})]
-    )
+    implicit = []
+    if root is not None:
+        share = root.half_range / step
+        own = root.remainder + share * noise.get("slip_noise", _ZERO)
+        implicit.append(Channel(name="root", own=own, shares={"slip_error": share}))
     return (
         Channel(name="acceleration", own=force, shares=task.half_ranges),
         Channel(name="drift", own=drift, shares={"slip_rate_error": coupling}),
         *implicit,
+        *(Channel(name=name, own=size, shares={}) for name, size in noise.items()),
     )
 
 

@@ -9,8 +9,9 @@ import numpy as np
 from scipy.linalg import expm
 
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Task
-from quakedesign.loop import ImplicitRoot, PeriodicLoop, Segment
+from quakedesign.loop import NOISES, PeriodicLoop, Segment
 from quakedesign.loop.implicit_root import root_of
+from quakedesign.loop.periodic import Row
 
 _PERIODS = 64
 _PIECES = 6
@@ -43,14 +44,13 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64
     periods long; in continuous time a period is that of the fastest pole, 1/|λ|. With `sticks` the fault does not
     slide backward: friction holds it wherever the loop would, along the reference at its largest rate and at a
-    twentieth of that, and courses that switch after random times are tried as well. An implicit step ends where its
-    equation says, inside its lines or not.
+    twentieth of that, and courses that switch after random times are tried as well. Noise is at its ends too. An
+    implicit step ends where its equation says, inside its lines or not.
     """
-    root = claim.held.law.root if isinstance(claim, Guarantee) else None
-    searches = [_Search(claim.task, claim.loop, root, sticks, 2 * _COURSES)]
+    searches = [_Search(claim, sticks, 2 * _COURSES)]
     searches[0].follow(searches[0].random(), _SWEEPS)
     if sticks:
-        searches.append(_Search(claim.task, claim.loop, root, sticks, _MANY))
+        searches.append(_Search(claim, sticks, _MANY))
         searches[1].follow(searches[1].switching(), _FEW)
     slip, rate = (max(search.largest[k] for search in searches) for k in (0, 1))
     return WorstFound(slip_error=slip, slip_rate_error=rate)
@@ -69,11 +69,16 @@ class _Pieces:
 class _Search:
     """Many courses at once; `largest` holds |e1| and |e2|."""
 
-    def __init__(self, task: Task, loop: PeriodicLoop, root: ImplicitRoot | None, sticks: bool, courses: int) -> None:
+    def __init__(self, claim: Guarantee | ContinuousPeaks, sticks: bool, courses: int) -> None:
+        task, loop = claim.task, claim.loop
+        held = claim.held if isinstance(claim, Guarantee) else None
+        root, noise = (held.law.root, held.noise) if held else (None, {})
         self.limit = float(task.amplitude) if task.change is not None else None
         flow, inputs = _with_disturbance(task, loop)
         self.size, self.root, self.step = len(flow), root, float(loop.period)
-        self.sudden = np.array([*loop.sampled.get("root", ()), *[0] * self.size], dtype=float)[: self.size]
+        self.sudden = _filled(loop.sampled.get("root", ()), self.size)
+        self.noise = np.array([float(noise.get(name, 0)) for name in NOISES])
+        self.heard = np.array([_filled(loop.sampled.get(name, ()), self.size) for name in NOISES])
         beta = [float(b) for b in task.beta]
         push = np.zeros(self.size)
         push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
@@ -119,7 +124,7 @@ class _Search:
         for number, costate in enumerate(costates):
             part = self.parts[number // _PIECES % len(self.parts)]
             if number % _PIECES == 0:
-                state = state @ part.jump.T + self._beside_the_line(state, number)
+                state = self._sampled(part, state, costate, number)
             ahead = np.einsum("vij,cj->cvi", part.steps, state)
             push = np.einsum("vij,ci->cvj", part.added, costate)
             gain = np.einsum("cvi,ci->cv", ahead, costate) + np.abs(push).sum(axis=2)
@@ -133,12 +138,20 @@ class _Search:
             self.largest = max(self.largest[0], float(slip)), max(self.largest[1], float(rate))
         return chosen, held
 
-    def _beside_the_line(self, state: np.ndarray, number: int) -> np.ndarray | float:
+    def _sampled(self, part: _Pieces, state: np.ndarray, costate: np.ndarray, number: int) -> np.ndarray:
+        """After a jump; the first of a period hears noise, for which the costate is that after the first piece."""
+        after = state @ part.jump.T
+        if number // _PIECES % len(self.parts):
+            return after
+        noise = self.noise * np.sign(costate @ part.steps[0] @ self.heard.T)
+        return np.asarray(after + noise @ self.heard + self._beside_the_line(state[:, :2] + noise))
+
+    def _beside_the_line(self, told: np.ndarray) -> np.ndarray | float:
         """What the true end of an implicit step adds to that of the nominal loop."""
-        if self.root is None or number // _PIECES % len(self.parts):
+        if self.root is None:
             return 0.0
-        line = float(self.root.middle) / self.step * state[:, 0]
-        return np.outer(root_of(self.root.pull, self.step, state[:, 0], state[:, 1]) + line, self.sudden)
+        line = float(self.root.middle) / self.step * told[:, 0]
+        return np.outer(root_of(self.root.pull, self.step, told[:, 0], told[:, 1]) + line, self.sudden)
 
     def _held(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
         """Keep every state where it can be; mask of what is held there."""
@@ -186,6 +199,11 @@ def _at(task: Task, flow: np.ndarray, push: np.ndarray, beta: float, slip: float
     found[1] += (beta - float(model.gain / task.authority)) * push
     found[1, :2] += slip - float(model.slip), float(model.rate) - rate
     return found
+
+
+def _filled(column: Row, size: int) -> np.ndarray:
+    """A column, with zeros below."""
+    return np.array([*column, *[0] * (size - len(column))], dtype=float)
 
 
 def _flowing(flow: np.ndarray) -> Segment:

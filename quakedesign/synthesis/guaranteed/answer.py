@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, Unpack
 
-from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee import Around, Guarantee, Held, NoGuarantee, guarantee, task_of
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.controllers import SlidingMode, control_law
 from quakedesign.errors import ParameterError
@@ -15,6 +15,7 @@ from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
 from quakedesign.synthesis.guaranteed.continuous import CLASSES
 from quakedesign.synthesis.guaranteed.design import design_held
+from quakedesign.synthesis.guaranteed.families import MEASURED
 from quakedesign.synthesis.guaranteed.reach import design_at, longest_step
 from quakedesign.synthesis.guaranteed.sliding import GUARANTEED, sliding_mode
 
@@ -120,9 +121,9 @@ def answer(
     objective: str = "tracking",
     scheme: str | None = None,
     step: Fraction | None = None,
-    delay: Fraction = Fraction(0),
-    lag: Fraction = Fraction(0),
+    measured: str = MEASURED[0],
     disturbance_class: str = "amplitude",
+    **around: Unpack[Around],
 ) -> Answer:
     """Guarantee of given e-LQR gains with summed integrals, of a law that is designed for it, or of a sliding mode.
 
@@ -140,10 +141,12 @@ def answer(
         Of a sliding mode: ``compensated`` unless given, the only one with a guarantee; of the e-LQR ``explicit``.
     step : Fraction, optional
         T_s [s]; the fault's unless given.
-    delay, lag : Fraction
-        [s].
+    measured : str
+        ``slip-and-rate``, or ``slip`` for a designed e-LQR with an observer.
     disturbance_class : str
         ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
+    **around : Fraction
+        Delay and lag [s], bounds of the noise of slip [m] and slip rate [m/s]; 0 unless given.
 
     Raises
     ------
@@ -156,10 +159,13 @@ def answer(
         raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")
     task = task_of(fault, rate_limited=disturbance_class == "rate")
     law = control_law(controller)
-    if issubclass(law, SlidingMode):
-        made = sliding_mode(
-            task, law, period, gains=gains, scheme=scheme or GUARANTEED, objective=objective, delay=delay, lag=lag
+    if measured != MEASURED[0] and (gains or issubclass(law, SlidingMode)):
+        raise ParameterError(
+            f"measured is for a designed e-LQR, all other laws need slip and slip rate. Received {measured!r}. "
+            "Leave it out, or the gains and the controller."
         )
+    if issubclass(law, SlidingMode):
+        made = sliding_mode(task, law, period, gains=gains, scheme=scheme or GUARANTEED, objective=objective, **around)
         if isinstance(made, NoGuarantee):
             return Answer(fault=fault, found=made)
         return replace(attacked(fault, made.found), compensation=made)
@@ -167,11 +173,11 @@ def answer(
         raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {scheme!r}. Leave it out.")
     if gains:
         summed = summed_integrals(_four(gains), period)
-        return attacked(fault, guarantee(task, Held(law=summed, step=period, delay=delay, lag=lag)))
-    found = design_held(task, period, objective=objective, delay=delay, lag=lag)
+        return attacked(fault, guarantee(task, Held(law=summed, step=period, **around)))
+    found = design_held(task, period, objective=objective, measured=measured, **around)
     if isinstance(found, Guarantee):
         return attacked(fault, found)
-    longest = longest_step(task, period, delay=delay, lag=lag)
+    longest = longest_step(task, period, measured=measured, **around)
     return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest, objective))
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from itertools import product
-from typing import Any
+from typing import Any, Unpack
 
 from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
+from quakedesign.certificates.guarantee import Around, Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.sector import holds
 from quakedesign.controllers import SlidingMode
 from quakedesign.errors import ParameterError, UnsupportedError
@@ -92,9 +92,7 @@ def compensated(
     weight: Fraction,
     authority: Fraction,
     step: Fraction,
-    *,
-    delay: Fraction = Fraction(0),
-    lag: Fraction = Fraction(0),
+    **around: Unpack[Around],
 ) -> Guarantee | NoGuarantee:
     """Guarantee of given settings: the narrowest lines around the root, of a few, that close the circle.
 
@@ -107,7 +105,7 @@ def compensated(
         pull = implicit_pull(controller, step, authority)
     except UnsupportedError as error:
         return NoGuarantee(reason=str(error), small_gain=None)
-    held = _held(ImplicitRoot(pull=pull), weight, authority, step, delay, lag)
+    held = _held(ImplicitRoot(pull=pull), weight, authority, step, around)
     first = guarantee(task, held)
     deadbeat = estimated(task, held)
     if isinstance(first, Guarantee) or deadbeat is None or isinstance(deadbeat.bounds, NoGuarantee):
@@ -119,7 +117,8 @@ def compensated(
         near = estimated(task, wider)
         if near is None or isinstance(near.bounds, NoGuarantee):
             continue
-        within = holds(root, step, near.bounds.slip_error, near.bounds.slip_rate_error)
+        errors = near.bounds.slip_error + held.slip_noise, near.bounds.slip_rate_error + held.rate_noise
+        within = holds(root, step, *errors)
         found = guarantee(task, wider) if within else None
         if isinstance(found, Guarantee):
             return found
@@ -132,8 +131,7 @@ def design_compensated(
     step: Fraction,
     *,
     objective: str = "tracking",
-    delay: Fraction = Fraction(0),
-    lag: Fraction = Fraction(0),
+    **around: Unpack[Around],
 ) -> Compensation:
     """Weight, authority and scale of a sliding mode with given base gains, chosen over certified bounds.
 
@@ -147,7 +145,7 @@ def design_compensated(
     ------
     ParameterError
     """
-    weight, authority, errors = _deadbeat(task, step, objective, delay, lag)
+    weight, authority, errors = _deadbeat(task, step, objective, around)
     law = controller
     try:
         if errors is not None:
@@ -156,12 +154,12 @@ def design_compensated(
         return Compensation(
             controller=law, weight=weight, authority=authority, found=NoGuarantee(reason=str(error), small_gain=None)
         )
-    found = compensated(task, law, weight, authority, step, delay=delay, lag=lag)
+    found = compensated(task, law, weight, authority, step, **around)
     return Compensation(controller=law, weight=weight, authority=authority, found=found)
 
 
 def _deadbeat(
-    task: Task, step: Fraction, objective: str, delay: Fraction, lag: Fraction
+    task: Task, step: Fraction, objective: str, around: Around
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
     """Weight and authority for a deadbeat step, and the errors that it leaves, if it has a guarantee."""
     if objective not in OBJECTIVES:
@@ -169,7 +167,7 @@ def _deadbeat(
     worst, seen = replace(task, change=None), dict[tuple[Fraction, Fraction], Estimate]()
     for weight, ratio in product(_WEIGHTS, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
-        found = estimated(worst, _held(_DEADBEAT, *choice, step, delay, lag))
+        found = estimated(worst, _held(_DEADBEAT, *choice, step, around))
         if found is not None and isinstance(found.bounds, Bounds):
             seen[choice] = found
     if not seen:
@@ -180,7 +178,8 @@ def _deadbeat(
         allowed = [choice for choice in seen if peaks[choice] <= _ROOM * peaks[least]]
         least = min(allowed, key=lambda choice: seen[choice].drift_gain)
     bounds = _bounds(seen[least])
-    return *least, (bounds.slip_error, bounds.slip_rate_error)
+    slip_noise, rate_noise = around.get("slip_noise", 0), around.get("rate_noise", 0)
+    return *least, (bounds.slip_error + slip_noise, bounds.slip_rate_error + rate_noise)
 
 
 def _scale(controller: SlidingMode, authority: Fraction, step: Fraction, errors: tuple[Fraction, Fraction]) -> Fraction:
@@ -198,10 +197,8 @@ def _scale(controller: SlidingMode, authority: Fraction, step: Fraction, errors:
     return controller.scale
 
 
-def _held(
-    root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, delay: Fraction, lag: Fraction
-) -> Held:
-    return Held(law=compensated_law(root, weight, step * authority), step=step, delay=delay, lag=lag)
+def _held(root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, around: Around) -> Held:
+    return Held(law=compensated_law(root, weight, step * authority), step=step, **around)
 
 
 def _bounds(found: Estimate) -> Bounds:

@@ -27,7 +27,7 @@ def estimated(task: Task, held: Held) -> Estimate | None:
     gains = _gains(held.loop(task))
     if gains is None:
         return None
-    return Estimate(bounds_from(task, gains, held.law.root, held.step), max(gains["slip_error", "drift"]))
+    return Estimate(bounds_from(task, gains, held.law.root, held.step, held.noise), max(gains["slip_error", "drift"]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,13 @@
 from collections.abc import Callable
 from fractions import Fraction
 from math import sqrt
+from typing import Unpack
 
 import numpy as np
 
-from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
+from quakedesign.certificates.guarantee import Around, Guarantee, NoGuarantee, Task
 from quakedesign.synthesis.guaranteed.design import MOST_DELAY, design_held, first_held
+from quakedesign.synthesis.guaranteed.families import MEASURED
 
 Search = Callable[[Fraction, np.ndarray | None], tuple[Guarantee | NoGuarantee, np.ndarray | None]]
 Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
@@ -20,9 +22,9 @@ def longest_step(
     task: Task,
     step: Fraction,
     *,
-    delay: Fraction = Fraction(0),
-    lag: Fraction = Fraction(0),
     most: Fraction | None = None,
+    measured: str = MEASURED[0],
+    **around: Unpack[Around],
 ) -> Guarantee | None:
     """A guarantee at nearly the longest T_s that has one; None where none is found.
 
@@ -31,14 +33,14 @@ def longest_step(
     task : Task
     step : Fraction
         T_s of the fault [s], tried first where the fault is stable.
-    delay, lag : Fraction
-        [s].
     most : Fraction, optional
         Longest T_s to try [s].
+    measured, **around
+        As in `design_held`.
     """
     pole = _fastest_pole(task)
     first = Fraction(f"{_SHARE / pole:.3g}") if pole > 0 else step
-    attempt = _attempt(lambda held, near: first_held(task, held, delay=delay, lag=lag, near=near))
+    attempt = _attempt(lambda held, near: first_held(task, held, near=near, measured=measured, **around))
     return _last(reached(attempt, first if most is None else min(first, most), most=most))
 
 
@@ -49,17 +51,24 @@ def _fastest_pole(task: Task) -> float:
 
 
 def design_at(task: Task, longest: Guarantee, objective: str) -> Guarantee:
-    """Design for an objective at the T_s, delay and lag of a guarantee, which stays where there is none."""
+    """Design for an objective at T_s and all else of a guarantee, which stays where there is none."""
     held = longest.held
-    found = design_held(task, held.step, objective=objective, delay=held.delay, lag=held.lag)
+    measured = MEASURED[held.law.of_slip_alone]
+    found = design_held(task, held.step, objective=objective, measured=measured, **held.around)
     return found if isinstance(found, Guarantee) else longest
 
 
-def longest_delay(task: Task, step: Fraction) -> Guarantee | None:
+def longest_delay(
+    task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> Guarantee | None:
     """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
     most = MOST_DELAY * step
-    _, near = first_held(task, step)
-    attempt = _attempt(lambda delay, near: first_held(task, step, delay=delay, near=near), near)
+
+    def search(delay: Fraction, near: np.ndarray | None) -> tuple[Guarantee | NoGuarantee, np.ndarray | None]:
+        return first_held(task, step, near=near, measured=measured, **(around | {"delay": delay}))
+
+    _, near = search(Fraction(0), None)
+    attempt = _attempt(search, near)
     return _last(reached(attempt, step / 2, most=most))
 
 

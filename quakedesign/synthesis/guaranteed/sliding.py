@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from typing import Unpack
 
 from quakedesign.bounds import UpperBound
-from quakedesign.certificates.guarantee import NoGuarantee, Task
+from quakedesign.certificates.guarantee import Around, NoGuarantee, Task
 from quakedesign.controllers import SlidingMode, family
 from quakedesign.errors import ParameterError
 from quakedesign.loop.schemes import schemes
@@ -21,8 +22,7 @@ def sliding_mode(
     gains: tuple[str, ...] = (),
     scheme: str = GUARANTEED,
     objective: str = "tracking",
-    delay: Fraction = Fraction(0),
-    lag: Fraction = Fraction(0),
+    **around: Unpack[Around],
 ) -> Compensation | NoGuarantee:
     """Design a sliding mode with given base gains, or the first ones known for it, in a scheme.
 
@@ -37,8 +37,8 @@ def sliding_mode(
     scheme : str
     objective : str
         ``tracking`` or ``peak``.
-    delay, lag : Fraction
-        [s].
+    **around : Fraction
+        As in `design_held`.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def sliding_mode(
     if scheme != GUARANTEED or not isinstance(base, SlidingMode):
         return NoGuarantee(reason=_why_none(task, law, scheme, step), small_gain=None)
     known = replace(base, gains=dict(base.gains), divisor=task.authority)
-    return design_compensated(task, known, step, objective=objective, delay=delay, lag=lag)
+    return design_compensated(task, known, step, objective=objective, **around)
 
 
 def _why_none(task: Task, law: type[SlidingMode], scheme: str, step: Fraction) -> str:

@@ -18,12 +18,14 @@ from quakedesign.certificates.guarantee.files import guarantee_text, parse_guara
 from quakedesign.errors import CertificateError
 from quakedesign.fault import load_fault
 from quakedesign.loop import (
+    ErrorPrediction,
     ImplicitRoot,
     Power,
     Prediction,
     compensated,
     disturbance_estimate,
     exact_integrals,
+    slip_observer,
     summed_integrals,
 )
 
@@ -53,6 +55,15 @@ def implicit(scale, slope, remainder="0"):
     return Held(law=compensated(root, F("0.3"), GAIN), step=STEP)
 
 
+OBSERVER = slip_observer(
+    (F(680000000), F(215900000)),
+    (F("0.949"), F("6.53"), F("0.605")),
+    ErrorPrediction(
+        of_errors=((F("1.007"), F("0.1598")), (F("0.0718"), F("0.7513"))), of_pushes=((F("0.0154"), F("0.1598")),)
+    ),
+    F("2.282e-8"),
+)
+NOISY = {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
 LOOPS = {
     "deadbeat": implicit("1", "1"),
     "sluggish": implicit("3/5", "97/100", "1/1000000"),
@@ -60,6 +71,10 @@ LOOPS = {
     "late": Held(law=ESTIMATE, step=STEP, delay=F("0.02")),
     "integrals": Held(law=INTEGRALS, step=STEP),
     "lagging": Held(law=ESTIMATE, step=F("0.1"), lag=F("0.03")),
+    "noisy": Held(law=ESTIMATE, step=STEP, **NOISY),
+    "observer": Held(law=OBSERVER, step=STEP, slip_noise=F(1, 10**6)),
+    "noisy deadbeat": replace(implicit("1", "1"), **NOISY),
+    "noisy sluggish": replace(implicit("4/5", "97/100", "1/1000000"), slip_noise=F(1, 10**6)),
 }
 CONTINUOUS_GAINS = tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5")))
 CONTINUOUS = exact_integrals(CONTINUOUS_GAINS)
@@ -85,8 +100,10 @@ def standalone(text):
         return f"invalid: {error}"
 
 
-@pytest.mark.parametrize("name", EVERY)
-@pytest.mark.parametrize("rate_limited", [False, True])
+@pytest.mark.parametrize(
+    ("name", "rate_limited"),
+    [(name, kind) for name in EVERY for kind in (False, True) if not kind or "noisy" not in name],
+)
 def test_both_checkers_accept_what_the_package_writes(name, rate_limited):
     found = claim(name, rate_limited)
     text = guarantee_text(found)
@@ -97,6 +114,51 @@ def test_both_checkers_accept_what_the_package_writes(name, rate_limited):
     began = time.process_time()
     assert package(text) == "proved"
     assert time.process_time() - began < 0.5
+
+
+def test_the_statement_says_what_is_measured_and_how_well():
+    """A bound of the noise is a premise: what is printed of it is never above what was proved."""
+    said = (
+        "law with 2 states, every 23/125 s, 0 s late, lag 0 s, measured slip within 1/1000000 m of the true one, slip "
+    )
+    assert said + "rate within 1/100000 m/s" in checker.check(guarantee_text(claim("noisy"))).statement
+    said = "law with 3 states of the slip alone, every 23/125 s, 0 s late, lag 0 s, measured slip within 1/1000000 m of"
+    assert f"{said} the true one" in checker.check(guarantee_text(claim("observer"))).statement
+    third = replace(LOOPS["noisy"], slip_noise=F(1, 3 * 10**6))
+    found = guarantee(task_of(load_fault("real-fault")), third).sentence()
+    said = "held over 0.184 s, with any noise of at most 3.33333e-07 m in the measured slip, with any noise of at most"
+    assert f"{said} 1e-05 m/s in the measured slip rate, for every disturbance" in found
+    said = (
+        "held over 0.184 s, with the slip alone measured, with any noise of at most 1e-06 m in the measured slip, for"
+    )
+    assert said in claim("observer").sentence()
+
+
+def test_noise_of_a_slip_rate_that_is_not_measured_is_refused_by_both():
+    raw = json.loads(guarantee_text(claim("observer")))
+    text = json.dumps(changed(raw, ("loop", "noise", "rate"), "1/100000"))
+    assert "needs a law that measures it" in standalone(text)
+    assert "needs a law that measures it" in package(text)
+
+
+def test_a_file_of_before_noise_is_one_without():
+    raw = json.loads(guarantee_text(claim("noisy")))
+    del raw["loop"]["noise"]
+    assert standalone(json.dumps(raw)) == package(json.dumps(raw)) == "proved"
+    assert parse_guarantee(json.dumps(raw)).held == LOOPS["estimate"]
+
+
+def test_the_root_lies_between_its_lines_for_all_errors_that_it_is_told():
+    """Errors as claimed and the noise on top: lines that hold for the errors alone are refused by both."""
+    found = claim("noisy deadbeat")
+    raw, claims = json.loads(guarantee_text(found)), found.claims
+    told = claims.slip_error + NOISY["slip_noise"], claims.slip_rate_error + NOISY["rate_noise"]
+    least = told[0] / STEP + told[1]  # a sign of this size holds the end of the step at w = −e1/T_s
+    for factor, shown in ((1 + F(1, 10**9), True), (1 - F(1, 10**9), False)):
+        sign = {"factor": [str(least * factor)] * 2, "power": "0", "of": "slip"}
+        text = json.dumps(changed(raw, ("loop", "root", "pull"), [sign]))
+        assert ("implicit step must lie" in standalone(text)) is not shown
+        assert package(text) == ("proved" if shown else "undecided")
 
 
 def test_the_statement_says_the_slip_rate_of_this_fault():
@@ -143,8 +205,11 @@ def test_the_statement_about_continuous_time_says_so_in_both():
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
 
 
-@pytest.mark.parametrize("loop", ["estimate", "sluggish", "continuous"])
-@pytest.mark.parametrize("name", CLAIMS)
+@pytest.mark.parametrize(
+    ("loop", "name"),
+    [(loop, name) for loop in ("estimate", "sluggish", "continuous") for name in CLAIMS]
+    + [("observer", "slip_rate_error"), ("noisy sluggish", "slip_error"), ("noisy", "least_pressure")],
+)
 def test_one_percent_less_is_refused_by_both(name, loop):
     raw = json.loads(guarantee_text(claim(loop)))
     raw["claims"][name] = str(F(raw["claims"][name]) * F(99, 100))
@@ -168,6 +233,12 @@ WORSE += [
     ("estimate", ("loop", "feedback", 1), F(4, 3)),
     ("estimate", ("loop", "measured", 1, 1), F(4, 3)),
     ("estimate", ("loop", "update", 1, 0), F(4, 3)),
+    ("noisy", ("loop", "noise", "slip"), F(3, 2)),
+    ("noisy", ("loop", "noise", "rate"), F(21, 20)),
+    ("noisy deadbeat", ("loop", "noise", "slip"), F(3, 2)),
+    ("noisy sluggish", ("loop", "noise", "slip"), F(21, 20)),
+    ("observer", ("loop", "noise", "slip"), F(21, 20)),
+    ("observer", ("loop", "measured", 1, 0), F(3, 2)),
     ("continuous", ("loop", "feedback", 0), F(3, 4)),
     ("continuous", ("loop", "feedback", 1), F(3, 4)),
     ("continuous", ("loop", "measured", 0, 0), F(4, 3)),
@@ -256,6 +327,8 @@ PATHS = [(RAW, path) for path in places(RAW) if path and path != ("fault", "name
 PATHS += [(CONTINUOUS_RAW, path) for path in places(CONTINUOUS_RAW) if path and path[0] == "loop"]
 PATHS += [(NESTED, ("loop", "root", *path)) for path in places(NESTED["loop"]["root"])]
 PATHS += [(NESTED, ("loop", key)) for key in ("feedback", "measured", "update")]
+NOISY_RAW = json.loads(guarantee_text(claim("noisy")))
+PATHS += [(NOISY_RAW, ("loop", "noise", name)) for name in ("slip", "rate")]
 
 
 @pytest.mark.parametrize("new", [None, "x", "1/0", "2/4", 0.5, True, [], {}, -1], ids=repr)

@@ -130,6 +130,12 @@ def test_a_root_beyond_its_lines_at_the_claims_is_undecided(monkeypatch):
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: wide)
     assert Guarantee(task=TASK, held=ROOTED, claims=Claims.of(TASK, wide)).check() is Verdict.UNDECIDED
     assert Guarantee(task=TASK, held=HELD, claims=Claims.of(TASK, wide)).check() is Verdict.PROVED
+    told = replace(BOUNDS, slip_rate_error=F(1, 3) - F(1, 10**9))
+    for noise, verdict in ((F(0), Verdict.PROVED), (F(1, 10**6), Verdict.UNDECIDED)):
+        loud = Guarantee(task=TASK, held=replace(ROOTED, rate_noise=noise), claims=Claims.of(TASK, told))
+        monkeypatch.setattr(statement, "certified_bounds", lambda *_: told)
+        assert loud.check() is verdict
+    monkeypatch.setattr(statement, "certified_bounds", lambda *_: wide)
     none = guarantee(TASK, ROOTED)
     assert isinstance(none, NoGuarantee)
     assert "leaves its range at errors up to 0 m and 0.501 m/s" in none.reason
@@ -153,11 +159,12 @@ def test_a_loop_that_is_not_seen_to_be_stable_has_no_guarantee(monkeypatch):
     assert found.reason == "held over 0.1 s even the nominal loop is not stable, or too slow to be seen so"
 
 
-def test_bounds_are_asked_for_the_loop_and_its_root(monkeypatch):
+def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monkeypatch):
     asked = []
     monkeypatch.setattr(statement, "certified_bounds", lambda *given: asked.append(given) or NONE)
-    late = replace(ROOTED, delay=F(1, 3), lag=F(1, 5))
+    late = replace(ROOTED, delay=F(1, 3), lag=F(1, 5), rate_noise=F(1, 9))
     claim = Guarantee(task=TASK, held=late, claims=CLAIMS)
     assert claim.bounds() is NONE
-    assert asked == [(TASK, claim.loop, SIGN)]
+    assert asked == [(TASK, claim.loop, SIGN, {"rate_noise": F(1, 9)})]
+    assert tuple(claim.loop.sampled) == ("root", "rate_noise")
     assert [segment.duration for segment in claim.loop.segments] == [F(1, 3), F(2, 3)]

@@ -1,5 +1,6 @@
 """The small gain of several channels against eigenvalues and closed forms."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 
 import numpy as np
@@ -42,10 +43,20 @@ def test_spectral_radii_known_by_hand_are_bounded_closely(rows, exact):
     assert F(exact) <= found <= F(exact) * F(1001, 1000)
 
 
-def gains(acceleration=("1/20", "2/5", 2), drift=("1/50", "1/12", "1/2"), root=("3/10", 2, 13)):
+NOISE = {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
+
+
+def gains(
+    acceleration=("1/20", "2/5", 2),
+    drift=("1/50", "1/12", "1/2"),
+    root=("3/10", 2, 13),
+    slip_noise=(1, 7, 40),
+    rate_noise=("1/3", 2, 9),
+):
     """One part of the period."""
     outputs = ("slip_error", "slip_rate_error", "push")
-    columns = {"acceleration": acceleration, "drift": drift, "root": root}
+    columns = {"acceleration": acceleration, "drift": drift, "root": root, "slip_noise": slip_noise}
+    columns["rate_noise"] = rate_noise
     return {(y, name): (F(v),) for name, column in columns.items() for y, v in zip(outputs, column, strict=True)}
 
 
@@ -62,17 +73,36 @@ def test_one_channel_is_the_scalar_small_gain():
 
 @pytest.mark.parametrize("task", [TASK, LIMITED], ids=["amplitude", "rate"])
 @pytest.mark.parametrize("root", [None, ImplicitRoot(pull=PULL, slopes=(F("0.9"), F(1)), remainder=F(1, 10**6))])
-def test_the_inputs_are_the_fixed_point_of_what_the_outputs_make_of_them(task, root):
+@pytest.mark.parametrize("noise", [{}, NOISE, {"rate_noise": F(1, 10**4)}], ids=["quiet", "noisy", "noisy rate"])
+def test_the_inputs_are_the_fixed_point_of_what_the_outputs_make_of_them(task, root, noise):
     """W ← F + MW from 0, a thousand times in floats."""
-    channels, given = channels_of(task, root, STEP), gains()
+    channels, given = channels_of(task, root, STEP, noise), gains()
     sizes = dict.fromkeys((c.name for c in channels), 0.0)
     for _ in range(1000):
         peaks = {y: sum(float(given[y, k][0]) * v for k, v in sizes.items()) for y in task.half_ranges}
         sizes = {c.name: float(c.own) + sum(float(s) * peaks[y] for y, s in c.shares.items()) for c in channels}
-    found = bounds_from(task, given, root, STEP)
+    found = bounds_from(task, given, root, STEP, noise)
     assert isinstance(found, Bounds)
     assert float(found.slip_error) == pytest.approx(peaks["slip_error"], rel=1e-9)
     assert float(found.slip_rate_error) == pytest.approx(peaks["slip_rate_error"], rel=1e-9)
+
+
+def test_noise_adds_what_its_gains_make_of_it():
+    """Without anything else: 1e-6 m times the gain, and what the ranges make of that, (1 − m)⁻¹."""
+    task = replace(TASK, amplitude=F(0), damping=F(0), target_slip=F(1, 10**30))
+    found = bounds_from(task, gains(drift=(0, 0, 0)), None, STEP, {"slip_noise": F(1, 10**6)})
+    half = task.half_ranges.values()
+    m, n = (sum(h * g for h, g in zip(half, v, strict=True)) for v in ((F(1, 20), F(2, 5), F(2)), (F(1), F(7), F(40))))
+    assert found.slip_error == pytest.approx(F(1, 10**6) * (1 + n / (1 - m) / 20), rel=1e-12)
+
+
+def test_the_root_of_a_noisy_step_may_lie_wider_by_the_noise():
+    """|w + γe1/T_s| ≤ δγ|e1 + n1|/T_s + ε."""
+    root = ImplicitRoot(pull=PULL, slopes=(F("0.9"), F(1)), remainder=F(1, 10**6))
+    found = {c.name: c for c in channels_of(TASK, root, STEP, NOISE)}
+    assert found["root"].own == F(1, 10**6) + F(1, 20) / STEP * NOISE["slip_noise"]
+    assert [found[name].own for name in NOISE] == list(NOISE.values())
+    assert not any(found[name].shares for name in NOISE)
 
 
 def test_a_loop_through_the_implicit_step_can_fail_by_itself():

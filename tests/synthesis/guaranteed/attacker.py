@@ -1,7 +1,8 @@
 """A simulator of a held loop that knows numbers only, and courses made to hurt it. NumPy; nothing of the package.
 
 The plant e1′ = e2, e2′ = s·e1 − w·e2 + β·b·p + φ is integrated by RK4 in small steps, many courses at once. The law is
-p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later; y = (e1, e2), or (e1, e2, w) with w by a rule.
+p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later; y = (e1, e2), or (e1, e2, w) with w by a rule, of
+the errors as they are measured.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Held:
-    """Numbers of a loop: matrices of the law, b, ranges of s, w and β, T_s, delay, bound of φ, all in SI."""
+    """Numbers of a loop: matrices of the law, b, ranges of s, w and β, T_s, delay, bounds of φ and noise, all in SI."""
 
     F: np.ndarray
     G: np.ndarray
@@ -25,17 +26,19 @@ class Held:
     delay: float
     force: float
     ends: object = None
+    noise: tuple = (0.0, 0.0)
 
 
 def middle(ends):
     return (ends[0] + ends[1]) / 2
 
 
-def run(held, periods, pieces, choose, courses, kick=None, back=None):
+def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None):
     """Largest |e1| and |e2| of every course and the errors at the end.
 
     choose(k, e, v) gives s, w, β and φ for one small step from its number, the errors (2 × courses) and b·p; kick(k) is
-    an amount added to e2 before a step; back is the slip rate of the reference on a plant that never slides backward.
+    an amount added to e2 before a step, hear(k) to both errors that the law is told
+    (2 × courses); back is the slip rate of the reference on a plant that never slides backward.
     """
     size, h = len(held.C), held.step / pieces
     late = round(held.delay / h)
@@ -43,7 +46,8 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None):
     waiting, largest = [], np.zeros((2, courses))
     for k in range(periods * pieces):
         if k % pieces == 0:
-            y = e if held.ends is None else np.vstack([e, held.ends(e[0], e[1])])
+            told = e if hear is None else e + hear(k)
+            y = told if held.ends is None else np.vstack([told, held.ends(told[0], told[1])])
             waiting.append((k + late, held.b * (held.C @ z + held.D @ y)))
             z = held.F @ z + held.G @ y
         if waiting and waiting[0][0] == k:
@@ -92,6 +96,21 @@ def aligned(held, response, sign=1.0, lag=0):
         )
 
     return choose
+
+
+def heard(held, response):
+    """Noise at its ends, each time the way that the nominal response to it wants: response(k) for either error."""
+    bounds = np.array(held.noise)[:, None]
+    return lambda k: bounds * np.sign(response[:, k : k + 1])
+
+
+def noisy(held, courses, count, seed):
+    """Noise at its ends: of one sign for random times, from every sample to the next for half of the courses."""
+    random = np.random.default_rng(seed)
+    changes = random.random((count, 2, courses)) < 10.0 ** random.uniform(-2.5, 0, courses)
+    changes[:, :, : courses // 2] = random.random((count, 2, courses // 2)) < 0.5
+    signs = 1 - 2 * (np.cumsum(changes, axis=0) % 2)
+    return lambda k: np.array(held.noise)[:, None] * signs[k]
 
 
 def switching(held, courses, count, seed):

@@ -1,0 +1,143 @@
+"""Laws of a few numbers without units for one model, T_s and delay, among which searches choose."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import floor, log10
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+
+from quakedesign.certificates.guarantee import Task
+from quakedesign.loop import ErrorPrediction, LinearLaw, Prediction, disturbance_estimate, slip_observer
+
+MEASURED = ("slip-and-rate", "slip")
+_STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
+_OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains, and decades above what noise allows
+_DECADES = 4.0  # of process noise over that of the measurement, at most, at the start
+_WIDEST = 12.0  # decades, at which Riccati equations are still solved well
+_FAINT = 1e-12  # process noise of everything, so that the filter forgets its start
+_DIGITS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Laws of numbers x, where to begin, which x make one, and what ``tracking`` may spend of the smallest peak."""
+
+    law: Callable[[np.ndarray], LinearLaw]
+    starts: tuple[tuple[float, ...], ...]
+    admits: Callable[[np.ndarray], bool]
+    room: float
+
+
+def family_of(task: Task, step: Fraction, delay: Fraction, measured: str, noise: Fraction) -> Family:
+    """Feedback with an estimate of the disturbance, from slip and slip rate or from the slip alone.
+
+    Parameters
+    ----------
+    task : Task
+    step, delay : Fraction
+        [s].
+    measured : str
+        One of `MEASURED`.
+    noise : Fraction
+        Bound of that of the slip [m], near which an observer's search begins.
+    """
+    if measured == "slip":
+        return _observers(task, step, delay, noise)
+    scale, prediction = _Scale.of(task, step), _ahead(task, step, delay)
+    known = Prediction(
+        of_slip=prediction.of_errors[1][0],
+        of_rate=prediction.of_errors[1][1],
+        of_pushes=tuple(v[1] for v in prediction.of_pushes),
+        ahead=prediction.ahead,
+        ahead_of_pushes=prediction.ahead_of_pushes,
+    )
+
+    def law(x: np.ndarray) -> LinearLaw:
+        return disturbance_estimate(scale.gains(x), _short(float(x[2])), known, scale.gain)
+
+    return Family(law, _STARTS, lambda x: bool(0 < x[2] < 1), room=1.6)
+
+
+def _observers(task: Task, step: Fraction, delay: Fraction, noise: Fraction) -> Family:
+    """Steady-state Kalman observers: two gains, decades of the variances of accelerations and of the level's steps."""
+    scale, prediction, period = _Scale.of(task, step), _ahead(task, step, delay), float(step)
+    units = np.diag([1, 1 / period, 1 / period**2])
+    follows = np.linalg.inv(units) @ expm(_flow(task) * period) @ units
+
+    def law(x: np.ndarray) -> LinearLaw:
+        corrections = units @ _kalman(follows, float(x[2]), float(x[3]))
+        first, second, third = (_short(float(v)) for v in corrections)
+        return slip_observer(scale.gains(x), (first, second, third), prediction, scale.gain)
+
+    moved = float(task.amplitude) * period**2
+    decades = _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
+    starts = tuple((k1, k2, decades + a, decades + b) for k1, k2, a, b in _OBSERVERS)
+    return Family(law, starts, lambda x: bool(np.abs(x[2:]).max() < _WIDEST), room=1.4)
+
+
+def _kalman(follows: np.ndarray, acceleration: float, level: float) -> np.ndarray:
+    """Corrections per innovation of the slip, whose noise has the variance 1, by the Riccati equation of the filter."""
+    pushed = follows[:, 2] * [1, 1, 0]
+    process = 10**acceleration * np.outer(pushed, pushed) + np.diag([0, 0, 10**level]) + _FAINT * np.eye(3)
+    covariance = solve_discrete_are(follows.T, np.eye(3)[:, :1], process, np.eye(1))
+    return np.asarray(covariance[:, 0] / (covariance[0, 0] + 1))
+
+
+@dataclass(frozen=True, slots=True)
+class _Scale:
+    """β0·b of the model, in a few digits [m²/kg], and T_s [s]."""
+
+    gain: Fraction
+    model_gain: float
+    step: float
+
+    @classmethod
+    def of(cls, task: Task, step: Fraction) -> "_Scale":
+        gain = float(task.model.gain)
+        return cls(_short(gain), gain, float(step))
+
+    def gains(self, x: np.ndarray) -> tuple[Fraction, Fraction]:
+        """k1 [Pa/m] and k2 [Pa·s/m]."""
+        return _short(float(x[0]) / self.model_gain / self.step**2), _short(float(x[1]) / self.model_gain / self.step)
+
+
+def _flow(task: Task) -> np.ndarray:
+    """Of e1, e2 and a constant push."""
+    return np.array([[0, 1, 0], [float(task.model.slip), -float(task.model.rate), 1], [0, 0, 0]])
+
+
+def _ahead(task: Task, step: Fraction, delay: Fraction) -> ErrorPrediction:
+    """What the model says of the next sample, and of the time at which a pressure arrives; numbers of four digits."""
+    flow, period, late = _flow(task), float(step), float(delay)
+
+    def pushed(duration: float) -> np.ndarray:
+        """Errors after a unit push for some time."""
+        return np.array(expm(flow * duration))[:2, 2]
+
+    whole, part = int(delay // step), float(delay % step)
+    ages = whole + (1 if part else 0)
+    pushes = [np.zeros(2)] * (ages + 1)
+    pushes[whole] = pushed(period - part)
+    if part:
+        pushes[whole + 1] = pushed(period) - pushes[whole]
+    arriving = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in range(1, ages + 1)]
+    return ErrorPrediction(
+        of_errors=_rounded(expm(flow * period)[:2, :2]),
+        of_pushes=_rounded(pushes),
+        ahead=_rounded(expm(flow * late)[:2, :2]),
+        ahead_of_pushes=_rounded(arriving),
+    )
+
+
+def _rounded(rows: "np.ndarray | list[np.ndarray]") -> tuple[tuple[Fraction, ...], ...]:
+    return tuple(tuple(_short(float(v)) for v in row) for row in rows)
+
+
+def _short(value: float, digits: int = _DIGITS) -> Fraction:
+    """Rational with few decimal digits near a float."""
+    if not value:
+        return Fraction(0)
+    unit = Fraction(10) ** (floor(log10(abs(value))) + 1 - digits)
+    return round(Fraction(value) / unit) * unit

@@ -1,0 +1,145 @@
+"""Guarantees of designs that are told the slip alone, with noise, against a simulator of its own."""
+
+import importlib.util
+from dataclasses import replace
+from fractions import Fraction as F
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee import Guarantee, guarantee, task_of
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.synthesis.guaranteed import answer, design_held, worst_found
+
+SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
+attacker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(attacker)
+
+REAL = load_fault("real-fault")
+STEP, NOISE, PERIODS, PIECES = F("0.184"), F(1, 10**6), 40, 6
+
+
+@cache
+def designed(name):
+    around = {
+        "slip alone": {"measured": "slip", "slip_noise": NOISE},
+        "both": {"slip_noise": NOISE, "rate_noise": F(1, 10**5)},
+    }[name]
+    return design_held(task_of(REAL), STEP, objective="peak", **around)
+
+
+def numbers(claim):
+    """A guarantee as the attacker reads it."""
+    law, task, held = claim.held.law, claim.task, claim.held
+    as_floats = lambda m: np.array([[float(v) for v in row] for row in m])  # noqa: E731
+    return attacker.Held(
+        F=as_floats(law.update),
+        G=as_floats(law.measured),
+        C=np.array([float(v) for v in law.output]),
+        D=np.array([float(v) for v in law.feedback]),
+        b=float(task.authority),
+        s=tuple(map(float, task.slip_chord)),
+        w=tuple(map(float, task.rate_chord)),
+        beta=tuple(map(float, task.beta)),
+        step=float(held.step),
+        delay=float(held.delay),
+        force=float(task.amplitude + task.reference_force),
+        noise=(float(held.slip_noise), float(held.rate_noise)),
+    )
+
+
+def within(largest, claim):
+    return largest[0].max() <= claim.claims.slip_error and largest[1].max() <= claim.claims.slip_rate_error
+
+
+def test_the_slip_alone_is_enough_for_the_target():
+    claim = designed("slip alone")
+    assert isinstance(claim, Guarantee)
+    assert claim.held.law.of_slip_alone
+    assert (claim.held.slip_noise, claim.check()) == (NOISE, Verdict.PROVED)
+    assert claim.claims.slip_rate_error <= F(4, 10**4)
+    assert claim.claims.slip_error <= F(12, 10**5)
+
+
+@pytest.mark.parametrize("name", ["slip alone", "both"])
+@pytest.mark.parametrize("sticks", [False, True])
+def test_no_course_of_five_thousand_with_noise_violates_a_guarantee(name, sticks):
+    claim, courses = designed(name), 5_000
+    held, back = numbers(claim), float(claim.task.reference_rates[0]) if sticks else None
+    hear = attacker.noisy(held, courses, PERIODS * PIECES, seed=8)
+    choose = attacker.switching(held, courses, PERIODS * PIECES, seed=3)
+    largest, _ = attacker.run(held, PERIODS, PIECES, choose, courses, back=back, hear=hear)
+    assert within(largest, claim)
+    assert largest[1].max() > 0.3 * float(claim.claims.slip_rate_error)  # the courses do hurt
+
+
+def nominal_response(held, k):
+    """Of the slip error (0) or the slip-rate error (1) at the end, to a push and to noise in every step."""
+    count = PERIODS * PIECES
+    ends = attacker.responses(held, PERIODS, PIECES)[k]
+    off = np.zeros((2, count))
+    for place in (0, 1):
+        hear = lambda i, place=place: np.outer(np.arange(2) == place, np.arange(count) == i)  # noqa: E731
+        _, end = attacker.run(held, PERIODS, PIECES, attacker.nominal(held), count, hear=hear)
+        off[place] = end[k]
+    return ends, off
+
+
+@pytest.mark.parametrize("name", ["slip alone", "both"])
+def test_noise_along_the_nominal_response_comes_close_and_the_worst_found_is_no_less(name):
+    claim, seen = designed(name), []
+    held = numbers(claim)
+    for k in (0, 1):
+        ends, off = nominal_response(held, k)
+        choose = attacker.aligned(held, ends)
+        largest, _ = attacker.run(held, PERIODS, PIECES, choose, 1, hear=attacker.heard(held, off))
+        quiet, _ = attacker.run(held, PERIODS, PIECES, choose, 1)
+        assert largest[k].max() > 1.02 * quiet[k].max()
+        assert within(largest, claim)
+        seen.append(largest[k].max())
+    assert claim.claims.slip_rate_error <= 2 * seen[1]
+    found = worst_found(claim)
+    assert 0.97 * seen[0] <= found.slip_error <= claim.claims.slip_error
+    assert 0.97 * seen[1] <= found.slip_rate_error <= claim.claims.slip_rate_error <= 2 * found.slip_rate_error
+    assert claim.claims.slip_error <= 2 * found.slip_error
+
+
+def test_the_search_uses_the_noise():
+    claim = designed("slip alone")
+    quiet = replace(claim, held=replace(claim.held, slip_noise=F(0)))
+    loud, still = worst_found(claim), worst_found(quiet)
+    assert loud.slip_error > 1.02 * still.slip_error
+    assert loud.slip_rate_error > 1.02 * still.slip_rate_error
+
+
+def test_with_stick_no_course_is_found_that_leaves_the_bounds():
+    claim = designed("slip alone")
+    found = worst_found(claim, sticks=True)
+    assert claim.claims.slip_rate_error / 4 < found.slip_rate_error <= claim.claims.slip_rate_error
+    assert claim.claims.slip_error / 4 < found.slip_error <= claim.claims.slip_error
+
+
+def test_more_noise_is_guaranteed_less():
+    claim = designed("slip alone")
+    more = guarantee(task_of(REAL), replace(claim.held, slip_noise=2 * NOISE))
+    assert more.claims.slip_rate_error > claim.claims.slip_rate_error
+    assert more.claims.slip_error > claim.claims.slip_error
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"measured": "rate"}, "measured must be one of slip-and-rate, slip"),
+        ({"measured": "slip", "gains": ("1", "1", "1", "1")}, "measured is for a designed e-LQR"),
+        ({"measured": "slip", "controller": "cta"}, "measured is for a designed e-LQR"),
+        ({"slip_noise": F(-1)}, "a bound of noise must be 0 or more"),
+        ({"measured": "slip", "rate_noise": F(1)}, "needs a law that measures it"),
+    ],
+)
+def test_what_cannot_be_measured_so_is_refused(wrong, said):
+    with pytest.raises(ParameterError, match=said):
+        answer(REAL, **wrong)
