@@ -18,7 +18,7 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "quakedesign"
 EVERYWHERE = {
     f"quakedesign.{name}"
-    for name in ("arguments", "errors", "rationals", "input", "output", "temporary", "text", "bounds")
+    for name in ("arguments", "errors", "rationals", "input", "output", "temporary", "text", "bounds", "discovery")
 }
 BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "loop", "certificates", "simulation")
 MAY_IMPORT = {
@@ -42,6 +42,7 @@ MAY_IMPORT = {
     "__init__": (),
     "errors": (),
     "text": (),
+    "discovery": (),
     "arguments": (),
     "input": (),
     "rationals": (),
@@ -84,6 +85,32 @@ def imports(path):
             "__import__",
         ):
             yield from (a.value for a in node.args[:1] if isinstance(a, ast.Constant))
+
+
+def imported_modules(path):
+    """Modules of the package that a file imports anywhere, those for type hints alone included."""
+    known = {module_name(p).removesuffix(".__init__") for p in PACKAGE.rglob("*.py")}
+    for name in imports(path):
+        yield from [n for n in (name, name.rpartition(".")[0]) if n in known][:1]
+
+
+def circle(arrows):
+    """Modules that import each other in a circle, and what leads there; none where all can be put in order."""
+    rest = {name: set(others) - {name} for name, others in arrows.items()}
+    while free := [name for name, others in rest.items() if not others & rest.keys()]:
+        for name in free:
+            del rest[name]
+    return sorted(rest)
+
+
+def test_no_module_imports_in_a_circle():
+    arrows = {module_name(p).removesuffix(".__init__"): imported_modules(p) for p in SOURCES}
+    assert circle(arrows) == []
+
+
+def test_a_circle_is_found():
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": set()}) == ["a", "b", "c"]
+    assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
 
 
 def third_party(path):

@@ -1,12 +1,14 @@
 """Claims about closed loops, their files, and the exact decision."""
 
 from quakedesign.arguments import check_arguments
-from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, Witness, loop_of
-from quakedesign.certificates.files import certificate_text, load_certificate, parse_certificate, save_certificate
+from quakedesign.certificates.certificate import Certificate, load_certificate, parse_certificate
+from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Verdict, Witness, loop_of
+from quakedesign.certificates.files import certificate_text, save_certificate
 
 __all__ = [
     "Certificate",
     "Equilibrium",
+    "Evidence",
     "Loop",
     "Verdict",
     "Witness",

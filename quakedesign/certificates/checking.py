@@ -4,14 +4,14 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from itertools import product
 
-from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Verdict, loop_of, require
+from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Verdict, loop_of, require
 from quakedesign.certificates.obligations import Obligation, claimed, different
 from quakedesign.certificates.witnesses import proves
 from quakedesign.controllers import LoopField, Subject, laws, model_of
 from quakedesign.symbolic.terms import Term, value
 
 
-def check(certificate: Certificate, law: Subject | None = None) -> Verdict:
+def check(certificate: Evidence, law: Subject | None = None) -> Verdict:
     """Decide a certificate in exact arithmetic; see `Certificate.check`."""
     _check_roots(certificate.loop)
     _same_field(certificate.loop, law)
@@ -59,7 +59,7 @@ def _sorted(loop: Loop, sums: Mapping[str, tuple[Term, ...]]) -> dict[str, list[
     }
 
 
-def _check_proof(certificate: Certificate) -> None:
+def _check_proof(certificate: Evidence) -> None:
     loop, claims = certificate.loop, certificate.claims
     second = "decrease" if loop.domain == "cells" else "rate"
     required, allowed = {"positive", second}, {f"bound_{state}" for state in loop.states}
@@ -74,7 +74,7 @@ def _check_proof(certificate: Certificate) -> None:
     _check_witnesses(certificate, claimed(loop, certificate.lyapunov, claims))
 
 
-def _check_witnesses(certificate: Certificate, obligations: Iterable[Obligation]) -> None:
+def _check_witnesses(certificate: Evidence, obligations: Iterable[Obligation]) -> None:
     """Refuse unless every different obligation has its witness, in order, and it is exact."""
     expected = list[str]()
     for one in different(obligations):

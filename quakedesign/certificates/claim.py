@@ -7,11 +7,10 @@ from decimal import Decimal
 from enum import Enum
 from fractions import Fraction
 from math import isqrt
-from pathlib import Path
 
 import sympy as sp
 
-from quakedesign.controllers import LoopField, Subject
+from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.polynomial import Polynomial
@@ -136,20 +135,8 @@ class Equilibrium:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Certificate:
-    """A statement about one closed loop with its proof or its counterexample.
-
-    Attributes
-    ----------
-    loop : Loop
-    lyapunov : tuple of Term
-        V; empty for a refutation.
-    claims : mapping of str to Fraction
-        ``positive`` and ``decrease`` or ``rate`` [1/s on `reals`].
-    witnesses : mapping of str to Witness
-        One for every different obligation, by name.
-    refutation : Equilibrium, optional
-    """
+class Evidence:
+    """The parts of a `Certificate`, as they stand in a file."""
 
     loop: Loop
     lyapunov: tuple[Term, ...] = ()
@@ -159,30 +146,9 @@ class Certificate:
 
     def __repr__(self) -> str:
         claimed = f"claims {', '.join(self.claims)} with {len(self.witnesses)} witnesses"
-        return f"Certificate({self.loop}; {claimed if self.refutation is None else 'refuted by an equilibrium'})"
-
-    def check(self, law: Subject | None = None) -> Verdict:
-        """Re-decide the statement from nothing but its claim, in exact arithmetic; field against law as well.
-
-        Parameters
-        ----------
-        law : str, type of Law or LoopField, optional
-            What the field must be that of; without it the law of the package that the certificate names.
-
-        Raises
-        ------
-        CertificateError
-            When the proof does not hold, or the field is not that of the law.
-        """
-        from quakedesign.certificates.checking import check
-
-        return check(self, law)
-
-    def save(self, path: str | Path) -> None:
-        """Write the file of FORMAT.md, whole or not at all."""
-        from quakedesign.certificates.files import save_certificate
-
-        save_certificate(self, path)
+        return (
+            f"{type(self).__name__}({self.loop}; {claimed if self.refutation is None else 'refuted by an equilibrium'})"
+        )
 
 
 def loop_of(

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.bounds import UpperBound
-from quakedesign.certificates.checking import check
-from quakedesign.certificates.claim import Certificate, Verdict
-from quakedesign.certificates.files import certificate_of, read_json
+from quakedesign.certificates.certificate import Certificate
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.files import evidence_of, read_json
 from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.guarantee.files import is_guarantee, read_guarantee
 from quakedesign.certificates.linear_premises import sectors
@@ -58,9 +58,9 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
         if is_about_polynomial(raw):
             verdict_of, said = _polynomial(raw)
             return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
-        certificate = certificate_of(raw)
+        certificate = Certificate.of(evidence_of(raw))
         with limited():
-            verdict = check(certificate)
+            verdict = certificate.check()
         more = _covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []
     except WorkError as error:
         return f"undecided: {error}", []

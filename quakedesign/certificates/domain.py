@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates.claim import Certificate
+from quakedesign.certificates.certificate import Certificate
 from quakedesign.certificates.level_sets import LevelSets
 from quakedesign.certificates.matched import (
     Errors,

@@ -7,7 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from quakedesign.certificates.claim import Certificate, Equilibrium, Loop, Witness
+from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Witness
 from quakedesign.certificates.term_files import LIMITS, plain_terms, read_terms, texts
 from quakedesign.errors import CertificateError, UnsupportedError
 from quakedesign.input import read_text
@@ -32,25 +32,6 @@ from quakedesign.sos.exact.strict import (
 _LAW = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 
-def load_certificate(path: str | Path) -> Certificate:
-    """Read a certificate file; reading verifies nothing.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Certificate
-
-    Raises
-    ------
-    CertificateError
-        When the file cannot be read or breaks a rule of FORMAT.md.
-    """
-    return certificate_of(read_json(path))
-
-
 def read_json(path: str | Path) -> Any:
     """JSON value of a file of bounded size.
 
@@ -63,16 +44,13 @@ def read_json(path: str | Path) -> Any:
     return parse(text)
 
 
-def parse_certificate(text: str) -> Certificate:
-    """Certificate from the text of a file. Raises CertificateError as `load_certificate`."""
-    return certificate_of(parse(text))
-
-
-def certificate_of(raw: Any) -> Certificate:
-    """Certificate from a parsed file. Raises CertificateError as `load_certificate`.
+def evidence_of(raw: Any) -> Evidence:
+    """Evidence from a parsed file; reading verifies nothing.
 
     Raises
     ------
+    CertificateError
+        When it breaks a rule of FORMAT.md.
     UnsupportedError
         For a bound of outputs under inputs, which files of the kind ``guarantee`` have replaced.
     """
@@ -82,7 +60,7 @@ def certificate_of(raw: Any) -> Certificate:
             "longer read. Make the new file with certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE."
         )
     refutes = isinstance(raw, dict) and "refutation" in raw
-    return _certificate(with_keys(raw, _REFUTATION if refutes else _PROOF))
+    return _evidence(with_keys(raw, _REFUTATION if refutes else _PROOF))
 
 
 _COMMON = {"format", "law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field"}
@@ -91,17 +69,17 @@ _PROOF = _COMMON | {"V", "claims", "witnesses"}
 _REFUTATION = _COMMON | {"refutation"}
 
 
-def _certificate(raw: dict[str, Any]) -> Certificate:
+def _evidence(raw: dict[str, Any]) -> Evidence:
     need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
     loop = _loop(raw)
     if "refutation" in raw:
-        return Certificate(loop=loop, refutation=_equilibrium(raw["refutation"]))
+        return Evidence(loop=loop, refutation=_equilibrium(raw["refutation"]))
     witnesses: dict[str, Witness] = {}
     for entry in listed(raw["witnesses"], "witnesses", LIMITS["witnesses"]):
         name = with_keys(entry, _WITNESS)["obligation"]
         need(isinstance(name, str) and name not in witnesses, "an obligation must be named once, by a text")
         witnesses[name] = _witness(entry, loop)
-    return Certificate(
+    return Evidence(
         loop=loop,
         lyapunov=read_terms(raw["V"], loop, tuple(loop.states)),
         claims=read_rationals(raw["claims"], "claims", 3 + LIMITS["states"]),
@@ -200,12 +178,12 @@ def _equilibrium(raw: Any) -> Equilibrium:
     )
 
 
-def certificate_text(certificate: Certificate) -> str:
+def certificate_text(certificate: Evidence) -> str:
     """Text of the file, the same for the same certificate."""
     return json.dumps(_plain(certificate), ensure_ascii=True, separators=(",", ":"), indent=None) + "\n"
 
 
-def _plain(certificate: Certificate) -> dict[str, Any]:
+def _plain(certificate: Evidence) -> dict[str, Any]:
     loop = certificate.loop
     plain: dict[str, Any] = {
         "format": 1,
@@ -255,7 +233,7 @@ def _plain_square(square: Square, variables: int) -> dict[str, Any]:
     return {"times": times, "basis": [list(b) for b in square.basis], "gram": [str(v) for v in square.gram]}
 
 
-def save_certificate(certificate: Certificate, path: str | Path) -> None:
+def save_certificate(certificate: Evidence, path: str | Path) -> None:
     """Write a certificate file whole or not at all, and only if it can be read again.
 
     Raises
@@ -266,5 +244,5 @@ def save_certificate(certificate: Certificate, path: str | Path) -> None:
         When the certificate is beyond the limits of the format, such as numbers of more than 400 digits.
     """
     text = certificate_text(certificate)
-    parse_certificate(text)
+    evidence_of(parse(text))
     write_whole(Path(path), text)

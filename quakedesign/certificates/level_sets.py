@@ -6,7 +6,8 @@ from typing import Any
 
 import sympy as sp
 
-from quakedesign.certificates.claim import Certificate, error_units, full_field
+from quakedesign.certificates.certificate import Certificate
+from quakedesign.certificates.claim import error_units, full_field
 from quakedesign.certificates.matched import Errors
 from quakedesign.controllers import LoopField
 from quakedesign.rationals import fraction_of

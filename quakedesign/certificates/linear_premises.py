@@ -7,7 +7,8 @@ from functools import cache, lru_cache
 import sympy as sp
 
 from quakedesign.bounds import UpperBound
-from quakedesign.certificates.claim import Certificate, require
+from quakedesign.certificates.certificate import Certificate
+from quakedesign.certificates.claim import require
 from quakedesign.certificates.matched import static_friction
 from quakedesign.certificates.premises import (
     Premise,

@@ -6,7 +6,8 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.bounds import Enclosure, UpperBound
-from quakedesign.certificates.claim import Certificate, require
+from quakedesign.certificates.certificate import Certificate
+from quakedesign.certificates.claim import require
 from quakedesign.certificates.domain import Domain, Question, certified_domain, certified_lipschitz
 from quakedesign.certificates.level_sets import LevelSets
 from quakedesign.certificates.matched import (

@@ -11,7 +11,8 @@ from fractions import Fraction
 
 import sympy as sp
 
-from quakedesign.certificates.claim import Certificate, error_units, require
+from quakedesign.certificates.certificate import Certificate
+from quakedesign.certificates.claim import error_units, require
 from quakedesign.certificates.forms import Form, Problem, largest_ratio
 from quakedesign.certificates.obligations import Obligations, degree
 from quakedesign.controllers import LoopField

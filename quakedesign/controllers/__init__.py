@@ -4,14 +4,12 @@ import tomllib
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from importlib import import_module
 from importlib.resources import files
-from inspect import isabstract
-from pkgutil import iter_modules
 
 from quakedesign.arguments import check_arguments
 from quakedesign.controllers.base import Controller, Law, LoopField, Signals
 from quakedesign.controllers.sliding_mode import SlidingMode
+from quakedesign.discovery import discovered
 from quakedesign.errors import UnknownNameError
 
 __all__ = [
@@ -59,13 +57,7 @@ class BaseGains:
 @cache
 def laws() -> dict[str, type[Law]]:
     """Every law of the package by name, those included that act on other plants than a fault and are only proved."""
-    found: dict[str, type[Law]] = {}
-    for info in iter_modules(__path__):
-        module = import_module(f"{__name__}.{info.name}")
-        for item in vars(module).values():
-            if isinstance(item, type) and issubclass(item, Law) and not isabstract(item):
-                found[item.name] = item
-    return found
+    return discovered(__name__, Law)
 
 
 def law(name: str) -> type[Law]:

@@ -9,6 +9,7 @@ from quakedesign.fault.checks import Problems, require_name, require_nonnegative
 from quakedesign.fault.disturbance import Disturbance
 from quakedesign.fault.friction import FrictionLaw
 from quakedesign.fault.reference import Reference
+from quakedesign.fault.statics import rest_slip
 from quakedesign.fault.uncertainty import UncertaintyBox, uncertainty_box
 
 
@@ -169,9 +170,7 @@ class Fault:
 
         nan for friction with a state, which has no strength of its own at rest.
         """
-        from quakedesign.fault.statics import rest_slip
-
-        return rest_slip(self)
+        return rest_slip(self.friction, self.effective_normal_stress * self.area, self.stiffness)
 
 
 _PLANT = ("density", "shear_modulus", "length", "damping", "effective_normal_stress", "sampling_time")

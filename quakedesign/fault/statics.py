@@ -1,33 +1,31 @@
 """Where a fault that starts to slip comes to rest."""
 
 from math import nan
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from quakedesign.fault.parameters import Fault
+from quakedesign.fault.friction import FrictionLaw
 
 _SCAN = 4096
 _DIGITS = 40  # the slip of a fault that is only just unstable is a small difference
 
 
-def rest_slip(fault: "Fault") -> float:
+def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
     """Smallest positive slip [m] where the excess of load over strength turns from driving to resisting.
 
-    The excess is (μ(0) − μ(x))σ'_n A − kx at zero pressure (statics of eq. shift). All roots lie below
+    The excess is (μ(0) − μ(x))σ'_n A − kx at zero pressure (statics of eq. shift), for a load σ'_n A [N] and a
+    stiffness k [N/m]. All roots lie below
     (μ_max − μ_min)σ'_n A/k. A fault whose origin is stable stays where it is; friction with a state has no strength
     of its own at rest, and nan is returned.
     """
-    if fault.friction.state_names:
+    if friction.state_names:
         return nan
     import mpmath
     import sympy as sp
 
     x = sp.Symbol("x", nonnegative=True)
-    law = fault.friction.exact().coefficient
-    load = fault.effective_normal_stress * fault.area
-    drive = sp.lambdify(x, law(sp.Integer(0), 0) - law(x, 0) - fault.stiffness / load * x, "mpmath")
-    low, high = fault.friction.bounds
-    furthest = (high - low) * load / fault.stiffness * 1.0001
+    law = friction.exact().coefficient
+    drive = sp.lambdify(x, law(sp.Integer(0), 0) - law(x, 0) - stiffness / load * x, "mpmath")
+    low, high = friction.bounds
+    furthest = (high - low) * load / stiffness * 1.0001
     if furthest == 0:
         return 0.0
     grid = [furthest * i / _SCAN for i in range(_SCAN + 1)]

@@ -11,7 +11,7 @@ from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.loop.law_expressions import law_expressions
 from quakedesign.loop.schemes import Scheme
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.energy import WORKS, powers
+from quakedesign.simulation.energy import WORKS
 from quakedesign.simulation.integrators.adaptive import AdaptiveIntegrator, Flow, StoppedError
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.symbolic import SignedPower
@@ -181,4 +181,4 @@ def field(recorder: Recorder) -> Any:
     counter = time / recorder.step
     rates = recorder.scheme.rates(loop, counter, state, recorder.step)
     pressure = recorder.scheme.pressure(loop, counter, state, recorder.step)
-    return ca.Function("field", [time, state, factors], [rates, powers(loop, time, state[:2], pressure)])
+    return ca.Function("field", [time, state, factors], [rates, loop.powers(time, state[:2], pressure)])

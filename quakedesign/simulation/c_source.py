@@ -1,10 +1,9 @@
-"""Text of the C files of an exported controller."""
+"""A sampled step of a controller, and the text of its C files."""
 
 import textwrap
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from quakedesign.simulation.export import ControllerStep
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 _WIDTH = 110
 _USE = """
@@ -62,7 +61,41 @@ void controller_step(const double* measurement, double* memory, double* pressure
 """
 
 
-def header_text(found: "ControllerStep") -> str:
+@dataclass(frozen=True, kw_only=True)
+class ControllerStep:
+    """What a controller does once per sample, as one function of its measurement and its memory.
+
+    Attributes
+    ----------
+    function : casadi.Function
+        (measurement, memory) → memory, pressure [Pa].
+    measurement : mapping of str to str
+        Unit of every measured signal, in order.
+    start : mapping of str to float
+        Memory before the first sample, in order, SI units.
+    step : float
+        Sampling period T_s [s].
+    facts : mapping of str to str
+        Where it comes from: fault, law, gains, scheme, versions.
+    """
+
+    function: Any
+    measurement: Mapping[str, str]
+    start: Mapping[str, float]
+    step: float
+    facts: Mapping[str, str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able facts."""
+        return {
+            "step": self.step,
+            "measurement": dict(self.measurement),
+            "memory": dict(self.start),
+            "facts": dict(self.facts),
+        }
+
+
+def header_text(found: ControllerStep) -> str:
     """Header with the meaning of every number."""
     measured = (f"measurement[{i}]: {name} [{unit}]" for i, (name, unit) in enumerate(found.measurement.items()))
     kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(found.start.items()))
@@ -73,7 +106,7 @@ def header_text(found: "ControllerStep") -> str:
     return comment + _HEADER.format(**sizes)
 
 
-def source_text(found: "ControllerStep", header: str) -> str:
+def source_text(found: ControllerStep, header: str) -> str:
     """CasADi's C for the step, followed by the two functions of the header."""
     import casadi as ca
 

@@ -10,9 +10,8 @@ import sympy as sp
 from quakedesign.controllers import Controller, SlidingMode
 from quakedesign.fault import Fault
 from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
-from quakedesign.loop.schemes import Stepped
 from quakedesign.rationals import rational
-from quakedesign.simulation.energy import WORKS, powers
+from quakedesign.simulation.energy import WORKS, Metered
 from quakedesign.simulation.integrators import Integrator
 from quakedesign.simulation.loading import NOTHING, Load
 from quakedesign.simulation.variation import (
@@ -78,7 +77,7 @@ def _with_numbers(expression: sp.Expr, fault: Fault, varied: bool) -> sp.Expr:
 
 
 @dataclass(frozen=True)
-class ClosedLoop(Stepped):
+class ClosedLoop(Metered):
     """One fault under one law, or under a constant pressure.
 
     Attributes
@@ -132,7 +131,7 @@ class ClosedLoop(Stepped):
             seen: list[Any] = []
 
             def watched(time: Any, x: Any, pressure: Any) -> Any:
-                seen[:] = [powers(self, time, x, pressure, getattr(plant, "direction", 1))]
+                seen[:] = [self.powers(time, x, pressure, getattr(plant, "direction", 1))]
                 return plant(time, x, pressure)
 
             return ca.vertcat(motion(watched, passed, now[:size]), seen[0])

@@ -1,13 +1,13 @@
 """Where the energy of a run went: forces times rates on one side, stored energies on the other."""
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from quakedesign.loop.schemes import Stepped
+from quakedesign.simulation.loading import Load
 from quakedesign.symbolic import plant
-
-if TYPE_CHECKING:
-    from quakedesign.simulation.closed_loop import ClosedLoop
 
 WORKS = ("work_weakening", "work_injection", "work_viscous", "work_disturbance", "sum_slip")
 
@@ -86,47 +86,73 @@ class EnergyBudget:
         return "" if name == "relative_residual" else "J"
 
 
-def powers(loop: "ClosedLoop", time: Any, x: Any, pressure: Any, direction: Any = 1) -> Any:
-    """Integrands per unit mass in the order of `WORKS` (SX): [W/kg], and x1 [m] for the last.
+class Metered(Stepped):
+    """A loop whose forces do work that can be integrated along with its motion; functions on CasADi SX.
 
-    Friction counts relative to its static value under the whole normal stress, whose work is exact in the slip; it
-    acts against `direction`.
+    Attributes
+    ----------
+    load : Load
+    factors : tuple of float or SX
+        True over nominal parameters; empty for the nominal fault.
     """
-    import casadi as ca
 
-    _, normal, damping, stress = hats(loop)
-    rate, relief = (ca.fabs(x[1]), ca.fmin(pressure, stress)) if loop.sticks else (x[1], pressure)
-    friction, way = loop.friction(ca.vertcat(x[0], rate)), direction * x[1]
-    return ca.vertcat(
-        normal * stress * (friction * way - loop.static_friction * x[1]),
-        normal * friction * relief * way,
-        damping * x[1] * x[1],
-        loop.shaken(time, x) * x[1],
-        x[0],
-    )
+    load: Load
+    factors: tuple[Any, ...]
 
+    @property
+    @abstractmethod
+    def friction(self) -> Any:
+        """Function x [m, m/s] → friction coefficient [-]."""
 
-def budget(loop: "ClosedLoop", integrals: Mapping[str, float], time: float, slip: float, rate: float) -> EnergyBudget:
-    """Budget of a run from rest that has taken a time [s], from the integrals of `powers` and its last state."""
-    mass, drift = loop.fault.mass, loop.load.drift
-    stiffness, normal, damping, stress = hats(loop)
-    static = normal * stress * float(loop.static_friction)
-    tension, opened = static - damping * drift, drift * time - slip
-    pull = tension * time + stiffness * (drift * time**2 / 2 - integrals["sum_slip"]) + damping * opened
-    return EnergyBudget.of(
-        kinetic=mass * rate**2 / 2,
-        elastic=mass * (tension + stiffness * opened / 2) * opened,
-        frictional=mass * (integrals["work_weakening"] + static * slip - integrals["work_injection"]),
-        injection=mass * integrals["work_injection"],
-        viscous=mass * (integrals["work_viscous"] + damping * drift * (drift * time - 2 * slip)),
-        far_field=mass * drift * pull,
-        disturbance=mass * integrals["work_disturbance"],
-    )
+    @property
+    @abstractmethod
+    def static_friction(self) -> Any:
+        """Friction coefficient [-] on the verge of slip."""
 
+    @property
+    @abstractmethod
+    def shaken(self) -> Any:
+        """Function (t [s], x [m, m/s]) → φ̂_e [m/s²]."""
 
-def hats(loop: "ClosedLoop") -> tuple[Any, Any, Any, float]:
-    """k̂ [1/s²], N̂ [m²/kg], η̂ [1/s] with the factors of the loop, and σ' [Pa]."""
-    numbers = plant.plant_values(loop.fault)
-    stiffness, damping, authority = loop.factors[:3] or (1.0,) * 3
-    k, eta, N, sigma = (float(numbers[s]) for s in (plant.k_hat, plant.eta_hat, plant.N_hat, plant.sigma))
-    return k * stiffness, N * authority, eta * damping, sigma
+    def powers(self, time: Any, x: Any, pressure: Any, direction: Any = 1) -> Any:
+        """Integrands per unit mass in the order of `WORKS` (SX): [W/kg], and x1 [m] for the last.
+
+        Friction counts relative to its static value under the whole normal stress, whose work is exact in the slip; it
+        acts against `direction`.
+        """
+        import casadi as ca
+
+        _, normal, damping, stress = self.hats()
+        rate, relief = (ca.fabs(x[1]), ca.fmin(pressure, stress)) if self.sticks else (x[1], pressure)
+        friction, way = self.friction(ca.vertcat(x[0], rate)), direction * x[1]
+        return ca.vertcat(
+            normal * stress * (friction * way - self.static_friction * x[1]),
+            normal * friction * relief * way,
+            damping * x[1] * x[1],
+            self.shaken(time, x) * x[1],
+            x[0],
+        )
+
+    def budget(self, integrals: Mapping[str, float], time: float, slip: float, rate: float) -> EnergyBudget:
+        """Budget of a run from rest that has taken a time [s], from the integrals of `powers` and its last state."""
+        mass, drift = self.fault.mass, self.load.drift
+        stiffness, normal, damping, stress = self.hats()
+        static = normal * stress * float(self.static_friction)
+        tension, opened = static - damping * drift, drift * time - slip
+        pull = tension * time + stiffness * (drift * time**2 / 2 - integrals["sum_slip"]) + damping * opened
+        return EnergyBudget.of(
+            kinetic=mass * rate**2 / 2,
+            elastic=mass * (tension + stiffness * opened / 2) * opened,
+            frictional=mass * (integrals["work_weakening"] + static * slip - integrals["work_injection"]),
+            injection=mass * integrals["work_injection"],
+            viscous=mass * (integrals["work_viscous"] + damping * drift * (drift * time - 2 * slip)),
+            far_field=mass * drift * pull,
+            disturbance=mass * integrals["work_disturbance"],
+        )
+
+    def hats(self) -> tuple[Any, Any, Any, float]:
+        """k̂ [1/s²], N̂ [m²/kg], η̂ [1/s] with the factors of the loop, and σ' [Pa]."""
+        numbers = plant.plant_values(self.fault)
+        stiffness, damping, authority = self.factors[:3] or (1.0,) * 3
+        k, eta, N, sigma = (float(numbers[s]) for s in (plant.k_hat, plant.eta_hat, plant.N_hat, plant.sigma))
+        return k * stiffness, N * authority, eta * damping, sigma

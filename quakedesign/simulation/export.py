@@ -1,8 +1,7 @@
 """A sampled controller as C, for the computer of a laboratory."""
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,46 +14,12 @@ from quakedesign.loop.sensing import Sensor
 from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.loop.steps.sampled import Sampled
 from quakedesign.output import require_room, whole_folder, write_whole
-from quakedesign.simulation.c_source import header_text, source_text
+from quakedesign.simulation.c_source import ControllerStep, header_text, source_text
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.run import library_versions
 
 SOURCE, HEADER = "controller.c", "controller.h"
-
-
-@dataclass(frozen=True, kw_only=True)
-class ControllerStep:
-    """What a controller does once per sample, as one function of its measurement and its memory.
-
-    Attributes
-    ----------
-    function : casadi.Function
-        (measurement, memory) → memory, pressure [Pa].
-    measurement : mapping of str to str
-        Unit of every measured signal, in order.
-    start : mapping of str to float
-        Memory before the first sample, in order, SI units.
-    step : float
-        Sampling period T_s [s].
-    facts : mapping of str to str
-        Where it comes from: fault, law, gains, scheme, versions.
-    """
-
-    function: Any
-    measurement: Mapping[str, str]
-    start: Mapping[str, float]
-    step: float
-    facts: Mapping[str, str]
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-able facts."""
-        return {
-            "step": self.step,
-            "measurement": dict(self.measurement),
-            "memory": dict(self.start),
-            "facts": dict(self.facts),
-        }
 
 
 def controller_step(

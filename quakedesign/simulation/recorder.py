@@ -8,7 +8,7 @@ from typing import Any
 
 from quakedesign.loop.schemes import Scheme
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.energy import WORKS, EnergyBudget, budget
+from quakedesign.simulation.energy import WORKS, EnergyBudget
 from quakedesign.simulation.integrators import Integrator
 
 NEVER = -1.0
@@ -107,7 +107,7 @@ class Recorder:
 
     def energy(self, end: Any) -> EnergyBudget:
         """Energy budget of a run from its last vector."""
-        return budget(self.loop, self.watched(end), float(end[0]) * self.step, float(end[2]), float(end[3]))
+        return self.loop.budget(self.watched(end), float(end[0]) * self.step, float(end[2]), float(end[3]))
 
     def advance(self, vector: Any, method: type[Integrator]) -> Any:
         """Vector (SX) after its own instant has been watched and one step has been taken."""

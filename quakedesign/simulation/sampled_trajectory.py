@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from quakedesign.simulation.plotting import NOTHING, Panel
 from quakedesign.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -29,8 +30,9 @@ class SampledTrajectory(Trajectory):
         """Values, long name and SI unit of every signal that this run has, by name."""
         return super().signals() | dict(self.actuation)
 
-    def plot(self) -> Any:
-        """Return a matplotlib Figure of slip, slip rate, pressures, errors, and what the actuator adds."""
-        from quakedesign.simulation.plotting import figure
-
-        return figure(self, self.actuation)
+    def panels(self) -> list[Panel]:
+        """The pressure at the well in the panel of that in the fault, and what the actuator tells beside."""
+        found, further = super().panels(), dict(self.actuation)
+        if "well_pressure" in further:
+            found[2] = (*found[2][:3], ("at the well", further.pop("well_pressure")[0]))
+        return [*found, *((title, unit, values, NOTHING) for values, title, unit in further.values())]

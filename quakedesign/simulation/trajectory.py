@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.simulation.energy import EnergyBudget
 from quakedesign.simulation.metrics import Metrics
 from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
+from quakedesign.simulation.plotting import NOTHING, Panel, figure, stress_figure
 from quakedesign.simulation.recording import Recording
 
 if TYPE_CHECKING:
@@ -142,14 +143,28 @@ class Trajectory(Recording):
             title=self.name,
         )
 
-    def plot(self) -> Any:
-        """Return a matplotlib Figure of slip, slip rate, pressure and errors."""
-        from quakedesign.simulation.plotting import figure
+    @property
+    def heading(self) -> str:
+        """Name, and how much of the run is drawn: what happened in between is in its metrics alone."""
+        kept = len(self.time) - 1
+        return self.name + (f"\n{kept} of {self.metrics.steps} steps drawn" if kept < self.metrics.steps else "")
 
-        return figure(self)
+    def panels(self) -> list[Panel]:
+        """Slip, slip rate and pressure, and errors where something is followed."""
+        found: list[Panel] = [
+            ("slip", "m", self.slip, ("reference", self.reference)),
+            ("slip rate", "m/s", self.slip_rate, ("reference", self.reference_rate)),
+            ("pressure", "Pa", self.pressure, ("at the well", None)),
+        ]
+        if self.slip_error is None:
+            return found
+        errors = (("slip error", "m", self.slip_error), ("slip-rate error", "m/s", self.slip_rate_error))
+        return [*found, *((*error, NOTHING) for error in errors)]
+
+    def plot(self) -> Any:
+        """Return a matplotlib Figure of slip, slip rate, pressure, errors, and what an actuator adds."""
+        return figure(self.heading, self.time, self.panels())
 
     def plot_stress(self) -> Any:
         """Return a matplotlib Figure of the shear stress against slip, and of the moment rate over time."""
-        from quakedesign.simulation.plotting import stress_figure
-
-        return stress_figure(self)
+        return stress_figure(self.heading, self.time, self.slip, self.shear_stress, self.moment_rate)

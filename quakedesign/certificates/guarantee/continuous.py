@@ -1,7 +1,6 @@
 """Peaks of the idealised loop whose pressure acts at once: the theorem of the loop that runs, in continuous time."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from quakedesign.certificates.claim import Verdict
@@ -55,12 +54,6 @@ class ContinuousPeaks:
         """Exact claims as texts, SI, and what they rest on."""
         kind = "amplitude" if self.task.change is None else "rate"
         return {"disturbance_class": kind, **self.claims.to_dict(), "premises": list(PREMISES)}
-
-    def save(self, path: str | Path) -> None:
-        """Write the file of FORMAT.md, whole or not at all."""
-        from quakedesign.certificates.guarantee.files import save_guarantee
-
-        save_guarantee(self, path)
 
     def sentence(self) -> str:
         """What is proved, for people."""

@@ -1,11 +1,9 @@
 """Friction laws, one a file, found by looking into this folder."""
 
 from functools import cache
-from importlib import import_module
-from inspect import isabstract
-from pkgutil import iter_modules
 
 from quakedesign.arguments import check_arguments
+from quakedesign.discovery import discovered
 from quakedesign.errors import UnknownNameError
 from quakedesign.fault.friction.base import FrictionLaw
 
@@ -18,20 +16,7 @@ def friction_laws() -> dict[str, type[FrictionLaw]]:
 
     A law that cannot be built (an abstract class, for others to derive from) counts for its module but is not listed.
     """
-    laws: dict[str, type[FrictionLaw]] = {}
-    for info in iter_modules(__path__):
-        if info.name == "base":
-            continue
-        module = import_module(f"{__name__}.{info.name}")
-        found = [
-            item
-            for item in vars(module).values()
-            if isinstance(item, type) and issubclass(item, FrictionLaw) and item.__module__ == module.__name__
-        ]
-        if not found:
-            raise ImportError(f"{module.__name__} defines no FrictionLaw")
-        laws |= {law.name: law for law in found if not isabstract(law)}
-    return laws
+    return discovered(__name__, FrictionLaw, shared=("base",))
 
 
 def friction_law(name: str) -> type[FrictionLaw]:

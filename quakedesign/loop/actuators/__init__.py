@@ -1,7 +1,10 @@
 """What lies between the pressure that a law asks for and the pressure in the fault, one stage a file."""
 
+from functools import cache
+
 from quakedesign.arguments import check_arguments
-from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage, stages
+from quakedesign.discovery import discovered
+from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
 from quakedesign.loop.actuators.chain import DIRECT, Actuator
 from quakedesign.loop.actuators.delay import Delay
 from quakedesign.loop.actuators.diffusion import Diffusion
@@ -24,5 +27,12 @@ __all__ = [
     "Stage",
     "stages",
 ]
+
+
+@cache
+def stages() -> dict[str, type[Stage]]:
+    """Every stage of the package, by name."""
+    return discovered(__name__, Stage, shared=("base", "chain"))
+
 
 check_arguments(__name__)

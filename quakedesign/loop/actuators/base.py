@@ -1,9 +1,6 @@
 """What every stage of an actuator offers."""
 
 from abc import ABC, abstractmethod
-from functools import cache
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any, ClassVar
 
 
@@ -73,15 +70,3 @@ FLOWS = {
     "injected_volume": ("injected volume", "m^3"),
     "flow_rate": ("injected flow rate", "m^3/s"),
 }
-
-
-@cache
-def stages() -> dict[str, type[Stage]]:
-    """Every stage of the package, by name."""
-    found: dict[str, type[Stage]] = {}
-    package = import_module("quakedesign.loop.actuators")
-    for info in iter_modules(package.__path__):
-        for item in vars(import_module(f"{package.__name__}.{info.name}")).values():
-            if isinstance(item, type) and issubclass(item, Stage) and hasattr(item, "name"):
-                found[item.name] = item
-    return found

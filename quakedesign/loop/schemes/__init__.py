@@ -2,12 +2,11 @@
 
 from dataclasses import fields, is_dataclass
 from functools import cache
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any
 
 from quakedesign.arguments import check_arguments
 from quakedesign.controllers import Controller
+from quakedesign.discovery import discovered
 from quakedesign.errors import ParameterError
 from quakedesign.loop.schemes.base import Scheme, Stepped
 
@@ -17,12 +16,7 @@ __all__ = ["Scheme", "Stepped", "own_way", "schemes", "simulation_scheme"]
 @cache
 def schemes() -> dict[str, type[Scheme]]:
     """Every scheme of the package, by name."""
-    found: dict[str, type[Scheme]] = {}
-    for info in iter_modules(__path__):
-        for item in vars(import_module(f"{__name__}.{info.name}")).values():
-            if isinstance(item, type) and issubclass(item, Scheme) and hasattr(item, "name"):
-                found[item.name] = item
-    return found
+    return discovered(__name__, Scheme, shared=("base",))
 
 
 def simulation_scheme(name: str, **settings: Any) -> Scheme:

@@ -11,9 +11,9 @@ from quakedesign.loop.compensation import answered, followed
 from quakedesign.loop.schemes.base import Stepped
 from quakedesign.loop.steps import sampled_law
 from quakedesign.loop.steps.backward import backward_euler, inclusion
-from quakedesign.loop.steps.control_step import slope_of
+from quakedesign.loop.steps.control_step import Decision, slope_of
 from quakedesign.loop.steps.inclusion import end_rate
-from quakedesign.loop.steps.sampled import Decision, Sampled
+from quakedesign.loop.steps.sampled import Sampled
 from quakedesign.loop.steps.sampled_law import Law, Values
 
 
@@ -73,7 +73,7 @@ class Compensated(Sampled):
 
     @classmethod
     def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
-        """See `Sampled.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
+        """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
         import casadi as ca
 
         begun, before, ahead_before, estimate, weight = own

@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 import sympy as sp
 
 from quakedesign.loop.steps import sampled_law
-from quakedesign.loop.steps.sampled import Decision, Sampled
+from quakedesign.loop.steps.control_step import Decision
+from quakedesign.loop.steps.sampled import Sampled
 from quakedesign.loop.steps.sampled_law import Law, Values
 
 
@@ -26,7 +27,7 @@ class Explicit(Sampled):
 
     @classmethod
     def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
-        """See `Sampled.decide`."""
+        """See `Decided.decide`."""
         pressure, *rates = sampled_law.values(found, known)
         after = [known[s] + known[sampled_law.step] * rate for s, rate in zip(law.integrals, rates, strict=True)]
         return Decision(pressure, after, [])

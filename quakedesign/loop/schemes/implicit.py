@@ -7,8 +7,9 @@ import sympy as sp
 
 from quakedesign.loop.steps import sampled_law
 from quakedesign.loop.steps.backward import backward_euler, inclusion
+from quakedesign.loop.steps.control_step import Decision
 from quakedesign.loop.steps.inclusion import end_rate
-from quakedesign.loop.steps.sampled import Decision, Sampled
+from quakedesign.loop.steps.sampled import Sampled
 from quakedesign.loop.steps.sampled_law import Law, Values
 
 
@@ -31,7 +32,7 @@ class Implicit(Sampled):
 
     @classmethod
     def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
-        """See `Sampled.decide`."""
+        """See `Decided.decide`."""
         pull, feed_forward, *ends = found
         problem = inclusion(pull)
         solved = problem.solve(known)

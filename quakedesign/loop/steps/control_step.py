@@ -1,16 +1,14 @@
 """What a sampled controller computes at one sample, as one CasADi Function."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import sympy as sp
 
 from quakedesign.loop.steps import sampled_law
-from quakedesign.loop.steps.sampled_law import Law, Lifted
-
-if TYPE_CHECKING:
-    from quakedesign.loop.steps.sampled import Sampled
+from quakedesign.loop.steps.sampled_law import Law, Lifted, Values
 
 SIGNALS = (
     sampled_law.slip,
@@ -24,6 +22,47 @@ SIGNALS = (
     sampled_law.authority,
     sampled_law.held,
 )
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What a controller decides at one sample.
+
+    Attributes
+    ----------
+    pressure : SX
+        That it asks for [Pa].
+    integrals : list of SX
+        ξ at the next sample.
+    own : list of SX
+        Memory of the scheme itself at the next sample.
+    """
+
+    pressure: Any
+    integrals: list[Any]
+    own: list[Any]
+
+
+class Decided(ABC):
+    """What a controller does with a law at one sample: one part of a scheme that samples.
+
+    Attributes
+    ----------
+    own_size : int
+        Entries of its own memory.
+    """
+
+    own_size: ClassVar[int] = 0
+
+    @staticmethod
+    @abstractmethod
+    def derive(law: Law) -> tuple[sp.Expr, ...]:
+        """Return the expressions that `decide` evaluates, with the numbers of the law in them."""
+
+    @classmethod
+    @abstractmethod
+    def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
+        """What the controller does, given the expressions, the values of their symbols, and its own memory."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +83,7 @@ class ControlStep:
 
 
 @lru_cache(maxsize=64)
-def control_step(kind: "type[Sampled]", law: Law) -> ControlStep:
+def control_step(kind: type[Decided], law: Law) -> ControlStep:
     """Sampled-step function of a law under a scheme."""
     import casadi as ca
 

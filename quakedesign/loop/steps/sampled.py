@@ -1,10 +1,7 @@
 """What the sampled schemes share: the law once per T_s, its pressure held while the plant moves on."""
 
-from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
-
-import sympy as sp
+from typing import Any
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators import DIRECT, Actuator
@@ -13,29 +10,10 @@ from quakedesign.loop.schemes.base import Scheme, Stepped
 from quakedesign.loop.sensing.base import Sensor
 from quakedesign.loop.sensing.measurement import EXACT, Measurement
 from quakedesign.loop.steps import sampled_law
-from quakedesign.loop.steps.control_step import SIGNALS, ControlStep, control_step
+from quakedesign.loop.steps.control_step import SIGNALS, ControlStep, Decided, control_step
 from quakedesign.loop.steps.sampled_law import Law, Values
 
 MOST_SUBSTEPS = 100
-
-
-@dataclass(frozen=True)
-class Decision:
-    """What a controller decides at one sample.
-
-    Attributes
-    ----------
-    pressure : SX
-        That it asks for [Pa].
-    integrals : list of SX
-        ξ at the next sample.
-    own : list of SX
-        Memory of the scheme itself at the next sample.
-    """
-
-    pressure: Any
-    integrals: list[Any]
-    own: list[Any]
 
 
 @dataclass(frozen=True)
@@ -52,7 +30,7 @@ class Sample:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sampled(Scheme):
+class Sampled(Scheme, Decided):
     """A controller that measures every T_s and holds its pressure in between (zero-order hold).
 
     The entries of the memory are: the law's numbers, those of actuator and measurement, the scheme's own memory, the
@@ -73,8 +51,6 @@ class Sampled(Scheme):
     ParameterError
     """
 
-    own_size: ClassVar[int] = 0
-
     substeps: int = 1
     actuator: Actuator = DIRECT
     measurement: Measurement | Sensor = EXACT
@@ -91,16 +67,6 @@ class Sampled(Scheme):
     def starts(self) -> tuple[float, ...]:
         """The scheme's own memory at the start, `own_size` entries."""
         return ()
-
-    @staticmethod
-    @abstractmethod
-    def derive(law: Law) -> tuple[sp.Expr, ...]:
-        """Return the expressions that `decide` evaluates, with the numbers of the law in them."""
-
-    @classmethod
-    @abstractmethod
-    def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
-        """What the controller does, given the expressions, the values of their symbols, and its own memory."""
 
     def nominal(self, loop: Stepped) -> float:
         """B0 [m²/kg] unless told: the smallest μN̂ of the fault's uncertainty box."""

@@ -14,7 +14,7 @@ from quakedesign.simulation.campaign.program import STEP, Program
 from quakedesign.simulation.campaign.reseeding import reseeded
 from quakedesign.simulation.campaign.space import MOST_SAMPLES, Sample, Space, noise_seed, point
 from quakedesign.simulation.earthquake import natural_peak
-from quakedesign.simulation.energy import WORKS, EnergyBudget, budget
+from quakedesign.simulation.energy import WORKS, EnergyBudget
 from quakedesign.simulation.integrators import Integrator
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.metrics import events, metrics
@@ -53,7 +53,7 @@ class ReleasedRecorder(Recorder):
     def energy(self, end: Any) -> EnergyBudget:
         """Energy budget of a run from its last vector: that from rest, less what it took to get to the start."""
         whole = super().energy(end).to_dict()
-        before = budget(self.loop, dict.fromkeys(WORKS, 0.0), 0.0, *self.initial).to_dict()
+        before = self.loop.budget(dict.fromkeys(WORKS, 0.0), 0.0, *self.initial).to_dict()
         return EnergyBudget.of(**{name: whole[name] - before[name] for name in whole if name != "residual"})
 
 

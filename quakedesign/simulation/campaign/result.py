@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError
 from quakedesign.output import write_whole
+from quakedesign.simulation.campaign.plotting import figure
 from quakedesign.simulation.campaign.problem import Problem, SampleResult
 from quakedesign.simulation.campaign.search import Worst
 from quakedesign.simulation.campaign.space import UNITS
@@ -23,6 +24,15 @@ if TYPE_CHECKING:
 
 LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 SHOWN = 5
+_DRAWN = (
+    "max_slip_error",
+    "max_slip_rate_error",
+    "peak_slip_rate",
+    "rms_pressure",
+    "max_pressure",
+    "pressure_total_variation",
+)
+_MARKED = (0.05, 0.5, 0.95)
 _LESS_IS_WORSE = frozenset({"min_pressure"})
 
 
@@ -207,9 +217,21 @@ class Campaign:
 
     def plot(self) -> Any:
         """Return a matplotlib Figure of the distribution of the metrics."""
-        from quakedesign.simulation.campaign.plotting import figure
-
-        return figure(self)
+        problem, levels = self.problem, self.quantiles(_MARKED)
+        law = problem.controller.title if problem.controller else "no control"
+        diverged, count = len(self.events["diverged"]), len(self.results)
+        return figure(
+            f"{problem.fault.name}, {law}: {count} samples, {diverged} diverge",
+            f"scheme {problem.scheme.name}, step {problem.setting.step:g} s",
+            {
+                f"{name.replace('_', ' ')} [{StickMetrics.unit(name) or '-'}]": (
+                    self.values(name),
+                    {level: levels[name][f"{level:g}"] for level in _MARKED},
+                )
+                for name in _DRAWN
+                if name in self.metrics
+            },
+        )
 
 
 def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:

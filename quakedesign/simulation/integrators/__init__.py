@@ -1,10 +1,9 @@
 """Integrators, one a file, found by looking into this folder: with a fixed step, or with one of their own choice."""
 
 from functools import cache
-from importlib import import_module
-from pkgutil import iter_modules
 
 from quakedesign.arguments import check_arguments
+from quakedesign.discovery import discovered
 from quakedesign.errors import ParameterError
 from quakedesign.simulation.integrators.adaptive import AdaptiveIntegrator
 from quakedesign.simulation.integrators.base import Integrator
@@ -12,21 +11,16 @@ from quakedesign.simulation.integrators.base import Integrator
 __all__ = ["AdaptiveIntegrator", "Integrator", "adaptive_integrators", "any_integrator", "integrator", "integrators"]
 
 
-def _found() -> list[type]:
-    modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
-    return [item for module in modules for item in vars(module).values() if isinstance(item, type)]
-
-
 @cache
 def integrators() -> dict[str, type[Integrator]]:
     """Every integrator with a fixed step, by name."""
-    return {item.name: item for item in _found() if issubclass(item, Integrator) and hasattr(item, "name")}
+    return discovered(__name__, Integrator)
 
 
 @cache
 def adaptive_integrators() -> dict[str, type[AdaptiveIntegrator]]:
     """Every integrator with a step of its own choice, by name."""
-    return {item.name: item for item in _found() if issubclass(item, AdaptiveIntegrator) and hasattr(item, "name")}
+    return discovered(__name__, AdaptiveIntegrator)
 
 
 def integrator(name: str) -> type[Integrator]:

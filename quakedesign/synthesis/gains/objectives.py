@@ -1,6 +1,5 @@
 """What gains can be best in: an order of levels, what a level asks of a loop, the proof and the figure at the end."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -14,82 +13,14 @@ from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.synthesis.analysis.margins import largest_gain_range
 from quakedesign.synthesis.analysis.settling_time import fastest_settling
 from quakedesign.synthesis.gains.dilation import scaled_norm
-from quakedesign.synthesis.gains.path_following import FAINT, Setting, State, look
+from quakedesign.synthesis.gains.path_following import look
+from quakedesign.synthesis.gains.setting import FAINT, Objective, Setting, State
 from quakedesign.synthesis.lyapunov.balancing import balance, below
 from quakedesign.synthesis.lyapunov.certify_exactly import GIVE_AWAY, bounds_of, finish, with_largest_decay
 from quakedesign.synthesis.lyapunov.decay_rate import box, degrees_of, fastest, least_margins, on_box, rounded
-from quakedesign.synthesis.lyapunov.search import find_certificate
 
-_ROOM = 1e-3
 _HALVINGS = 8
 _BITS = (16, 24, 34)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Objective(ABC):
-    """One way in which gains can be better than others.
-
-    Attributes
-    ----------
-    bound : float, optional
-        Largest ‖k_i/L̄^{p_i}‖₂ allowed.
-    """
-
-    name: ClassVar[str]
-    unit: ClassVar[str]
-    meaning: ClassVar[str]
-    larger: ClassVar[bool] = True
-    bounded: ClassVar[bool] = True
-    paced: ClassVar[bool] = False
-
-    bound: float | None = None
-
-    def better(self, level: float, other: float) -> bool:
-        """Whether a level is better than another one."""
-        return level > other if self.larger else level < other
-
-    def improved(self, level: float, share: float) -> float:
-        """Level that is better by a share."""
-        return level * (1 + share if self.larger else 1 - share)
-
-    def at(self, loop: Loop, level: float) -> Loop:
-        """Loop with the ranges that a level asks for."""
-        return loop
-
-    def speed(self, level: float) -> float | None:
-        """1/T that a level asks for, see `pace_of`."""
-        return None
-
-    def norm_bound(self, level: float) -> float | None:
-        """Bound on the norm of the gains."""
-        return self.bound
-
-    def kept(self, gains: Mapping[str, float], loop: Loop, exponents: Mapping[str, Fraction]) -> dict[str, float]:
-        """Gains drawn back to the bound on their norm, if they are beyond."""
-        scale = float(loop.uncertain["d"][1])
-        norm = sum((k / scale ** float(exponents[name])) ** 2 for name, k in gains.items()) ** 0.5
-        factor = 1.0 if self.bound is None else min(1.0, self.bound * (1 - _ROOM) / norm)
-        return {name: k * factor for name, k in gains.items()}
-
-    def reached(self, level: float, loop: Loop, exponents: Mapping[str, Fraction]) -> float:
-        """Level of gains that a step for a level has led to."""
-        return level
-
-    @abstractmethod
-    def start(self, setting: Setting, loop: Loop) -> State | None:
-        """First state at given gains; None where the search has nothing to begin with."""
-
-    def proved(self, setting: Setting, state: State, subject: Subject) -> Certificate | None:
-        """Exact certificate at the gains of a state, or None."""
-        return find_certificate(state.loop, setting.degree, subject=subject)
-
-    def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Proof of given gains by another way than a climb, to be beaten by that if V is paced; None without one."""
-        return None
-
-    @abstractmethod
-    def figure(self, certificate: Certificate, setting: Setting) -> float:
-        """What a certificate proves, in terms of the objective."""
 
 
 @dataclass(frozen=True, kw_only=True)

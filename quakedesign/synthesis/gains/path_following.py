@@ -7,11 +7,8 @@ only after a programme with these gains fixed has a margin too. Nothing here is 
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
-
-import sympy as sp
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.claim import root_enclosure
@@ -20,61 +17,14 @@ from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.gains.affine_program import Limits
 from quakedesign.synthesis.gains.dilation import scaled_norm
 from quakedesign.synthesis.gains.linearised_program import Neighbourhood, neighbourhood
+from quakedesign.synthesis.gains.setting import Setting, State
 from quakedesign.synthesis.lyapunov.balancing import balance
 from quakedesign.synthesis.lyapunov.decay_rate import box, on_box, pace_of
 
-if TYPE_CHECKING:
-    from quakedesign.synthesis.gains.objectives import Objective
-
-MARGIN, FAINT = 1e-6, 1e-9
 _TRUST = 3.0
 _FIRST, _LAST, _LARGEST = 0.1, 1e-3, 0.35
 _AGAIN, _WORTH, _GROWTH = 0.03, 3e-3, 1.2
 _ROOT_SHARE = 0.5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Setting:
-    """What does not change during a search.
-
-    Attributes
-    ----------
-    objective : Objective
-    exponents : mapping of str to Fraction
-        Of gains and states, see `stretch_exponents`.
-    degree : int
-        Of V.
-    units : mapping of str to Expr
-        See `LoopField.units`.
-    least : float
-        Margin that counts; a search over gains steers clear of the edge of what a solver can tell.
-    """
-
-    objective: "Objective"
-    exponents: Mapping[str, Fraction]
-    degree: int
-    units: Mapping[str, sp.Expr] = field(default_factory=dict)
-    least: float = MARGIN
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class State:
-    """Gains with a V that a solver believes in.
-
-    Attributes
-    ----------
-    loop : Loop
-        With the ranges that the level asks for.
-    level : float
-        Of the objective.
-    lyapunov : tuple of Term
-    margin : float
-    """
-
-    loop: Loop
-    level: float
-    lyapunov: tuple[Term, ...]
-    margin: float
 
 
 def with_gains(loop: Loop, gains: Mapping[str, Fraction]) -> Loop:

@@ -10,7 +10,8 @@ from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.synthesis.analysis.certify import Number, closed_loop
 from quakedesign.synthesis.gains.dilation import scaled_norm, stretch_exponents
 from quakedesign.synthesis.gains.objectives import objective_for
-from quakedesign.synthesis.gains.path_following import Setting, short, with_gains
+from quakedesign.synthesis.gains.path_following import short, with_gains
+from quakedesign.synthesis.gains.setting import Setting
 from quakedesign.synthesis.lyapunov.search import candidate_degrees
 
 _SPREAD, _WIDTH = 0.4, 3.0

@@ -12,8 +12,9 @@ from quakedesign.fault.checks import MOST_WORKERS, require_count
 from quakedesign.synthesis.analysis.certify import Number
 from quakedesign.synthesis.gains.dilation import scaled_norm
 from quakedesign.synthesis.gains.objectives import SmallestNorm
-from quakedesign.synthesis.gains.path_following import FAINT, Setting, State, climb, look, short, with_gains
+from quakedesign.synthesis.gains.path_following import climb, look, short, with_gains
 from quakedesign.synthesis.gains.problem import Question, begin_with, question
+from quakedesign.synthesis.gains.setting import FAINT, Setting, State
 from quakedesign.workers import Processes
 
 _STRETCHES = (1.0, 1.5, 4.0)

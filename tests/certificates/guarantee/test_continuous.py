@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Bounds, Claims, ContinuousPeaks, NoGuarantee, continuous, task_of
-from quakedesign.certificates.guarantee.files import parse_guarantee
+from quakedesign.certificates.guarantee.files import parse_guarantee, save_guarantee
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop import exact_integrals
@@ -58,7 +58,7 @@ def test_what_is_said_names_the_class_and_the_exact_claims(change, said):
 
 
 def test_a_saved_file_is_read_again_as_the_same(tmp_path):
-    PEAKS.save(tmp_path / "peaks.json")
+    save_guarantee(PEAKS, tmp_path / "peaks.json")
     assert parse_guarantee((tmp_path / "peaks.json").read_text()) == PEAKS
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from quakedesign.certificates import Certificate
 from quakedesign.certificates.guarantee import ContinuousPeaks, NoGuarantee
+from quakedesign.certificates.guarantee.files import save_guarantee
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import OutputError
 from quakedesign.fault import Fault
@@ -92,7 +93,10 @@ class LinearVerdict:
                 "Give --force to replace them."
             )
         for name, proof in proofs.items():
-            proof.save(paths[name])
+            if isinstance(proof, ContinuousPeaks):
+                save_guarantee(proof, paths[name])
+            else:
+                proof.save(paths[name])
         return {name: str(path) for name, path in paths.items()}
 
 

@@ -1,0 +1,75 @@
+"""Evidence that decides itself, and goes into a file and back."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from quakedesign.certificates.checking import check
+from quakedesign.certificates.claim import Evidence, Verdict
+from quakedesign.certificates.files import evidence_of, read_json, save_certificate
+from quakedesign.controllers import Subject
+from quakedesign.sos.exact.strict import parse
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Certificate(Evidence):
+    """A statement about one closed loop with its proof or its counterexample.
+
+    Attributes
+    ----------
+    loop : Loop
+    lyapunov : tuple of Term
+        V; empty for a refutation.
+    claims : mapping of str to Fraction
+        ``positive`` and ``decrease`` or ``rate`` [1/s on `reals`].
+    witnesses : mapping of str to Witness
+        One for every different obligation, by name.
+    refutation : Equilibrium, optional
+    """
+
+    @classmethod
+    def of(cls, evidence: Evidence) -> "Certificate":
+        """Certificate with the parts of evidence."""
+        return cls(**{part.name: getattr(evidence, part.name) for part in fields(Evidence)})
+
+    def check(self, law: Subject | None = None) -> Verdict:
+        """Re-decide the statement from nothing but its claim, in exact arithmetic; field against law as well.
+
+        Parameters
+        ----------
+        law : str, type of Law or LoopField, optional
+            What the field must be that of; without it the law of the package that the certificate names.
+
+        Raises
+        ------
+        CertificateError
+            When the proof does not hold, or the field is not that of the law.
+        """
+        return check(self, law)
+
+    def save(self, path: str | Path) -> None:
+        """Write the file of FORMAT.md, whole or not at all."""
+        save_certificate(self, path)
+
+
+def load_certificate(path: str | Path) -> Certificate:
+    """Read a certificate file; reading verifies nothing.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    CertificateError
+        When the file cannot be read or breaks a rule of FORMAT.md.
+    """
+    return Certificate.of(evidence_of(read_json(path)))
+
+
+def parse_certificate(text: str) -> Certificate:
+    """Certificate from the text of a file. Raises CertificateError as `load_certificate`."""
+    return Certificate.of(evidence_of(parse(text)))
