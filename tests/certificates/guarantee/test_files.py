@@ -14,6 +14,7 @@ from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import Held, continuous_peaks, guarantee, task_of
+from quakedesign.certificates.guarantee import task as package_task
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, save_guarantee
 from quakedesign.errors import CertificateError
 from quakedesign.fault import load_fault
@@ -331,6 +332,14 @@ NOISY_RAW = json.loads(guarantee_text(claim("noisy")))
 PATHS += [(NOISY_RAW, ("loop", "noise", name)) for name in ("slip", "rate")]
 
 
+@pytest.fixture
+def coarse(monkeypatch):
+    """Few parts of the unit interval: cheap, and as strict."""
+    monkeypatch.setattr(checker.guarantee_module(), "HALVINGS", 2)
+    monkeypatch.setattr(package_task, "_HALVINGS", 2)
+
+
+@pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("new", [None, "x", "1/0", "2/4", 0.5, True, [], {}, -1], ids=repr)
 def test_entries_of_another_kind_are_refused_by_both_at_every_place(new):
     for raw, path in PATHS:
