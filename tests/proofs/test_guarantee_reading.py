@@ -126,7 +126,7 @@ LIMITS = [
     (ALONE, ("loop", "noise", "rate"), ["0"], ["1/9"]),
     (changed(ALONE, (("loop", "noise", "rate"), "1/9")), ("loop", "feedback"), [["0", "-1"]], [["1", "0"]]),
     (changed(ROOTED, (("loop", "measured"), [["1", "0", "1"]]), (("loop", "feedback"), ["1", "0", "1"])),
-     ("loop",), [dict(ROOTED["loop"], noise={"slip": "0", "rate": "1"}, measured=[["1", "0", "1"]])], []),
+     ("loop", "noise"), [{"slip": "0", "rate": "1"}], []),
     (ROOTED, ("loop", "root", "slopes"), [["0", "0"], ["1", "1"], ["0", "1"]],
      [["1/2", "1/4"], ["-1/2", "1"], ["0", "3/2"], ["0", "1", "1"], ["0"], "0"]),
     (ROOTED, ("loop", "root", "remainder"), ["0"], ["-1/2"]),
@@ -257,6 +257,41 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
     at_once = "for a pressure that acts at once (continuous time), which no sampled controller has"
     assert lines[2] == f"law with 1 states, {at_once}"
     assert lines[3].startswith("disturbance: |phi| <= 0.3333 m/s^2; from rest")
+
+
+@pytest.mark.parametrize(
+    ("seen", "feedback", "alone"), [("0", "0", True), ("1/3", "0", False), ("0", "-1", False), ("1", "1", False)]
+)
+def test_the_statement_says_what_is_measured_and_how_well(seen, feedback, alone):
+    claims = dict.fromkeys(CLAIMS, F(1))
+    raw = changed(HELD, (("loop", "measured"), [["1", seen]]), (("loop", "feedback"), ["1", feedback]))
+    told = " of the slip alone" if alone else ""
+    said = f"law with 1 states{told}, every 1 s, 0 s late, lag 0 s"
+    assert checker.statement(raw, checker.read_task(raw), claims, F(1, 3))[2] == said
+    raw = changed(raw, (("loop", "noise"), {"slip": "1/9", "rate": "0" if alone else "1/7"}))
+    said += ", measured slip within 1/9 m of the true one" + ("" if alone else ", slip rate within 1/7 m/s")
+    assert checker.statement(raw, checker.read_task(raw), claims, F(1, 3))[2] == said
+
+
+def test_a_law_with_an_implicit_step_measures_the_slip_rate():
+    raw = changed(ROOTED, (("loop", "measured"), [["1", "0", "1"]]), (("loop", "feedback"), ["1", "0", "1"]))
+    raw = changed(raw, (("loop", "noise"), {"slip": "0", "rate": "1/7"}))
+    said = checker.statement(raw, checker.read_task(raw), dict.fromkeys(CLAIMS, F(1)), F(1, 3))[2]
+    assert said.startswith("law with 1 states and an implicit step, every 1 s")
+    assert said.endswith("measured slip within 0 m of the true one, slip rate within 1/7 m/s")
+
+
+def test_the_root_must_lie_between_its_lines_for_the_noise_on_top(monkeypatch):
+    """w = e2 − sign(e1 + w)/3 is 0 for e1 = 0 where |e2| ≤ 1/3; as measured, by 1/4 and a noise below 1/12."""
+    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(0), F(0), F(0)], F(1, 3)))
+    sign = {"pull": [{"factor": ["1/3", "1/3"], "power": "0", "of": "slip"}], "slopes": ["0", "0"], "remainder": "0"}
+    task = checker.read_task(HELD)
+    tight = ("0", "1/4", "9", str(task.rest[0]), str(task.rest[1]))
+    raw = changed(ROOTED, (("loop", "root"), sign), (("claims",), dict(zip(CLAIMS, tight, strict=True))))
+    assert checker.verify(changed(raw, (("loop", "noise"), {"slip": "0", "rate": "1/13"})))
+    for noise in ({"slip": "0", "rate": "1/11"}, {"slip": "1/100", "rate": "0"}):
+        with pytest.raises(checker.Refused, match="root of the implicit step"):
+            checker.verify(changed(raw, (("loop", "noise"), noise)))
 
 
 def test_zero_has_no_sign():

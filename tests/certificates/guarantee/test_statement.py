@@ -20,7 +20,7 @@ from quakedesign.certificates.guarantee import (
 from quakedesign.certificates.guarantee.statement import _above, sentence_of
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.loop import ImplicitRoot, Power, compensated, summed_integrals
+from quakedesign.loop import ImplicitRoot, LinearLaw, Power, compensated, summed_integrals
 
 TASK = task_of(load_fault("real-fault"))
 CLAIMS = Claims(
@@ -84,6 +84,30 @@ def test_four_digits_are_not_below(value, rounded):
 )
 def test_a_sentence_says_which_disturbances_and_none_that_are_larger(amplitude, change, said):
     assert said in sentence_of(replace(TASK, amplitude=amplitude, change=change), CLAIMS, "held over 1 s")
+
+
+def test_noise_is_said_and_must_be_of_what_is_measured():
+    alone = LinearLaw(
+        states=("z",), update=((F(1),),), measured=((F(1), F(0)),), output=(F(1),), feedback=(F(1), F(0)), root=None
+    )
+    both = Held(law=replace(alone, feedback=(F(1), F(1))), step=F(1), slip_noise=F(1, 3), rate_noise=F(2, 3))
+    said = Guarantee(task=TASK, held=both, claims=CLAIMS).sentence()
+    told = "held over 1 s, with any noise of at most 0.333333 m in the measured slip, "
+    assert told + "with any noise of at most 0.666666 m/s in the measured slip rate, for every" in said
+    assert (both.noise, replace(both, slip_noise=F(0)).noise) == (
+        {"slip_noise": F(1, 3), "rate_noise": F(2, 3)},
+        {"rate_noise": F(2, 3)},
+    )
+    quiet = Held(law=alone, step=F(1))
+    assert (quiet.noise, quiet.around) == ({}, {"delay": 0, "lag": 0, "slip_noise": 0, "rate_noise": 0})
+    said = Guarantee(task=TASK, held=quiet, claims=CLAIMS).sentence()
+    assert "held over 1 s, with the slip alone measured, for every" in said
+    assert Held(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
+    with pytest.raises(ParameterError, match="needs a law that measures it"):
+        replace(quiet, rate_noise=F(1))
+    for name in ("slip_noise", "rate_noise"):
+        with pytest.raises(ParameterError, match="must be 0 or more"):
+            replace(both, **{name: F(-1, 10**9)})
 
 
 def test_claims_are_shown_as_the_exact_numbers():
