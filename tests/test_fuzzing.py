@@ -343,7 +343,7 @@ VALID = {
 }
 ANYTHING = [None, 3, -1, 0.5, float("nan"), "x", "\0", b"x", [], [1], {}, {"a": 1}, (), object(), print, int, FAULT, 1j]
 MINUTES = {"design", "compare", "certify", "assess", "natural_earthquake", "run_campaign", "simulate_state", "prove"}
-MINUTES |= {"decide", "largest", "accuracy", "gain_sensitivity", "noise_sensitivity", "weight_study", "velocity_step"}
+MINUTES |= {"decide", "largest", "accuracy", "gain_sensitivity", "noise_sensitivity", "velocity_step"}
 
 
 MINUTES |= {"limits", "answer", "design_held", "worst_found"}

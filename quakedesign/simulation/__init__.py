@@ -36,7 +36,7 @@ from quakedesign.simulation.metrics import ActuatorMetrics, Metrics, StickMetric
 from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
 from quakedesign.simulation.perturbation import perturbation
 from quakedesign.simulation.sampled_trajectory import SampledTrajectory
-from quakedesign.simulation.sampling_study import Study, accuracy, gain_sensitivity, noise_sensitivity, weight_study
+from quakedesign.simulation.sampling_study import Study, accuracy, gain_sensitivity, noise_sensitivity
 from quakedesign.simulation.simulate import simulate
 from quakedesign.simulation.state_plants import SpringSlider
 from quakedesign.simulation.state_run import simulate_state, velocity_step
@@ -94,7 +94,6 @@ __all__ = [
     "to_casadi",
     "to_iosystem",
     "velocity_step",
-    "weight_study",
 ]
 
 check_arguments(__name__)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.controllers import Controller, SlidingMode
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Fault
-from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.simulate import simulate
 from quakedesign.simulation.variation import Variation
@@ -235,25 +234,6 @@ def gain_sensitivity(
 
     title = f"{fault.name}, {controller.title}: sensitivity to the input gain"
     return _study(title, ("beta at rest over its middle", ""), tuple(levels), schemes, run)
-
-
-def weight_study(
-    fault: Fault, controller: Controller, *, weights: Sequence[float] = (0.25, 0.5, 0.75, 1.0), duration: float
-) -> Study:
-    """Errors of the scheme ``compensated`` from the start on, against the weight of its estimate.
-
-    Its B0 is the smallest of the box, so that β/β0 = μ_max/μ_res at the start: what
-    `quakedesign.loop.steps.stable_ratios` says about the weights then shows.
-    """
-    base: Any = simulation_scheme("compensated")
-
-    def run(_: str, level: float) -> "Trajectory":
-        least = fault.friction.bounds[0] * fault.authority * (1 - float(fault.box.authority))
-        scheme = replace(base, weight=level, authority=least)
-        return simulate(fault, controller, scheme=scheme, duration=duration, settled_from=duration / 4)
-
-    title = f"{fault.name}, {controller.title}: weight of the estimate"
-    return _study(title, ("weight", ""), tuple(weights), ("compensated",), run)
 
 
 def _slope(levels: Sequence[float], values: Sequence[float]) -> float | None:

@@ -15,7 +15,6 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 from quakedesign.symbolic.state_plant import loading_rate, rate, state_symbols, without_overflow
 
 slip, stretch = sp.symbols("slip stretch", real=True)
-log_rate = sp.Symbol("u", real=True)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -208,16 +208,6 @@ def nucleation_length(law: FrictionLaw) -> sp.Expr:
     return _tidy(shear_modulus * N_hat / critical) if critical != 0 else sp.oo
 
 
-def crack_half_length(law: FrictionLaw) -> sp.Expr:
-    """Half-length G b d_c/(π(σ' − p)(b − a)²) [m] that a slowly growing nucleation zone tends to.
-
-    For the ageing law in antiplane shear and a/b > 1/2 (Rubin and Ampuero 2005, J. Geophys. Res. 110, B11312); for
-    plane strain divide by one minus Poisson's ratio. The law must have the parameters of `RateAndState`.
-    """
-    a, b, d = (getattr(law, name) for name in ("direct_effect", "evolution_effect", "critical_slip"))
-    return shear_modulus * b * d / (sp.pi * (sigma - p) * (b - a) ** 2)
-
-
 def quasi_dynamic_rates(law: FrictionLaw) -> tuple[sp.Expr, ...]:
     """(v', θ', …) of the plant without inertia, from the time derivative of the balance of forces.
 

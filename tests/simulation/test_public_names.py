@@ -6,7 +6,7 @@ import sys
 import pytest
 
 import quakedesign.simulation as room
-from quakedesign.loop.actuators.base import Stage, stages
+from quakedesign.loop.actuators import Stage, stages
 from quakedesign.loop.schemes import Scheme, schemes
 
 

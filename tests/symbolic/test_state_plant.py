@@ -198,15 +198,6 @@ def test_the_critical_stiffness_is_that_of_ruina_and_of_rice_and_ruina(law):
     assert sp.simplify(quasi - ruina + eta_hat * loading_rate / d) == 0
 
 
-@pytest.mark.parametrize("law", LOGARITHMIC, ids=lambda law: law.name)
-def test_the_nucleation_length_is_that_of_the_critical_stiffness_per_area(law):
-    a, b, d, G = (sp.Symbol(s, positive=True) for s in ("a", "b", "d_c", "G"))
-    assert sp.simplify(state_plant.nucleation_length(law.symbolic()) - G * d / ((b - a) * (sigma - p))) == 0
-    # a crack grows to b/(π(b − a)) times that, to each side
-    ratio = state_plant.crack_half_length(law.symbolic()) / state_plant.nucleation_length(law.symbolic())
-    assert sp.simplify(ratio - b / (sp.pi * (b - a))) == 0
-
-
 @pytest.mark.parametrize("name", ["exponential-slip-weakening", "linear-slip-weakening"])
 def test_slip_weakening_is_unstable_below_drop_over_critical_slip(name):
     drop, d, G = (sp.Symbol(s, positive=True) for s in (r"\Delta\mu", "d_c", "G"))

@@ -24,8 +24,9 @@ class Compensated(Sampled):
     The estimate is d ← (1 − a)d + a[(e2 − e2⁻)/(T_sB0) − p⁻], where p⁻ is the pressure that was held, less the
     feed-forward, and the step is that of `Implicit` with ξ = 0; the pressure is its solution minus d: `answered` and
     `followed` of `quakedesign.loop`, which guarantees use as well. What certificates of continuous time say about the
-    law does not carry over to this scheme; `stable_ratios` says for which β/β0 the loop is stable near the origin, and
-    why the weight 1 chatters.
+    law does not carry over to this scheme. Near the origin, where it ends at e1⁺ = 0, the loop is linear and stable for
+    4a/((a + 1)(a + 2)) < β/β0 < 4/(a + 2): since friction lets β vary by a factor of 1.425 on faults of the paper, the
+    weight 1 chatters where β0 is the smallest β. Noise of the slip rate reaches the estimate with the gain a/(T_sβ0).
 
     Attributes
     ----------

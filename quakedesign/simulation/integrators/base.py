@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
-    import numpy as np
+    pass
 
 
 class Integrator(ABC):
@@ -54,15 +54,6 @@ class RungeKutta(Integrator):
     nodes: ClassVar[tuple[Fraction, ...]]
     matrix: ClassVar[tuple[tuple[Fraction, ...], ...]]
     weights: ClassVar[tuple[Fraction, ...]]
-
-    @classmethod
-    def tableau(cls) -> "tuple[np.ndarray, np.ndarray]":
-        """Matrix A, shape (s, s), and weights b, shape (s,), in floats."""
-        import numpy as np
-
-        size = len(cls.weights)
-        rows = [[float(share) for share in row] + [0.0] * (size - len(row)) for row in cls.matrix]
-        return np.array(rows), np.array([float(weight) for weight in cls.weights])
 
     @classmethod
     def advance(cls, field: Callable[[float, Any], Any], state: Any, step: float) -> Any:

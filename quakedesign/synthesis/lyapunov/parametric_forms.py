@@ -38,11 +38,6 @@ class Row:
     equalities: tuple[Polynomial, ...] = ()
     inequalities: tuple[Polynomial, ...] = ()
 
-    @property
-    def conditioned(self) -> bool:
-        """Whether there are conditions besides u ≥ 0."""
-        return bool(self.equalities or self.inequalities)
-
 
 def ends_of(loop: Loop) -> dict[str, tuple[tuple[str, int], ...]]:
     """Ends of every range: ±name where it is [−x, x], name where it is a point, else name- and name+."""

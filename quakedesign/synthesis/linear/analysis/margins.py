@@ -14,7 +14,7 @@ from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, nearest, rational
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
-from quakedesign.synthesis.linear.analysis.common_quadratic import CommonQuadratic, robust_stability, sector_loop
+from quakedesign.synthesis.linear.analysis.common_quadratic import robust_stability, sector_loop
 from quakedesign.synthesis.linear.analysis.frequency import characteristic, circle_limit, slip_limit, stable_quartic
 from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop, polytope_of
 
@@ -51,11 +51,6 @@ class SlopeMargin:
     slope: Fraction
     working_slope: Fraction
     certificate: Certificate | None
-
-    @property
-    def certified_over_limit(self) -> float:
-        """Share of the limit that is proved [-]."""
-        return float(self.certified / self.limit)
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts, measured ones as numbers."""
@@ -239,21 +234,3 @@ def decay_rate(loop: Loop) -> DecayRate | None:
         return None
     limit = -polytope_of(loop).slowest()
     return DecayRate(certified=LowerBound(certificate.claims["rate"]), limit=limit, certificate=certificate)
-
-
-def supremum(loop_at: Callable[[Fraction], Loop], limit: Fraction, steps: int = 14) -> float:
-    """Largest number for which the solver finds a common V, by bisection in floating point; proves nothing.
-
-    Parameters
-    ----------
-    loop_at : callable
-        Loop for a number between 0 and `limit`.
-    limit : Fraction
-    steps : int
-    """
-    low, high = Fraction(0), limit
-    for _ in range(steps):
-        middle = (low + high) / 2
-        found = CommonQuadratic(polytope_of(loop_at(middle)))()
-        low, high = (middle, high) if found is not None and found.rate > 0 else (low, middle)
-    return float(low)

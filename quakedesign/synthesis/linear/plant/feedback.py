@@ -11,7 +11,6 @@ so that the error behind a slow reference is r̈ times −s/(βb k4), or (βb k1
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from quakedesign.certificates.linear_premises import rest_pressure
 from quakedesign.controllers.elqr import FEEDBACKS
@@ -88,15 +87,6 @@ def lag_coefficient(problem: LinearProblem, gains: Sequence[Fraction], vertex: V
     return float(stiff / (push * gains[3]))
 
 
-def error_transfer(problem: LinearProblem, gains: Sequence[Fraction], vertex: Vertex, feedback: str) -> tuple[Any, Any]:
-    """Numerator and denominator of e1/r, highest power first."""
-    beta, s, w = (float(v) for v in vertex)
-    push = [beta * float(problem.sectors.authority) * float(k) for k in gains]
-    denominator = [1.0, w + push[1], push[0] - s, push[2], push[3]]
-    held = push[:2] if feedback == "state" else [0.0, 0.0]
-    return [-1.0, -(w + held[1]), -(held[0] - s), 0.0, 0.0], denominator
-
-
 def largest_reference_acceleration(fault: Fault) -> float:
     """Rigorous to rounding: max |r̈| [m/s²] of the reference, from the zeros of its third derivative."""
     import sympy as sp
@@ -107,17 +97,3 @@ def largest_reference_acceleration(fault: Fault) -> float:
     ends = [*(root for root in turns if root.is_real and 0 <= root <= 1), sp.Integer(0), sp.Integer(1)]
     peak = max(abs(float(bend.subs(stage, end))) for end in ends)
     return peak * fault.reference.target_slip / fault.reference.operation_time**2
-
-
-def feedback_table(comparisons: Sequence[FeedbackComparison]) -> str:
-    """Markdown table of both kinds of feedback."""
-    lines = [
-        "| feedback | lag behind the reference [m] | largest term of Kx [Pa] | p* [Pa] | terms per p* | ξ2 [m s²] |",
-        "|---|---:|---:|---:|---:|---:|",
-    ]
-    for c in comparisons:
-        lines.append(
-            f"| {c.feedback} | {c.lag:.3g} | {c.largest_term:.3g} | {c.pressure:.3g} | {c.cancellation:.3g} | "
-            f"{c.integral:.3g} |"
-        )
-    return "\n".join(lines) + "\n"

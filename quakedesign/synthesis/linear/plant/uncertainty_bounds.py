@@ -60,11 +60,6 @@ class UncertaintyBounds:
     rest_pressure: Range
     nonvanishing: Fraction
 
-    def dominant(self, acts_on: str) -> Contribution | None:
-        """Largest contribution of a kind; None where all are zero."""
-        parts = [c for c in self.contributions if c.acts_on == acts_on and c.bound]
-        return max(parts, key=lambda c: c.bound) if parts else None
-
     def to_dict(self) -> dict:
         """Plain values, SI."""
         return {
