@@ -21,6 +21,7 @@ from types import ModuleType
 from typing import Any
 
 import clarabel
+from cvxpy.reductions.solvers.conic_solvers.clarabel_conif import dims_to_solver_cones
 from scipy import sparse
 
 from quakedesign.certificates import Loop
@@ -53,9 +54,9 @@ def one_solve(loop: Loop, repeats: int = 20) -> float:
     sweep = Sweep(loop, DEGREE)
     sweep.solve(loop)
     (numbers,) = sweep._numbers.values()
-    held = numbers.matrix
-    data = (sparse.csc_matrix((len(held.cost),) * 2), held.cost, held.matrix, held.right, held.cones)
-    solver = clarabel.DefaultSolver(*data, settings(ACCURACY))
+    data, _, _ = numbers.cones.compiled.data()
+    nothing, cones = sparse.csc_array((len(data["c"]),) * 2), dims_to_solver_cones(data["dims"])
+    solver = clarabel.DefaultSolver(nothing, data["c"], data["A"], data["b"], cones, settings(ACCURACY))
     return median(cpu(solver.solve)[0] for _ in range(repeats))
 
 

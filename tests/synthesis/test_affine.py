@@ -5,8 +5,7 @@ import pytest
 
 from quakedesign.certificates.obligations import Obligation
 from quakedesign.certificates.witnesses import statement_of
-from quakedesign.sos.solve.joint import Demand
-from quakedesign.synthesis.gains.affine_program import AffineProgram, Limits
+from quakedesign.sos.solve.joint import Demand, JointProgram, Limits
 
 SQUARE = {(2,): 1.0}
 TEMPLATE = statement_of(Obligation("", {(2,): 1}), "reals")
@@ -18,7 +17,7 @@ def demand(*parts):
 
 
 def largest(demands, fixed, limits):
-    found = AffineProgram(demands).largest(demands, [{(2,): c} for c in fixed], limits)
+    found = JointProgram(demands).solve(demands, [{(2,): c} for c in fixed], limits)
     return found.margin, found.decision
 
 

@@ -1,9 +1,13 @@
-"""cvxpy problems solved by Clarabel."""
+"""Programmes stated in cvxpy and solved by Clarabel: once, or compiled and solved again with other Parameters."""
 
+from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
+from quakedesign.sos.solve.moment import MomentProgram, options, pairs, useful
 
-def solve(problem: Any, **options: Any) -> bool:
+
+def solve(problem: Any, **chosen: Any) -> bool:
     """Run Clarabel; whether there is an answer worth looking at. Its status is no verdict."""
     import warnings
 
@@ -12,7 +16,71 @@ def solve(problem: Any, **options: Any) -> bool:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            problem.solve(solver=cp.CLARABEL, **options)
+            problem.solve(solver=cp.CLARABEL, **chosen)
         except (cp.SolverError, ValueError, ArithmeticError):
             return False
     return problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
+
+
+class Compiled:
+    """A cvxpy problem whose cone form is compiled once; between two solves only its Parameters change.
+
+    Parameters
+    ----------
+    problem : cvxpy.Problem
+        Disciplined in its Parameters (DPP).
+    """
+
+    def __init__(self, problem: Any) -> None:
+        self.problem = problem
+        self.solver_seconds = 0.0
+        self._solvers: dict[str, Any] = {}
+
+    def data(self) -> tuple[dict[str, Any], Any, Any]:
+        """Cone form for the present Parameters, as `cvxpy.Problem.get_problem_data` returns it."""
+        import cvxpy as cp
+
+        return self.problem.get_problem_data(cp.CLARABEL, canon_backend=cp.COO_CANON_BACKEND, solver_opts={})
+
+    def solve(self, accuracy: float = 1e-8, *, anew: bool = True) -> bool:
+        """Whether Clarabel has an answer worth looking at; variables and constraints then have their values.
+
+        Parameters
+        ----------
+        accuracy : float
+        anew : bool
+            False goes on with the solver of the last call, faster by what it has ordered and scaled; its last digits
+            then depend on what was solved before.
+        """
+        data, chain, inverse = self.data()
+        answer = chain.solver.solve_via_data(data, not anew, False, options(accuracy), self._solvers)
+        self.solver_seconds = answer.solve_time
+        if not useful(answer):
+            return False
+        found = {name: getattr(answer, name) for name in ("x", "z", "obj_val", "solve_time", "iterations")}
+        self.problem.unpack_results(SimpleNamespace(status="Solved", **found), chain, inverse)
+        return True
+
+
+def in_cones(shapes: Sequence[MomentProgram], moments: Any) -> list[Any]:
+    """cvxpy constraints on functionals, one a shape, below each other: zero on its relations, ⪰ 0 on its blocks.
+
+    Blocks of one size are one constraint, which compiles some ten times faster than one for every block.
+    """
+    import cvxpy as cp
+    import numpy as np
+    from scipy import sparse
+
+    triangles = sparse.block_diag([shape.triangles() for shape in shapes], format="csr")
+    relations = sparse.block_diag([shape.relations() for shape in shapes], format="csr")
+    sizes = np.array([block.size for shape in shapes for block in shape.blocks])
+    starts = np.cumsum(sizes * (sizes + 1) // 2) - sizes * (sizes + 1) // 2
+    constraints = [relations @ moments == 0] if relations.shape[0] else []
+    for size in np.unique(sizes).tolist():
+        place = np.empty((size, size), dtype=np.int64)
+        rows, columns = pairs(size)
+        place[rows, columns] = place[columns, rows] = np.arange(len(rows))
+        first = starts[sizes == size]
+        entries = triangles[(first[:, None] + place.ravel()).ravel()]
+        constraints.append(cp.reshape(entries @ moments, (len(first), size, size), order="C") >> 0)
+    return constraints

@@ -1,28 +1,35 @@
 """Decision variables that put many polynomials into their cones at once, with the largest common margin.
 
-Primal: maximise t with Σ_j a_j P_j − t·N in the cone of every obligation, |a_j| ≤ 1. It is solved from the other side,
+Primal: maximise t with C_o + Σ_j x_j P_oj − t·N_o in the cone of every obligation o, and x within limits. It is stated
+from the other side,
 
-    minimise Σ_j |Σ_o L_o(P_j)|  subject to  Σ_o L_o(N) = 1,  L_o(g_S·b bᵀ) ⪰ 0,  L_o(m·h) = 0,
+    minimise Σ_o L_o(C_o) + Σ_j radius_j·|Σ_o L_o(P_oj)|
+    subject to  Σ_o L_o(N_o) = 1,  L_o(g_S·b bᵀ) ⪰ 0,  L_o(m·h) = 0,
 
-where the unknowns are as many as monomials and the P_j occur in one row each: a sweep over other P_j changes only
-these rows.
+where the unknowns are as many as monomials; t and x are the multipliers of equations. Every further limit has a
+multiplier of its own among the unknowns.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any
 
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, product
 from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.solve.conic import Compiled, in_cones
 from quakedesign.sos.solve.decide import initial_blocks
 from quakedesign.sos.solve.faces import modulo
-from quakedesign.sos.solve.moment import MomentProgram, settings, useful
+from quakedesign.sos.solve.moment import MomentProgram
 from quakedesign.sos.solve.rounding import relations
+
+_KEPT = 32
+_known: dict[tuple, "JointProgram"] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Demand:
-    """One polynomial Σ_j a_j P_j − t·N that must be in a cone.
+    """One polynomial Σ_j x_j P_j − t·N that must be in a cone.
 
     Attributes
     ----------
@@ -39,6 +46,26 @@ class Demand:
     margin: Polynomial
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Bounds on the decisions x: |x_j| ≤ radius_j, row·x ≤ bound for every row, and Σ_j share_j|x_j| ≤ 1.
+
+    Attributes
+    ----------
+    radii : sequence of float
+        Without effect on those that have a share.
+    rows : sequence of sequence of float
+    bounds : sequence of float
+    shares : sequence of float
+        Of the first decisions, positive; none unless given.
+    """
+
+    radii: Sequence[float]
+    rows: Sequence[Sequence[float]] = ()
+    bounds: Sequence[float] = ()
+    shares: Sequence[float] = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Proposal:
     """Floating-point answer of a search; proves nothing.
@@ -46,7 +73,7 @@ class Proposal:
     Attributes
     ----------
     decision : list of float
-        a_j in [−1, 1].
+        x_j.
     margin : float
         Largest t; negative or zero when no decision gives one.
     """
@@ -55,8 +82,23 @@ class Proposal:
     margin: float
 
 
+def joint_program(demands: Sequence[Demand]) -> "JointProgram":
+    """The programme of the structure that demands have, kept from the last time that it was asked for."""
+    key = len(demands[0].parts), *(_structure(d.template) for d in demands)
+    found = _known.pop(key, None) or JointProgram(demands)
+    if len(_known) >= _KEPT:
+        _known.pop(next(iter(_known)), None)
+    return _known.setdefault(key, found)
+
+
+def _structure(template: Statement) -> tuple:
+    """What two templates with one cone share."""
+    conditions = (tuple(tuple(p.items()) for p in group) for group in (template.inequalities, template.equalities))
+    return frozenset(template.target), template.degree, template.products, *conditions
+
+
 class JointProgram:
-    """Programme of one structure, built once and solved for many numbers.
+    """Programme of one structure, compiled once for every kind of limits and solved for many numbers.
 
     Parameters
     ----------
@@ -65,93 +107,94 @@ class JointProgram:
     """
 
     def __init__(self, demands: Sequence[Demand]) -> None:
-        import numpy as np
-
-        self._shapes = [_shape(d.template) for d in demands]
-        widths = [len(s.keys) for s in self._shapes]
-        self._starts = np.concatenate([[0], np.cumsum(widths)]).astype(int)
+        self._shapes = [shape_of(d.template) for d in demands]
         self._count = len(demands[0].parts)
-        self._solver: Any = None
-        self._entries: Any = None
-        self.solver_seconds = 0.0
+        self._stated: dict[tuple[int, int], _Stated] = {}
 
-    def solve(self, demands: Sequence[Demand]) -> Proposal | None:
+    def solve(
+        self,
+        demands: Sequence[Demand],
+        fixed: Sequence[Polynomial] | None = None,
+        limits: Limits | None = None,
+    ) -> Proposal | None:
         """Decision with the largest margin for demands of the same structure; None if the solver fails.
+
+        Parameters
+        ----------
+        demands : sequence of Demand
+        fixed : sequence of Polynomial, optional
+            C_o, in the monomials of the demand's template; nothing unless given.
+        limits : Limits, optional
+            All |x_j| ≤ 1 unless given.
 
         Raises
         ------
         ValueError
             When a monomial occurs that the structure does not have.
         """
-        import clarabel
         import numpy as np
-        from scipy import sparse
 
-        A, b, cones = self._matrix(demands)
-        total, count = int(self._starts[-1]), self._count
-        q = np.concatenate([np.zeros(total), np.ones(2 * count)])
-        if self._solver is None or not np.array_equal(A.indices, self._entries):
-            zero = sparse.csc_matrix((len(q), len(q)))
-            self._solver, self._entries = clarabel.DefaultSolver(zero, q, A, b, cones, settings(1e-8)), A.indices
-        else:
-            self._solver.update(A=A, b=b)
-        answer = self._solver.solve()
-        self.solver_seconds = answer.solve_time
-        z = np.array(answer.z)
-        if not useful(answer):
-            return None
-        return Proposal((z[1 : 1 + count]).tolist(), float(-z[0]))
+        within = limits or Limits(radii=[1.0] * self._count)
+        kind = len(within.bounds), len(within.shares)
+        if kind not in self._stated:
+            self._stated[kind] = _Stated(self._shapes, self._count, *kind)
+        values = {
+            "costs": self._row(fixed or [{}] * len(demands)),
+            "margin": self._row([_times(d, d.margin) for d in demands]),
+            "parts": np.array([self._row([_times(d, d.parts[j]) for d in demands]) for j in range(self._count)]),
+            "radii": [*[0.0] * kind[1], *within.radii[kind[1] :]],
+            "rows": np.reshape(within.rows, (kind[0], self._count)),
+            "bounds": within.bounds,
+            "shares": within.shares,
+        }
+        return self._stated[kind].solve(values)
 
-    def _matrix(self, demands: Sequence[Demand]):
-        """Rows: Σ L(N) = 1; one for every decision; relations; y ≥ 0; localizing matrices."""
-        import clarabel
+    def _row(self, polynomials: Sequence[Mapping[Exponents, Any]]) -> Any:
+        """Coefficients of one polynomial for every demand, beside each other."""
         import numpy as np
-        from scipy import sparse
 
-        total, count = int(self._starts[-1]), self._count
-        rows: list[Any] = []
-        columns: list[Any] = []
-        values: list[Any] = []
-
-        def put(r, c, v) -> None:
-            rows.append(np.asarray(r, dtype=np.int64))
-            columns.append(np.asarray(c, dtype=np.int64))
-            values.append(np.asarray(v, dtype=float))
-
-        for shape, start, demand in zip(self._shapes, self._starts, demands, strict=False):
-            put(
-                np.zeros(len(shape.keys)),
-                start + np.arange(len(shape.keys)),
-                shape.vector(_times(demand, demand.margin)),
-            )
-            for j, part in enumerate(demand.parts):
-                vector = shape.vector(_times(demand, part))
-                put(np.full(len(vector), 1 + j), start + np.arange(len(vector)), vector)
-        each = np.arange(count)
-        put(1 + each, total + each, -np.ones(count))
-        put(1 + each, total + count + each, np.ones(count))
-        first = 1 + count
-        for shape, start in zip(self._shapes, self._starts, strict=False):
-            number, column, value = shape.relation_entries
-            put(first + number, start + column, value)
-            first += shape.relation_count
-        cones = [clarabel.ZeroConeT(first), clarabel.NonnegativeConeT(2 * count)]
-        put(first + np.arange(2 * count), total + np.arange(2 * count), -np.ones(2 * count))
-        first += 2 * count
-        for shape, start in zip(self._shapes, self._starts, strict=False):
-            number, column, value, _ = shape.localizing
-            put(first + number, start + column, -value)
-            for block in shape.blocks:
-                cones.append(clarabel.PSDTriangleConeT(block.size))
-                first += block.size * (block.size + 1) // 2
-        where = (np.concatenate(rows), np.concatenate(columns))
-        A = sparse.csc_matrix((np.concatenate(values), where), shape=(first, total + 2 * count))
-        b = np.zeros(first)
-        b[0] = 1.0
-        return A, b, cones
+        return np.concatenate([shape.vector(p) for shape, p in zip(self._shapes, polynomials, strict=True)])
 
 
-def _shape(template: Statement) -> MomentProgram:
+class _Stated:
+    """The programme in cvxpy for limits of one kind; all its numbers are Parameters."""
+
+    def __init__(self, shapes: Sequence[MomentProgram], count: int, rows: int, shares: int) -> None:
+        import cvxpy as cp
+
+        self._alone = Lock()
+        size = sum(len(shape.keys) for shape in shapes)
+        sizes: dict[str, Any] = {"costs": size, "margin": size, "parts": (count, size), "radii": count}
+        sizes |= ({"rows": (rows, count), "bounds": rows} if rows else {}) | ({"shares": shares} if shares else {})
+        self.given = {name: cp.Parameter(size, name=name) for name, size in sizes.items()}
+        given, moments = self.given, cp.Variable(size, name="moments")
+        above, below = cp.Variable(count, name="above"), cp.Variable(count, name="below")
+        cost = given["costs"] @ moments + given["radii"] @ (above + below)
+        pull, signs = above - below, [above >= 0, below >= 0]
+        if rows:
+            held = cp.Variable(rows, name="held")
+            cost, pull = cost + given["bounds"] @ held, pull + given["rows"].T @ held
+            signs += [held >= 0]
+        if shares:
+            shared = cp.Variable(name="shared")
+            most = given["shares"] * shared
+            cost, signs = cost + shared, [*signs, shared >= 0, above[:shares] <= most, below[:shares] <= most]
+        self.unit, self.link = given["margin"] @ moments == 1, given["parts"] @ moments - pull == 0
+        constraints = [self.unit, self.link, *in_cones(shapes, moments), *signs]
+        self.compiled = Compiled(cp.Problem(cp.Minimize(cost), constraints))
+
+    def solve(self, values: Mapping[str, Any]) -> Proposal | None:
+        """Proposal for the values of all Parameters."""
+        with self._alone:
+            for name, parameter in self.given.items():
+                parameter.value = values[name]
+            if not self.compiled.solve():
+                return None
+            return Proposal(self.link.dual_value.tolist(), -float(self.unit.dual_value))
+
+
+def shape_of(template: Statement) -> MomentProgram:
+    """Monomials, blocks and relations of a cone, modulo the equalities."""
     multiples = [r for _, _, r in relations(template)]
     blocks = modulo(initial_blocks(template), multiples)
     rows = [{e: float(c) for e, c in r.items()} for r in multiples]

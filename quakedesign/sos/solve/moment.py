@@ -185,6 +185,23 @@ class MomentProgram:
             return None
         return dict(zip(self.index, answer.x[:-1], strict=True))
 
+    def triangles(self) -> Any:
+        """Sparse map from L to the upper triangles of all localizing matrices, column by column, below each other."""
+        import numpy as np
+        from scipy import sparse
+
+        rows, columns, values, diagonal = self.localizing
+        plain = np.where(np.isin(rows, diagonal), values, values / np.sqrt(2.0))
+        size = sum(s.size * (s.size + 1) // 2 for s in self.blocks)
+        return sparse.csr_array((plain, (rows, columns)), shape=(size, len(self.keys)))
+
+    def relations(self) -> Any:
+        """Sparse map from L to its values at the multiples of the equalities."""
+        from scipy import sparse
+
+        rows, columns, values = self.relation_entries
+        return sparse.csr_array((values, (rows, columns)), shape=(self.relation_count, len(self.keys)))
+
     def vector(self, target: Mapping[Exponents, Any]):
         """Coefficients in the order of the monomials, as floats.
 
@@ -245,16 +262,20 @@ def _localizing(blocks: Sequence[Shape], entries: list, where, width: int):
     return tuple(np.concatenate(part) for part in (rows, columns, values, diagonal))
 
 
+def options(accuracy: float) -> dict[str, Any]:
+    """What Clarabel is asked for, by the names of its settings."""
+    exact = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), accuracy)
+    return {"presolve_enable": False, "chordal_decomposition_enable": False, "max_iter": 100, **exact}
+
+
 def settings(accuracy: float):
-    """Settings of Clarabel for one accuracy."""
+    """Settings of Clarabel with these values."""
     import clarabel
 
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    settings.presolve_enable = False
-    settings.chordal_decomposition_enable = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = accuracy
-    settings.max_iter = 100
+    for name, value in options(accuracy).items():
+        setattr(settings, name, value)
     return settings
 
 
@@ -272,7 +293,7 @@ def _unique(stacked: list):
 
 
 @lru_cache(maxsize=256)
-def _pairs(size: int):
+def pairs(size: int):
     """Rows and columns of the upper triangle, column by column; read-only."""
     import numpy as np
 
@@ -300,7 +321,7 @@ def _entries(block: Shape):
     import numpy as np
 
     basis = np.array(block.basis, dtype=np.int64)
-    rows, columns = _pairs(len(basis))
+    rows, columns = pairs(len(basis))
     sums = basis[rows] + basis[columns]
     terms = np.array(list(block.weight), dtype=np.int64)
     factors = np.where(rows == columns, 1.0, np.sqrt(2.0))
@@ -314,8 +335,8 @@ def _congruence(face):
     from scipy import sparse
 
     face = np.asarray(face, dtype=float)
-    a, b = _pairs(face.shape[0])
-    i, j = _pairs(face.shape[1])
+    a, b = pairs(face.shape[0])
+    i, j = pairs(face.shape[1])
     whole = face[a][:, i] * face[b][:, j] + face[a][:, j] * face[b][:, i]
     whole *= np.where(a == b, 1.0, np.sqrt(2.0))[:, None] * np.where(i == j, 0.5, 1 / np.sqrt(2.0))[None, :]
     return sparse.csr_matrix(whole)
@@ -324,7 +345,7 @@ def _congruence(face):
 def _full(triangle, size: int):
     import numpy as np
 
-    rows, columns = _pairs(size)
+    rows, columns = pairs(size)
     matrix = np.zeros((size, size))
     values = np.where(rows == columns, 1.0, 1 / np.sqrt(2.0)) * triangle
     matrix[rows, columns] = values

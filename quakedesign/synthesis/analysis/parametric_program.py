@@ -17,7 +17,7 @@ from quakedesign.certificates import Loop
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.polynomial import monomial
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.synthesis.analysis.parametric_matrix import Matrix, scales_of
+from quakedesign.synthesis.analysis.parametric_cones import Cones, scales_of
 from quakedesign.synthesis.lyapunov.balancing import balance, exponents_of
 from quakedesign.synthesis.lyapunov.parametric_forms import ends_of, rows_of, values_of
 from quakedesign.synthesis.lyapunov.search import Family
@@ -61,7 +61,7 @@ class Screened:
         a_j, in the units of the frame.
     frame : Frame
     slopes : mapping of str to float
-        Derivative of the margin in every number that V̇ depends on, by the names of `sweep_rows`.
+        Derivative of the margin in every number that V̇ depends on, by the names of `rows_of`.
     """
 
     margin: float
@@ -154,7 +154,7 @@ class Sweep:
     def _in_units(self, scale: tuple[Fraction, ...]) -> "_Numbers":
         if scale not in self._numbers:
             free = self._numbers and not any(row.equalities or row.inequalities for row in self.rows)
-            known = next(iter(self._numbers.values())).matrix if free else None
+            known = next(iter(self._numbers.values())).cones if free else None
             if len(self._numbers) >= _KEPT:
                 self._numbers.pop(next(iter(self._numbers)))
             try:
@@ -179,12 +179,12 @@ class Sweep:
 
 
 class _Numbers:
-    """The coefficients of a sweep in the units of one scale; without conditions all scales share a matrix."""
+    """The coefficients of a sweep in the units of one scale; without conditions all scales share a programme."""
 
-    def __init__(self, sweep: Sweep, scale: tuple[Fraction, ...], matrix: Matrix | None) -> None:
+    def __init__(self, sweep: Sweep, scale: tuple[Fraction, ...], cones: Cones | None) -> None:
         import numpy as np
 
-        self.matrix = matrix or Matrix(sweep.rows, sweep.loop, sweep.monomials, scale)
+        self.cones = cones or Cones(sweep.rows, sweep.loop, sweep.monomials, scale)
         self.sizes = tuple(monomial(scale, exponents_of(t, sweep.loop.states)) for t in sweep.monomials)
         order = {names: i for i, names in enumerate(sweep.products)}
         parts = [(row, *part) for row in sweep.rows for part in row.parts]
@@ -200,7 +200,7 @@ class _Numbers:
         import numpy as np
 
         with np.errstate(over="ignore", invalid="ignore"):
-            merged = np.bincount(self.matrix.slots[self.rate], (self.coefficients * features[self.products])[self.rate])
+            merged = np.bincount(self.cones.slots[self.rate], (self.coefficients * features[self.products])[self.rate])
         if not np.isfinite(merged).all():
             raise CertificateError(_TOO_FAR)
         return float(np.abs(merged).max(initial=0.0)) or 1.0
@@ -210,14 +210,13 @@ class _Numbers:
         import numpy as np
 
         weights = np.where(self.rate, self.coefficients / pace, self.coefficients)
-        answer = self.matrix.solve(weights * features[self.products], accuracy)
-        if answer is None:
+        found = self.cones.solve(weights * features[self.products], accuracy)
+        if found is None:
             return None
-        x, z = np.array(answer.x), np.array(answer.z)
-        shares = weights * z[self.matrix.part_rows] * x[self.matrix.part_columns]
+        margin, decision, moments = found
+        shares = weights * decision[self.cones.parts] * moments[self.cones.columns]
         per_product = np.bincount(self.products, shares, minlength=len(features))
-        decision = z[1 : 1 + len(self.sizes)].tolist()
-        return float(-z[0]), decision, per_product, float(answer.solve_time)
+        return margin, decision.tolist(), per_product, self.cones.compiled.solver_seconds
 
 
 def _product(values: Mapping[str, float], names: tuple[str, ...]) -> float:

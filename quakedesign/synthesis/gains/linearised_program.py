@@ -15,10 +15,9 @@ from quakedesign.certificates.obligations import Obligation, power_sum
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.rationals import nearest
 from quakedesign.sos import Polynomial
-from quakedesign.sos.solve.joint import Demand
+from quakedesign.sos.solve.joint import Demand, JointProgram
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
-from quakedesign.synthesis.gains.affine_program import AffineProgram
 from quakedesign.synthesis.lyapunov.balancing import exponents_of, lifted_scale, scaled
 from quakedesign.synthesis.lyapunov.gain_forms import Kin, Row, rows_of
 from quakedesign.synthesis.lyapunov.parametric_forms import values_of
@@ -58,7 +57,7 @@ class Neighbourhood:
     ----------
     monomials, sizes
         V = Σ a_j·monomial_j/size_j.
-    program : AffineProgram
+    program : JointProgram
         For the demands.
     demands : tuple of Demand
         Parts: those of a_j, then those of the changes, with V as it is now.
@@ -68,7 +67,7 @@ class Neighbourhood:
 
     monomials: tuple[Term, ...]
     sizes: tuple[Fraction, ...]
-    program: AffineProgram
+    program: JointProgram
     demands: tuple[Demand, ...]
     fixed: tuple[Form, ...]
 
@@ -231,10 +230,10 @@ def _raised(support, unit: Form, times: int):
 
 
 @lru_cache(maxsize=32)
-def _program(kin: Kin, scale: tuple[Fraction, ...], paced: bool, changes: int) -> AffineProgram:
+def _program(kin: Kin, scale: tuple[Fraction, ...], paced: bool, changes: int) -> JointProgram:
     loop, degree = kin.loop, kin.structure.degree
     count = len(signed_monomials(loop.states, degree, loop.domain)) + changes
-    return AffineProgram(
+    return JointProgram(
         [Demand(template=t, parts=[{}] * count, margin={}) for _, t, _ in _templates(kin, scale, paced)]
     )
 

@@ -13,8 +13,8 @@ from fractions import Fraction
 from quakedesign.certificates import Loop
 from quakedesign.certificates.claim import root_enclosure
 from quakedesign.errors import CertificateError
+from quakedesign.sos.solve.joint import Limits
 from quakedesign.symbolic.terms import Term
-from quakedesign.synthesis.gains.affine_program import Limits
 from quakedesign.synthesis.gains.dilation import scaled_norm
 from quakedesign.synthesis.gains.linearised_program import Neighbourhood, neighbourhood
 from quakedesign.synthesis.gains.setting import Setting, State
@@ -104,7 +104,7 @@ def _step(setting: Setting, state: State, share: float) -> State | None:
     if around is None:
         return None
     limits = _limits(setting, loop, level, around, dict(zip(changes, sizes, strict=True)))
-    found = around.program.largest(around.demands, around.fixed, limits)
+    found = around.program.solve(around.demands, around.fixed, limits)
     if found is None:
         return None
     chosen = dict(zip(loop.gains, base, strict=True))
@@ -199,7 +199,7 @@ def look(
     if around is None:
         return None
     limits = _limits(setting, loop, level, around, {})
-    found = around.program.largest(around.demands, around.fixed, limits)
+    found = around.program.solve(around.demands, around.fixed, limits)
     if found is None or not found.margin > (setting.least if least is None else least):
         return None
     function = around.function(found.decision)

@@ -11,7 +11,7 @@ from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.polynomial import constant, product
 from quakedesign.sos.exact.proofs import Square, SumOfSquares
 from quakedesign.sos.solve.decide import strict_proof
-from quakedesign.sos.solve.joint import Demand, JointProgram
+from quakedesign.sos.solve.joint import Demand, joint_program
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov.balancing import below, lifted_scale, scaled
 from quakedesign.synthesis.lyapunov.quadratic import quadratic_rate
@@ -87,11 +87,10 @@ def bounds_of(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction])
     m, size = degree(function, "V"), len(loop.states)
     different = list({tuple(sorted(p.items())): p for p in function}.values())
     claims = {}
-    programs: dict[tuple, JointProgram] = {}
     for i, state in enumerate(loop.states):
         corner = {tuple(m * (j == i) for j in range(size)): Fraction(1)}
         obligations = [Obligation(state, p) for p in different]
-        gamma = below(0.9 * min(_largest(one, corner, loop.domain, scale, 0, programs) for one in obligations))
+        gamma = below(0.9 * min(_largest(one, corner, loop.domain, scale, 0) for one in obligations))
         if gamma > 0:
             claims[f"bound_{state}"] = gamma
     return claims
@@ -122,12 +121,8 @@ def _largest(
     domain: str,
     scale: Sequence[Fraction],
     level: int,
-    programs: dict[tuple, JointProgram] | None = None,
 ) -> float:
-    """Largest g for which the solver finds P − g·direction in the cone, 0 if it finds none; proves nothing.
-
-    Programmes of equal structure, up to the numbers of P, are shared by those who hand over the same `programs`.
-    """
+    """Largest g for which the solver finds P − g·direction in the cone, 0 if it finds none; proves nothing."""
     whole = lifted_scale(one.equalities, scale)
     size = max(abs(c) for c in scaled(one.polynomial, whole).values())
     moved = Obligation(
@@ -142,8 +137,5 @@ def _largest(
     kind = Obligation(one.name, support, moved.equalities, moved.inequalities)
     template = statement_of(kind, domain, power_of_sum(len(whole), level))
     demand = Demand(template=template, parts=(moved.polynomial,), margin=direction)
-    known = {} if programs is None else programs
-    program = known.get(kind.key) or JointProgram([demand])
-    known[kind.key] = program
-    found = program.solve([demand])
+    found = joint_program([demand]).solve([demand])
     return 0.0 if found is None else max(0.0, found.margin) / float(unit)

@@ -11,7 +11,7 @@ from quakedesign.certificates.claim import unit_ranges
 from quakedesign.certificates.obligations import Obligation, Obligations, degree, power_sum
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.sos import Polynomial
-from quakedesign.sos.solve.joint import Demand, JointProgram
+from quakedesign.sos.solve.joint import Demand, joint_program
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.gains.linearised_program import Pace
 from quakedesign.synthesis.lyapunov.balancing import exponents_of, lifted_scale, scaled
@@ -93,7 +93,7 @@ def _margin(one: Obligation, loop: Loop, scale: Sequence[Fraction]) -> float:
     support = Obligation("", dict.fromkeys((*moved, *margin), Fraction(1)), *conditions)
     parts = [{e: c / size for e, c in moved.items()}]
     demand = Demand(template=statement_of(support, loop.domain), parts=parts, margin=margin)
-    found = JointProgram([demand]).solve([demand])
+    found = joint_program([demand]).solve([demand])
     return 0.0 if found is None else max(0.0, found.margin) * float(size * min(1 / r**power for r in scale))
 
 

@@ -13,7 +13,7 @@ from quakedesign.errors import CertificateError
 from quakedesign.rationals import nearest
 from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.polynomial import monomial
-from quakedesign.sos.solve.joint import Demand, JointProgram, Proposal
+from quakedesign.sos.solve.joint import Demand, Proposal, joint_program
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov.balancing import balance, below, exponents_of, lifted_scale, scaled
@@ -63,7 +63,7 @@ def _of_degree(loop: Loop, degree: int, subject: Subject | None) -> Certificate 
     family = family_of(loop, degree, scale)
     if family is None:
         return None
-    proposal = JointProgram(family.demands).solve(family.demands)
+    proposal = joint_program(family.demands).solve(family.demands)
     if proposal is None or not proposal.margin > _WORTH_A_PROOF:
         return None
     return finished(loop, family, proposal, scale, subject)

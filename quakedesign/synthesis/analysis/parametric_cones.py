@@ -1,0 +1,95 @@
+"""The programme of a sweep in cvxpy: stated and compiled once, its numbers replaced between points."""
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from math import factorial, prod
+from typing import Any
+
+from quakedesign.certificates import Loop
+from quakedesign.certificates.obligations import Obligation
+from quakedesign.certificates.witnesses import statement_of
+from quakedesign.sos import Polynomial
+from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.solve.conic import Compiled, in_cones
+from quakedesign.sos.solve.joint import shape_of
+from quakedesign.symbolic.terms import Term
+from quakedesign.synthesis.lyapunov.balancing import exponents_of, lifted_scale, scaled
+from quakedesign.synthesis.lyapunov.parametric_forms import Row
+
+
+class Cones:
+    """Minimise μ subject to Σ L(N) = 1, Σ L(P_j) = μ·mean(V_j) for every j, and L ≥ 0 on the cone of every row.
+
+    The multipliers of the equations are the margin and a_j.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    loop : Loop
+    monomials : sequence of Term
+        V_j.
+    scale : tuple of Fraction
+        Of the states; the conditions of the rows are in these units.
+    """
+
+    def __init__(self, rows: Sequence[Row], loop: Loop, monomials: Sequence[Term], scale: Sequence[Fraction]) -> None:
+        import cvxpy as cp
+        import numpy as np
+        from scipy import sparse
+
+        shapes = [shape_of(_template(row, loop, scale)) for row in rows]
+        starts = np.cumsum([0, *(len(s.keys) for s in shapes)])
+        placed = list(zip(rows, shapes, starts, strict=False))
+        self.columns = np.array([start + shape.index[e] for row, shape, start in placed for _, e, _, _ in row.parts])
+        self.parts = np.array([j for row in rows for j, _, _, _ in row.parts])
+        count, size = len(monomials), int(starts[-1])
+        places, self.slots = np.unique(self.columns * count + self.parts, return_inverse=True)
+        each, ones = np.arange(len(places)), np.ones(len(places))
+        chosen = sparse.csr_array((ones, (each, places // count)), shape=(len(places), size))
+        summed = sparse.csr_array((ones, (places % count, each)), shape=(count, len(places)))
+        self._numbers = cp.Parameter(len(places), name="numbers")
+        self._moments, level = cp.Variable(size, name="moments"), cp.Variable(name="level")
+        margin = np.concatenate([shape.vector(row.margin) for row, shape, _ in placed])
+        self._unit = margin @ self._moments == 1
+        sums = summed @ cp.multiply(self._numbers, chosen @ self._moments)
+        self._link = sums - level * np.array(means(monomials, loop.states)) == 0
+        constraints = [self._unit, self._link, *in_cones(shapes, self._moments)]
+        self.compiled = Compiled(cp.Problem(cp.Minimize(level), constraints))
+
+    def solve(self, parts: Any, accuracy: float) -> tuple[float, Any, Any] | None:
+        """Margin, a_j and L for the values of all parts, in the order of the rows; None if the solver fails twice."""
+        import numpy as np
+
+        self._numbers.value = np.bincount(self.slots, parts)
+        if not self.compiled.solve(accuracy, anew=False) and not self.compiled.solve(accuracy):
+            return None
+        return -float(self._unit.dual_value), self._link.dual_value, self._moments.value
+
+
+def means(monomials: Sequence[Term], weights: Mapping[str, int]) -> list[float]:
+    """Mean of every V_j over all cells and Σu_i = 1, that of u^m being one; zero where signs alternate."""
+    found = []
+    for term in monomials:
+        even = all(kind == "a" for _, _, kind in term.factors)
+        powers = exponents_of(term, weights)
+        found.append(prod(map(factorial, powers)) / factorial(sum(powers)) if even else 0.0)
+    return found
+
+
+def scales_of(row: Row, scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """Scale of all variables of a row, given that of the states."""
+    return lifted_scale(row.equalities, scale)
+
+
+def _template(row: Row, loop: Loop, scale: Sequence[Fraction]) -> Statement:
+    """Set and monomials of a row, in scaled variables."""
+    whole = scales_of(row, scale)
+
+    def normal(p: Polynomial) -> dict:
+        found = scaled(p, whole)
+        size = max(abs(c) for c in found.values())
+        return {e: c / size for e, c in found.items()}
+
+    support = dict.fromkeys([*(e for _, e, _, _ in row.parts), *row.margin], Fraction(1))
+    conditions = tuple(map(normal, row.equalities)), tuple(map(normal, row.inequalities))
+    return statement_of(Obligation("", support, *conditions), loop.domain)
