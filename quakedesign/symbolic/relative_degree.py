@@ -22,7 +22,7 @@ def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control
     int or None
         None where as many derivatives as there are states do not depend on it, and so no later one does at all points.
     """
-    for degree in range(1, len(field) + 1):
+    for degree, _ in enumerate(field, start=1):
         output = sp.expand(lie_derivative(output, field))
         if output.has(control):
             return degree
