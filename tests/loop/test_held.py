@@ -247,6 +247,77 @@ def test_the_longest_delay_is_eight_periods():
     assert held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=F(1, 10**9)).segments[0].duration == F(1, 10**9)
 
 
+def named(loop, row):
+    """The entries of a row that are not zero, by the names of states."""
+    return {name: v for name, v in zip(loop.states, row, strict=True) if v}
+
+
+ASKED = {"e1": -8, "e2": -4, "xi1": -2, "xi2": F(-1, 5)}  # b·p of INTEGRALS
+SUMS = {"xi1": {"xi1": 1, "e1": F(1, 5)}, "xi2": {"xi2": 1, "xi1": F(1, 5)}}
+STAYS = {name: {name: 1} for name in ("e1", "e2", "valve", "behind")}
+CASES = {
+    "neither": ("0", "0", [{"valve": ASKED}]),
+    "lag": ("0", "1/4", [{"valve": ASKED, "behind": {"behind": 1, "valve": 1} | {k: -v for k, v in ASKED.items()}}]),
+    "delay of a period": ("1/5", "0", [{"waiting0": ASKED, "valve": {"waiting0": 1}}]),
+    "delay and lag": (
+        "27/100",
+        "1/10",
+        [
+            {"waiting0": ASKED, "waiting1": {"waiting0": 1}},
+            {"valve": {"waiting1": 1}, "behind": {"behind": 1, "valve": 1, "waiting1": -1}},
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize(("delay", "lag", "jumps"), CASES.values(), ids=CASES)
+def test_matrices_say_what_moves_where(delay, lag, jumps):
+    """Row by row: what flows, what a sample and an arrival move, what enters and what is seen."""
+    loop = held_loop(INTEGRALS, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag))
+    waiting, pressures = [f"waiting{i}" for i in range(2 if len(jumps) == 2 else int(F(delay) / STEP))], ["valve"]
+    pressures += ["behind"] if F(lag) else []
+    assert loop.states == ("e1", "e2", "xi1", "xi2", *waiting, *pressures)
+    flow = {name: named(loop, row) for name, row in zip(loop.states, loop.flow, strict=True)}
+    assert flow.pop("e1") == {"e2": 1}
+    assert flow.pop("e2") == {"e1": F(1, 2), "e2": F(-3, 2), **dict.fromkeys(pressures, F(6, 5))}
+    assert flow.pop("behind", None) == ({"behind": -1 / F(lag)} if F(lag) else None)
+    assert not any(flow.values())
+    for number, (segment, moved) in enumerate(zip(loop.segments, jumps, strict=True)):
+        stays = STAYS | ({name: {name: 1} for name in ("xi1", "xi2", *waiting)} if number else SUMS)
+        expected = {name: (stays | moved)[name] for name in loop.states}
+        assert {name: named(loop, row) for name, row in zip(loop.states, segment.jump, strict=True)} == expected
+    parts = [F(delay) % STEP, STEP - F(delay) % STEP] if len(jumps) == 2 else [STEP]
+    assert [segment.duration for segment in loop.segments] == parts
+    assert {name: named(loop, row) for name, row in loop.inputs.items()} == {
+        "acceleration": {"e2": 1},
+        "drift": {"xi2": 5, **dict.fromkeys([*waiting, "valve"], -1)},
+    }
+    assert {name: named(loop, row) for name, row in loop.outputs.items()} == {
+        "slip_error": {"e1": 1},
+        "slip_rate_error": {"e2": 1},
+        "push": dict.fromkeys(pressures, 1),
+    }
+    assert loop.sampled == {}
+
+
+def test_the_end_of_an_implicit_step_is_its_line_and_what_is_beside_it():
+    """w = v − 9/2·e1 in z⁺ = z + 3w and b·p = 2(−2e1 − 5e2 − z + 7w)."""
+    law = LinearLaw(
+        states=("z",),
+        update=((F(1),),),
+        measured=((F(0), F(0), F(3)),),
+        output=(F(-1),),
+        feedback=(F(-2), F(-5), F(7)),
+        root=ROOT,
+    )
+    loop = held_loop(law, MODEL, AUTHORITY, STEP)
+    (segment,) = loop.segments
+    moved = {name: named(loop, row) for name, row in zip(loop.states, segment.jump, strict=True)}
+    assert moved["z"] == {"z": 1, "e1": F(-27, 2)}
+    assert moved["valve"] == {"e1": -4 - 63, "e2": -10, "z": -2}
+    assert named(loop, loop.sampled["root"]) == {"z": 3, "valve": 14}
+
+
 def images(rows, vector):
     return tuple(sum(a * b for a, b in zip(row, vector, strict=True)) for row in rows)
 
