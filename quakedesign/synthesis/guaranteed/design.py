@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from math import inf, log10
+from math import hypot, inf, log10, sqrt
 from typing import Unpack
 
 import numpy as np
@@ -19,6 +19,7 @@ _EVALUATIONS = 150
 _FEW = 50  # evaluations near a law that has a guarantee at another time
 _CREEPING = 0.1  # what the slip error over T_s counts beside the slip-rate error, so that the loop does not creep
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
+_MOST_GROWTH = 50.0  # logarithm; no law of samples answers that, and predictions far beyond it overflow
 _FAILED = 1e6
 _HOPELESS = 1.2  # small gain of a whole search after which `first_held` tries no other start
 
@@ -37,6 +38,8 @@ def first_held(
     """
     if around.get("delay", 0) > MOST_DELAY * step:
         return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None), near
+    if (none := _unpredictable(task, step)) is not None:
+        return none, near
     family, template = _family(task, step, measured, around)
 
     def cost(x: np.ndarray) -> float:
@@ -93,6 +96,8 @@ def design_held(
             f"a design needs a positive step, a delay of 0 to {MOST_DELAY} steps and a lag of 0 or more. Received "
             f"{float(step):.4g} s, {float(delay):.4g} s, {float(lag):.4g} s. Shorten the delay."
         )
+    if (none := _unpredictable(task, step)) is not None:
+        return none
     family, template = _family(task, step, measured, around)
     worst = replace(task, change=None)  # gains are chosen for the larger class: they answer slow disturbances as well
 
@@ -106,6 +111,15 @@ def design_held(
         starts = (best[1], family.starts[1])
         best = min((_search(lambda x: _drift_cost(seen(x), limit), start) for start in starts), key=lambda f: f[0])
     return guarantee(task, replace(template, law=family.law(best[1])))
+
+
+def _unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
+    """No law of samples, where the errors of the model outgrow within a period what a prediction can hold."""
+    rate, slip = float(task.model.rate), max(float(task.model.slip), 0.0)
+    growth = float(step) * (hypot(rate, 2 * sqrt(slip)) - rate) / 2
+    if growth <= _MOST_GROWTH:
+        return None
+    return NoGuarantee(reason=f"errors grow by e^{growth:.3g} within T_s = {float(step):.4g} s", small_gain=None)
 
 
 def _family(task: Task, step: Fraction, measured: str, around: Around) -> tuple[Family, Held]:

@@ -17,6 +17,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.synthesis import Design
 from quakedesign.synthesis.guaranteed import Answer, design_held, worst_found
+from quakedesign.synthesis.guaranteed.design import first_held
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -158,6 +159,14 @@ def test_a_step_far_too_long_has_no_guarantee_and_says_why():
     found = design_held(task_of(load_fault("real-fault")), F(2), objective="peak")
     assert isinstance(found, NoGuarantee)
     assert "is not stable" in found.reason
+
+
+def test_a_step_in_which_errors_outgrow_all_numbers_has_none_either():
+    """The pole (√(w² + 4s) − w)/2 with s = 0.4493 1/s² and w = 1.6 1/s is 0.2437 1/s, for an hour: e^877."""
+    task = task_of(load_fault("real-fault"))
+    for found in (design_held(task, F(3600)), first_held(task, F(3600))[0]):
+        assert isinstance(found, NoGuarantee)
+        assert found.reason == "errors grow by e^877 within T_s = 3600 s"
 
 
 def test_another_objective_is_refused():
