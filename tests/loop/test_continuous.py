@@ -35,6 +35,8 @@ def test_a_drift_of_the_pressure_at_rest_enters_where_the_integrals_carry_it():
     loop = continuous_loop(exact_integrals(GAINS), MODEL, AUTHORITY)
     assert loop.inputs["drift"] == (0, 0, 0, 1 / (AUTHORITY * GAINS[3]))
     assert loop.inputs["acceleration"] == (0, 1, 0, 0)
+    assert loop.inputs.keys() == {"acceleration", "drift"}
+    assert (loop.outputs["slip_error"], loop.outputs["slip_rate_error"]) == ((1, 0, 0, 0), (0, 1, 0, 0))
     assert loop.segments == ()
 
 

@@ -128,6 +128,11 @@ def test_it_has_no_loop_in_continuous_time():
         SampledController.loop_field()
 
 
+def test_its_gains_are_not_told():
+    with pytest.raises(TypeError, match="gains"):
+        SampledController(law=LAW, step=STEP, gains={})
+
+
 def test_it_is_not_made_from_gains_in_order():
     with pytest.raises(UnsupportedError, match="made from its matrices"):
         SampledController.from_values(())
