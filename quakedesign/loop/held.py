@@ -135,14 +135,14 @@ def _events(
     own, first, zero = range(2, 2 + len(law.states)), 2 + len(law.states), Fraction(0)
     jump = [[Fraction(i == j) for j in range(n + 1)] for i in range(n)]
     asked = [zero] * (n + 1)
-    asked[:2] = [authority * v for v in law.feedback[:2]]
+    asked[0], asked[1] = (authority * v for v in law.feedback[:2])
     asked[n] = authority * sum(law.feedback[2:], zero)
     for i, fed, kept in zip(own, law.measured, law.update, strict=True):
         jump[i] = [*fed[:2], *kept, *[zero] * (n - first), sum(fed[2:], zero)]
         asked[i] = authority * law.output[i - 2]
     line = [*range(first, first + waiting), *([] if between else [valve])]
     for place, before in zip(reversed(line), [*reversed(line[:-1]), None], strict=True):
-        jump[place] = asked if before is None else [Fraction(j == before) for j in range(n + 1)]
+        jump[place] = asked if before is None else [Fraction(j == before) for j in range(len(asked))]
     arrival = [[Fraction(j == (first + waiting - 1 if i == valve else i)) for j in range(n)] for i in range(n)]
     if between:
         return tuple(map(tuple, jump)), _with_lag(arrival, valve)

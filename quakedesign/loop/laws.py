@@ -245,4 +245,5 @@ def unit_row(size: int, entries: dict[int, Fraction]) -> Row:
 
 def combined(*parts: tuple[Fraction, Row]) -> Row:
     """Combination of rows."""
-    return tuple(sum((factor * row[i] for factor, row in parts), Fraction(0)) for i in range(len(parts[0][1])))
+    scaled = ([factor * v for v in row] for factor, row in parts)
+    return tuple(sum(column, Fraction(0)) for column in zip(*scaled, strict=True))

@@ -129,7 +129,7 @@ def test_it_has_no_loop_in_continuous_time():
 
 
 def test_its_gains_are_not_told():
-    with pytest.raises(TypeError, match="gains"):
+    with pytest.raises(ParameterError, match="unexpected keyword argument 'gains'"):
         SampledController(law=LAW, step=STEP, gains={})
 
 
