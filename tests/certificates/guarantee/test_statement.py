@@ -165,6 +165,16 @@ def test_a_root_beyond_its_lines_at_the_claims_is_undecided(monkeypatch):
     assert "leaves its range at errors up to 0 m and 0.501 m/s" in none.reason
 
 
+def test_a_root_that_is_told_another_slip_may_leave_its_line(monkeypatch):
+    """w = e2 − sign(e1 + w) is −e1 where |e1| + |e2| ≤ 1; with E = 1/2 and R = 1/7 noise of 1/3 is not too much."""
+    sign = replace(SIGN, pull=(replace(SIGN.pull[0], factor=(F(1), F(1))),), slopes=(F(1), F(1)))
+    bounds = replace(BOUNDS, slip_error=F(1, 2))
+    monkeypatch.setattr(statement, "certified_bounds", lambda *_: bounds)
+    for noise, verdict in ((F(0), Verdict.PROVED), (F(1, 3), Verdict.PROVED), (F(1, 2), Verdict.UNDECIDED)):
+        held = Held(law=compensated(sign, F(1, 2), F(1)), step=F(1), slip_noise=noise)
+        assert Guarantee(task=TASK, held=held, claims=Claims.of(TASK, bounds)).check() is verdict
+
+
 def test_a_guarantee_claims_the_bounds_a_little_wider_or_has_none(monkeypatch):
     for held in (HELD, ROOTED):
         monkeypatch.setattr(statement, "certified_bounds", lambda *_: BOUNDS)
