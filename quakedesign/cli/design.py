@@ -6,7 +6,17 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Json, app, console, print_json, print_lines, progress
+from quakedesign.cli.shared import (
+    ExactMetres,
+    ExactMetresPerSecond,
+    Force,
+    Json,
+    app,
+    console,
+    print_json,
+    print_lines,
+    progress,
+)
 from quakedesign.errors import ParameterError, UnknownNameError
 
 
@@ -21,10 +31,19 @@ class LinearOptions:
         Of the e-LQR: tracking, or peak for the smallest guaranteed slip-rate error.
     continuous
         Design the e-LQR in continuous time, as in the paper, in place of the loop that samples and holds.
+    measured
+        What the e-LQR that samples is told: slip-and-rate, or slip, from which it estimates the slip rate.
+    slip_noise
+        Bound of the error of the slip that it is told, such as '1 um', in its guarantee and in its run.
+    rate_noise
+        The same of the slip rate.
     """
 
     objective: Literal["tracking", "peak"] = "tracking"
     continuous: Annotated[bool, Parameter(negative="")] = False
+    measured: Literal["slip-and-rate", "slip"] = "slip-and-rate"
+    slip_noise: ExactMetres = "0"
+    rate_noise: ExactMetresPerSecond = "0"
 
     def told(self, names: list[str]) -> dict[str, Any]:
         """Options of `quakedesign.design`, for laws that have them.
@@ -36,8 +55,8 @@ class LinearOptions:
         """
         if self != LinearOptions() and "elqr" not in names:
             raise ParameterError(
-                f"--continuous and --objective are for the e-LQR. Received --controller {', '.join(names)}. "
-                "Leave them out."
+                "--continuous, --objective, --measured and noise are for the e-LQR. "
+                f"Received --controller {', '.join(names)}. Leave them out."
             )
         return asdict(self)
 

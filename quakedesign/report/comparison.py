@@ -94,7 +94,7 @@ def designed_comparison(
     tell : callable
         Progress.
     linear : mapping, optional
-        ``objective`` and ``continuous`` of an e-LQR.
+        Options of `quakedesign.design` for an e-LQR.
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """

@@ -36,7 +36,7 @@ def controller_step(
         T_s [s]; that of a law of samples, or the fault's sampling time, unless given.
     scheme : str or Scheme, optional
         One that samples; ``explicit`` unless given. Of its measurement the part that runs on the controller is kept:
-        with a `Sensor` the slip is measured alone, else slip and slip rate.
+        with a `Sensor` the slip is measured alone, else slip and slip rate, if the step uses it.
 
     Returns
     -------
@@ -52,9 +52,10 @@ def controller_step(
     period = fault.sampling_time if step is None else step
     require_positive(step=period)
     chosen = _software(simulation_scheme(scheme) if isinstance(scheme, str) else scheme)
-    sensed = isinstance(chosen.measurement, Sensor)
-    measurement = {"slip": "m"} if sensed else {"slip": "m", "slip_rate": "m/s"}
-    function, start = _function(ClosedLoop(fault, controller), chosen, float(period), len(measurement))
+    loop, measurement = ClosedLoop(fault, controller), {"slip": "m", "slip_rate": "m/s"}
+    if isinstance(chosen.measurement, Sensor) or not _uses_rate(_function(loop, chosen, float(period), 2)[0]):
+        measurement.pop("slip_rate")
+    function, start = _function(loop, chosen, float(period), len(measurement))
     facts = _facts(fault, controller, chosen)
     return ControllerStep(function=function, measurement=measurement, start=start, step=float(period), facts=facts)
 
@@ -146,6 +147,11 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     later = [counter + 1, *(moved[i] for i, c in enumerate(changing) if c)]
     outputs = ca.cse([ca.vertcat(*later), scheme.pressure(loop, counter, state, step)])
     return ca.Function("sampled_step", [measurement, memory], outputs), start
+
+
+def _uses_rate(function: Any) -> bool:
+    """Whether any output depends on the second measurement."""
+    return any(1 in function.jac_sparsity(output, 0).get_col() for output in range(function.n_out()))
 
 
 def _after(loop: ClosedLoop, scheme: Sampled, counter: Any, state: Any, step: float) -> Any:

@@ -143,7 +143,10 @@ def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell) 
     label = f"{design.title} ({origin}, {scheme})" if differ else f"{design.title} ({origin})"
     if design.controller is None:
         return Entry(label=label, origin=origin, design=design, run=None)
-    run = simulate(design.fault, design.controller, scheme=scheme, progress=lambda done: tell(label, done))
+    told = design.measurement
+    run = simulate(
+        design.fault, design.controller, scheme=scheme, measurement=told, progress=lambda done: tell(label, done)
+    )
     continuous = scheme == AS_IN_THE_PAPER
     if sampled:
         return Entry(label=label, origin=origin, design=design, run=run)

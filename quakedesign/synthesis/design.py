@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
-from quakedesign.certificates.guarantee import task_of
+from quakedesign.certificates.guarantee import Around, task_of
 from quakedesign.certificates.linear_premises import linear_premises, sectors
 from quakedesign.certificates.premises import (
     Errors,
@@ -21,7 +21,7 @@ from quakedesign.errors import CertificateError, KinkError, ParameterError, Unkn
 from quakedesign.fault import Fault, require_fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.designed import Design
-from quakedesign.synthesis.guaranteed import OBJECTIVES, sampled_design
+from quakedesign.synthesis.guaranteed import MEASURED, OBJECTIVES, sampled_design
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability
 from quakedesign.synthesis.linear.analysis.robust_stability import unstable_vertex, why_undecided
 from quakedesign.synthesis.linear.design.riccati import RiccatiDesign, riccati_design
@@ -43,6 +43,9 @@ def design(
     feedforward: str = "none",
     objective: str = "tracking",
     continuous: bool = False,
+    measured: str = MEASURED[0],
+    slip_noise: str | float | Fraction = 0,
+    rate_noise: str | float | Fraction = 0,
 ) -> Design:
     """Find gains with a proof for a fault.
 
@@ -66,6 +69,10 @@ def design(
         slip-rate error.
     continuous : bool
         For the e-LQR: the paper's design in continuous time.
+    measured : str
+        What the e-LQR of samples is told: ``"slip-and-rate"``, or ``"slip"``, from which it estimates the slip rate.
+    slip_noise, rate_noise : str, float or Fraction
+        Bounds of what it is told wrongly of slip [m] and slip rate [m/s], for its guarantee.
 
     Returns
     -------
@@ -84,17 +91,25 @@ def design(
         raise UnknownNameError(f"controller to design must be one of {', '.join(DESIGNABLE)}. Received {controller!r}.")
     fault.require_memoryless("design")
     added = feed_forward(feedforward, fault, least_authority(fault))
+    noise = Around(slip_noise=rational(slip_noise, "slip_noise"), rate_noise=rational(rate_noise, "rate_noise"))
+    told = measured != MEASURED[0] or any(noise.values())
     if issubclass(control_law(controller), SlidingMode):
-        if continuous or objective != OBJECTIVES[0]:
+        if continuous or told or objective != OBJECTIVES[0]:
             raise ParameterError(
-                f"continuous and objective are for the e-LQR. Received them with {controller}. Leave them out."
+                "continuous, objective, measured and noise are for the e-LQR. Received some of them with "
+                f"{controller}. Leave them out."
             )
         return _design_sliding_mode(fault, controller, added)
     if added != NONE:
         raise ParameterError(
             f"a feed-forward is part of sliding-mode laws. Received {feedforward!r} with {controller}. Leave it out."
         )
-    return _design_linear(fault) if continuous else _design_sampled(fault, objective)
+    if continuous and told:
+        raise ParameterError(
+            "a design in continuous time knows slip and slip rate exactly. Received noise, or the slip alone. "
+            "Leave continuous out."
+        )
+    return _design_linear(fault) if continuous else _design_sampled(fault, objective, measured, noise)
 
 
 def _design_sliding_mode(fault: Fault, name: str, added: FeedForward) -> Design:
@@ -198,8 +213,8 @@ def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certifi
     return found or (finished_exactly(loop, theta) if theta is not None else None)
 
 
-def _design_sampled(fault: Fault, objective: str) -> Design:
-    found = sampled_design(task_of(fault), rational(fault.sampling_time), objective)
+def _design_sampled(fault: Fault, objective: str, measured: str, noise: Around) -> Design:
+    found = sampled_design(task_of(fault), rational(fault.sampling_time), objective, measured=measured, **noise)
     if found.runs is None:
         return _without_gains(fault, found.reason)
     held = found.runs.held
@@ -210,7 +225,15 @@ def _design_sampled(fault: Fault, objective: str) -> Design:
         controller=held.controller,
         certificate=None,
         premises=found.premises(),
-        details={"objective": objective, "step": str(held.step), "reason": found.reason or None},
+        details={
+            "objective": objective,
+            "step": str(held.step),
+            "reason": found.reason or None,
+            "measured": measured,
+            **{name: str(value) for name, value in held.noise.items()},
+        },
+        slip_noise=held.slip_noise,
+        rate_noise=held.rate_noise,
     )
 
 

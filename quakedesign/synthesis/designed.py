@@ -6,13 +6,14 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Verdict
-from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee import Around, ContinuousPeaks, Guarantee, Held, NoGuarantee, guarantee, task_of
 from quakedesign.certificates.premises import Domain, Premise, Variant, feedforward_variants
 from quakedesign.controllers import Controller, SlidingMode, control_law
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.controllers.feed_forward import NONE
 from quakedesign.fault import Fault
 from quakedesign.loop import SampledController, summed_integrals
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import Compensation, compensated, design_compensated
 from quakedesign.synthesis.guaranteed.continuous import certified_peaks
@@ -40,6 +41,8 @@ class Design:
         Certified domain of the self-consistent premise on |h'|.
     details : mapping
         What synthesis decided: exact numbers as texts.
+    slip_noise, rate_noise : Fraction
+        Bounds of what a law of samples is told wrongly of slip [m] and slip rate [m/s].
     """
 
     fault: Fault
@@ -50,6 +53,8 @@ class Design:
     premises: tuple[Premise, ...]
     domain: Domain | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
+    slip_noise: Fraction = Fraction(0)
+    rate_noise: Fraction = Fraction(0)
 
     @property
     def gains(self) -> dict[str, Fraction]:
@@ -65,6 +70,12 @@ class Design:
     def title(self) -> str:
         """Name for people."""
         return control_law(self.name).title
+
+    @property
+    def measurement(self) -> Measurement | None:
+        """What the controller is told in a run, with the noise that it is designed for; None without."""
+        slip, rate = float(self.slip_noise), float(self.rate_noise)
+        return Measurement(slip_noise=slip, rate_noise=rate, bounded=True) if slip or rate else None
 
     def with_premise(self, premise: Premise) -> "Design":
         """Return the design with one more premise, such as one read off a run."""
@@ -108,7 +119,8 @@ class Design:
         """
         law = self.controller
         if isinstance(law, SampledController):
-            return guarantee(task_of(self.fault), Held(law=law.law, step=law.step))
+            noise = Around(slip_noise=self.slip_noise, rate_noise=self.rate_noise)
+            return guarantee(task_of(self.fault), Held(law=law.law, step=law.step, **noise))
         if isinstance(law, SlidingMode):
             return self._guarantee_of_sliding_mode(law)
         summed = isinstance(law, ExtendedLQR) and law.feedback == "error" and law.limits is None and not law.offset

@@ -71,11 +71,11 @@ def test_wrong_combinations_are_one_line(case, capsys):
     assert reason in err
 
 
-@pytest.mark.parametrize("option", [("--continuous",), ("--objective", "peak")])
+@pytest.mark.parametrize("option", [("--continuous",), ("--objective", "peak"), ("--slip-noise", "1 um")])
 def test_options_of_the_elqr_are_refused_without_it(capsys, tmp_path, option):
     code, _, err = run(capsys, "design", "lab-fault", "--controller", "cta", *option, "--out", str(tmp_path / "o"))
     assert code == 2
-    assert "--continuous and --objective are for the e-LQR" in err
+    assert "--continuous, --objective, --measured and noise are for the e-LQR" in err
 
 
 def short(folder):

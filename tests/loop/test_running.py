@@ -15,7 +15,8 @@ from quakedesign.certificates.guarantee import Guarantee, Held, guarantee, task_
 from quakedesign.controllers import Signals
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.loop import Prediction, SampledController, disturbance_estimate
+from quakedesign.loop import ErrorPrediction, Prediction, SampledController, disturbance_estimate, slip_observer
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Variation, export_controller, to_casadi, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
@@ -68,6 +69,31 @@ def recursion(run, law):
         asked.append(c @ z + d @ y)
         z = f @ z + g @ y
     return np.array(asked)
+
+
+OBSERVER = slip_observer(
+    (F(1250000000), F(306200000)),
+    (F("0.942"), F("6.12"), F("9.85")),
+    ErrorPrediction(
+        of_errors=((F("1.007"), F("0.1598")), (F("0.0718"), F("0.7513"))), of_pushes=((F("0.0154"), F("0.1598")),)
+    ),
+    F("2.282e-8"),
+)
+
+
+def test_a_run_of_the_slip_alone_asks_for_the_pressure_of_the_matrices_and_for_that_of_the_noisy_slip():
+    """Without noise, and within what noise of a bound makes of it by the law's own gains."""
+    controller = Held(law=OBSERVER, step=STEP).controller
+    run = simulate(REAL, controller, duration=18.4, samples=101)
+    assert np.allclose(run.pressure, recursion(run, OBSERVER), rtol=1e-9, atol=1e-6)
+    noise = Measurement(slip_noise=1e-6, rate_noise=1.0, bounded=True)
+    loud = simulate(REAL, controller, duration=18.4, samples=101, measurement=noise)
+    f, g, c, d = (
+        np.array(m, dtype=float) for m in (OBSERVER.update, OBSERVER.measured, OBSERVER.output, OBSERVER.feedback)
+    )
+    heard = [abs(d[0]), *(abs(c @ np.linalg.matrix_power(f, k) @ g[:, 0]) for k in range(101))]
+    off = np.abs(loud.pressure - recursion(loud, OBSERVER))
+    assert 1e3 < off.max() <= 1e-6 * sum(heard)
 
 
 def test_it_runs_by_its_own_scheme_and_step_on_a_fault_of_another():

@@ -13,7 +13,7 @@ from quakedesign.controllers import published
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.loop import Prediction, SampledController, disturbance_estimate
+from quakedesign.loop import ErrorPrediction, Prediction, SampledController, disturbance_estimate, slip_observer
 from quakedesign.loop.actuators.chain import Actuator
 from quakedesign.loop.actuators.delay import Delay
 from quakedesign.loop.actuators.lag import Lag
@@ -42,7 +42,17 @@ SAMPLED = SampledController(
     ),
     step=F(1, 1000),
 )
+OBSERVER = SampledController(
+    law=slip_observer(
+        (F(149400000), F(460800)),
+        (F("0.9"), F(700), F(80000)),
+        ErrorPrediction(of_errors=((F(1), F("0.001")), (F("0.6"), F("0.99"))), of_pushes=((F("5e-7"), F("0.000995")),)),
+        F("0.002"),
+    ),
+    step=F(1, 1000),
+)
 CASES = {
+    "observer": (OBSERVER, "explicit", {}),
     "sampled": (SAMPLED, "explicit", {}),
     "cta": (PUBLISHED["cta"], "explicit", {}),
     "dia": (PUBLISHED["dia"], "explicit", {}),
@@ -85,6 +95,11 @@ def python_step(found):
     return measurement, memory, after, pressure, evaluate, buffer
 
 
+def test_a_law_of_the_slip_alone_is_told_the_slip_alone():
+    assert controller_step(LAB, OBSERVER).measurement == {"slip": "m"}
+    assert controller_step(LAB, SAMPLED).measurement == {"slip": "m", "slip_rate": "m/s"}
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_c_and_python_agree_bit_for_bit_over_random_steps(case, tmp_path):
     controller, scheme, settings = CASES[case]
@@ -115,7 +130,7 @@ def test_c_and_python_agree_bit_for_bit_over_random_steps(case, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "case", ["sampled", "elqr", "cta", "cta implicit", "dia compensated", "cta sensed", "cta limited"]
+    "case", ["observer", "sampled", "elqr", "cta", "cta implicit", "dia compensated", "cta sensed", "cta limited"]
 )
 def test_the_exported_step_decides_as_the_controller_of_the_simulated_loop(case):
     """Told the slips and slip rates of a run, it asks for the pressures of that run."""

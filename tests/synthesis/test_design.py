@@ -129,9 +129,13 @@ def test_an_unknown_controller_is_one_clear_message(real):
 
 
 def test_options_of_the_elqr_are_refused_elsewhere(real):
-    for options in ({"continuous": True}, {"objective": "peak"}):
+    more = ({"measured": "slip"}, {"slip_noise": "1e-6"}, {"rate_noise": 1e-6})
+    for options in ({"continuous": True}, {"objective": "peak"}, *more):
         with pytest.raises(ParameterError, match="are for the e-LQR"):
             qd.design(real, "cta", **options)
+    for options in more:
+        with pytest.raises(ParameterError, match="knows slip and slip rate exactly"):
+            qd.design(real, "elqr", continuous=True, **options)
     assert "no bound of peaks of 2-CTA" in assess(real, published("real-fault")["cta"]).certified_peaks().reason
 
 

@@ -14,14 +14,16 @@ _MODULI = (2147483563, 2147483399)
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """Slip and slip rate with independent normal noise, once per sample.
+    """Slip and slip rate with independent noise, once per sample.
 
     Attributes
     ----------
     slip_noise, rate_noise : float
-        Standard deviations [m], [m/s], not negative.
+        Standard deviations of normal noise, or bounds of noise that is anything within them [m], [m/s], not negative.
     seed : int
         Of the noise, not negative.
+    bounded : bool
+        Whether the noise is uniform within bounds, as a guarantee has them, instead of normal.
 
     Raises
     ------
@@ -31,6 +33,7 @@ class Measurement:
     slip_noise: float = 0.0
     rate_noise: float = 0.0
     seed: int = 0
+    bounded: bool = False
 
     def __post_init__(self) -> None:
         require_nonnegative(slip_noise=self.slip_noise, rate_noise=self.rate_noise)
@@ -44,7 +47,7 @@ class Measurement:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Standard deviations [m], [m/s]; none without noise."""
+        """Standard deviations or bounds [m], [m/s]; none without noise."""
         return (float(self.slip_noise), float(self.rate_noise)) if self.noisy else ()
 
     @property
@@ -63,15 +66,23 @@ class Measurement:
 
         if not self.noisy:
             return x, memory
-        normals = []
+        drawn = []
         for _ in numbers:
-            memory, radius = _uniform(memory)
-            memory, angle = _uniform(memory)
-            normals.append(ca.sqrt(-2 * ca.log(radius)) * ca.cos(2 * ca.pi * angle))
-        return x + ca.vertcat(*(size * normal for size, normal in zip(numbers, normals, strict=True))), memory
+            memory, number = _uniform(memory) if self.bounded else _normal(memory)
+            drawn.append(2 * number - 1 if self.bounded else number)
+        return x + ca.vertcat(*(size * each for size, each in zip(numbers, drawn, strict=True))), memory
 
 
 EXACT = Measurement()
+
+
+def _normal(memory: list[Any]) -> tuple[list[Any], Any]:
+    """State of the generator after two steps, and a number of the standard normal distribution."""
+    import casadi as ca
+
+    memory, radius = _uniform(memory)
+    memory, angle = _uniform(memory)
+    return memory, ca.sqrt(-2 * ca.log(radius)) * ca.cos(2 * ca.pi * angle)
 
 
 def _uniform(memory: list[Any]) -> tuple[list[Any], Any]:

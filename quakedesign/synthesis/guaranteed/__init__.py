@@ -7,10 +7,12 @@ from quakedesign.synthesis.guaranteed.compensated import Compensation, compensat
 from quakedesign.synthesis.guaranteed.continuous import CLASSES, certified_peaks
 from quakedesign.synthesis.guaranteed.default_design import SampledDesign, sampled_design
 from quakedesign.synthesis.guaranteed.design import OBJECTIVES, design_held
+from quakedesign.synthesis.guaranteed.families import MEASURED
 from quakedesign.synthesis.guaranteed.reach import longest_delay, reached
 
 __all__ = [
     "CLASSES",
+    "MEASURED",
     "OBJECTIVES",
     "Answer",
     "Compensation",

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Unpack
 
-from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
+from quakedesign.certificates.guarantee import Around, Guarantee, NoGuarantee, Task
 from quakedesign.certificates.premise import Premise
 from quakedesign.synthesis.guaranteed.design import design_held
+from quakedesign.synthesis.guaranteed.families import MEASURED
 from quakedesign.synthesis.guaranteed.reach import design_at, longest_delay, longest_step
 
 
@@ -54,23 +56,25 @@ class SampledDesign:
         )
 
 
-def sampled_design(task: Task, step: Fraction, objective: str = "tracking") -> SampledDesign:
-    """Design for a T_s [s], or for the longest shorter one that has a guarantee.
+def sampled_design(
+    task: Task, step: Fraction, objective: str = "tracking", *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> SampledDesign:
+    """Design for a T_s [s], or for the longest shorter one that has a guarantee; the rest as in `design_held`.
 
     Raises
     ------
     ParameterError
         For an unknown objective.
     """
-    found = design_held(task, step, objective=objective)
+    found = design_held(task, step, objective=objective, measured=measured, **around)
     fails = isinstance(found, NoGuarantee)
-    longest = longest_step(task, step, most=step if fails else None)
+    longest = longest_step(task, step, most=step if fails else None, measured=measured, **around)
     reason = found.reason if isinstance(found, NoGuarantee) else ""
     if isinstance(found, NoGuarantee) and longest is not None:
         found = design_at(task, longest, objective)
     if isinstance(found, NoGuarantee):
         return SampledDesign(step=step, runs=None, reason=reason)
-    delayed = longest_delay(task, found.held.step)
+    delayed = longest_delay(task, found.held.step, measured=measured, **around)
     return SampledDesign(
         step=step,
         runs=found,

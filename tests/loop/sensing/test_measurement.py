@@ -41,6 +41,15 @@ def test_the_noise_is_normal_white_and_independent():
     assert abs(np.corrcoef(values.T)[0, 1]) < 0.06
 
 
+def test_bounded_noise_is_anything_within_its_bounds():
+    values, _ = stream(Measurement(slip_noise=2.0, rate_noise=0.5, seed=1, bounded=True), 4000)
+    for column, size in zip(values.T, (2.0, 0.5), strict=True):
+        assert 0.99 * size < np.abs(column).max() <= size
+        assert kstest(column / size, "uniform", (-1, 2)).pvalue > 1e-3
+        assert abs(np.corrcoef(column[1:], column[:-1])[0, 1]) < 0.06
+    assert abs(np.corrcoef(values.T)[0, 1]) < 0.06
+
+
 def test_a_seed_fixes_the_run_and_another_one_changes_it():
     fault = load_fault("lab-fault")
     runs = [

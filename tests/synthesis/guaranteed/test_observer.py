@@ -9,11 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import quakedesign as qd
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, guarantee, task_of
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.loop.sensing.measurement import Measurement
+from quakedesign.studies import comparison
 from quakedesign.synthesis.guaranteed import answer, design_held, worst_found
+from quakedesign.synthesis.guaranteed.design import first_held
+from quakedesign.synthesis.guaranteed.reach import design_at
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -143,3 +148,55 @@ def test_more_noise_is_guaranteed_less():
 def test_what_cannot_be_measured_so_is_refused(wrong, said):
     with pytest.raises(ParameterError, match=said):
         answer(REAL, **wrong)
+
+
+MODULE = "quakedesign.synthesis.guaranteed.default_design"
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """What is asked of the searches of a design, which answer with one that is known."""
+    found = {}
+    answers = {"design_held": designed("slip alone"), "longest_step": None, "longest_delay": None}
+    for name, known in answers.items():
+        monkeypatch.setattr(f"{MODULE}.{name}", lambda *_, n=name, a=known, **told: found.__setitem__(n, told) or a)
+    return found
+
+
+def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for(asked, monkeypatch):
+    design = qd.design(REAL, "elqr", measured="slip", slip_noise="1e-6")
+    claim, told = design.guarantee, {"measured": "slip", "slip_noise": NOISE, "rate_noise": 0}
+    assert asked["design_held"] == told | {"objective": "tracking"}
+    assert (asked["longest_step"], asked["longest_delay"]) == (told | {"most": None}, told)
+    assert (design.verdict, claim) == (Verdict.PROVED, designed("slip alone"))
+    assert (design.details["measured"], design.details["slip_noise"]) == ("slip", "1/1000000")
+    ran = []
+    monkeypatch.setattr(comparison, "simulate", lambda *_, measurement, **__: ran.append(measurement))
+    comparison._entry("designed", design, {"designed": "explicit"}, lambda *_: None)
+    comparison._entry("designed", replace(design, slip_noise=F(0)), {"designed": "explicit"}, lambda *_: None)
+    assert ran == [Measurement(slip_noise=1e-6, bounded=True), None]
+
+
+def test_the_noisy_run_of_a_design_stays_within_its_guarantee():
+    claim = designed("slip alone")
+    noise = Measurement(slip_noise=1e-6, bounded=True)
+    for measurement in (None, noise):
+        seen = qd.simulate(REAL, claim.held.controller, duration=18400.0, measurement=measurement).metrics
+        assert 0 < seen.max_slip_error <= claim.claims.slip_error
+        assert 0 < seen.max_slip_rate_error <= claim.claims.slip_rate_error
+
+
+def test_a_delay_is_designed_for_with_the_slip_alone():
+    found, _ = first_held(task_of(REAL), STEP, measured="slip", slip_noise=NOISE, delay=F("0.1"))
+    assert found.held.law.of_slip_alone
+    assert (found.held.slip_noise, found.held.delay) == (NOISE, F("0.1"))
+    assert found.held.law.states[-1] == "asked_1_ago"
+    assert found.check() is Verdict.PROVED
+
+
+def test_another_objective_is_designed_for_what_a_guarantee_measures(monkeypatch):
+    claim, told = designed("slip alone"), []
+    monkeypatch.setattr("quakedesign.synthesis.guaranteed.reach.design_held", lambda *a, **k: told.append((a, k)))
+    assert design_at(claim.task, claim, "tracking") is claim
+    around = {"delay": 0, "lag": 0, "slip_noise": NOISE, "rate_noise": 0}
+    assert told == [((claim.task, STEP), {"objective": "tracking", "measured": "slip", **around})]
