@@ -310,12 +310,18 @@ def test_the_end_of_an_implicit_step_is_its_line_and_what_is_beside_it():
         feedback=(F(-2), F(-5), F(7)),
         root=ROOT,
     )
-    loop = held_loop(law, MODEL, AUTHORITY, STEP)
+    loop = held_loop(law, MODEL, AUTHORITY, STEP, noisy=("rate_noise", "slip_noise"))
     (segment,) = loop.segments
     moved = {name: named(loop, row) for name, row in zip(loop.states, segment.jump, strict=True)}
     assert moved["z"] == {"z": 1, "e1": F(-27, 2)}
     assert moved["valve"] == {"e1": -4 - 63, "e2": -10, "z": -2}
-    assert named(loop, loop.sampled["root"]) == {"z": 3, "valve": 14}
+    assert {name: named(loop, row) for name, row in loop.sampled.items()} == {
+        "root": {"z": 3, "valve": 14},
+        "slip_noise": {"z": F(-27, 2), "valve": -67},
+        "rate_noise": {"valve": -10},
+    }
+    assert held_loop(law, MODEL, AUTHORITY, STEP).sampled.keys() == {"root"}
+    assert held_loop(INTEGRALS, MODEL, AUTHORITY, STEP, noisy=["slip_noise"]).sampled.keys() == {"slip_noise"}
 
 
 def images(rows, vector):

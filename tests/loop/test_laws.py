@@ -144,6 +144,14 @@ def test_sizes_that_do_not_fit_are_refused(wrong):
         LinearLaw(**wrong)
 
 
+def test_a_law_of_the_slip_alone_reads_no_slip_rate():
+    blind = sizes(1) | {"feedback": (F(1), F(0))}
+    assert LinearLaw(**blind).of_slip_alone is True
+    assert LinearLaw(**sizes(1)).of_slip_alone is False
+    assert LinearLaw(**blind | {"measured": ((F(0), F(2)),)}).of_slip_alone is False
+    assert LinearLaw(**sizes(1, 3) | {"feedback": (F(1), F(0), F(1))}, root=ROOT).of_slip_alone is False
+
+
 def test_a_period_is_the_sum_of_its_parts():
     parts = tuple(Segment(jump=((F(1),),), duration=F(1, n)) for n in (2, 3, 6))
     loop = PeriodicLoop(states=("x",), flow=((F(0),),), segments=parts, inputs={}, outputs={})

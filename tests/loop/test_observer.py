@@ -1,6 +1,7 @@
 """An observer of slip, slip rate and disturbance: what it expects is what its own plant does."""
 
 from fractions import Fraction as F
+from random import Random
 
 import numpy as np
 import pytest
@@ -84,3 +85,54 @@ def test_a_model_that_the_pressure_does_not_move_is_refused():
     prediction = ErrorPrediction(of_errors=((F(1), F(0)), (F(0), F(1))), of_pushes=((F(1), F(1)),))
     with pytest.raises(ParameterError, match="gain of a model must be positive"):
         slip_observer((F(1), F(1)), (F(1), F(1), F(1)), prediction, F(0))
+
+
+def some(random, *size):
+    """Fractions, in rows of rows."""
+    return tuple(some(random, *size[1:]) for _ in range(size[0])) if size else F(random.randint(1, 19), 7) - 1
+
+
+def product(row, column):
+    return sum((a * b for a, b in zip(row, column, strict=True)), F(0))
+
+
+@pytest.mark.parametrize("late", [0, 1, 3])
+def test_the_matrices_are_the_recursion(late):
+    """ê ← π + l(e1 − π1), d ← d + l3(e1 − π1), p by ê at its arrival, π ← Φê + Σγ_j(gain·p_j + d), exactly."""
+    random = Random(late)
+    gains, corrections, gain = some(random, 2), some(random, 3), F(3, 7)
+    given = ErrorPrediction(
+        of_errors=some(random, 2, 2),
+        of_pushes=some(random, late + 1, 2),
+        ahead=some(random, 2, 2),
+        ahead_of_pushes=some(random, late, 2),
+    )
+    law = slip_observer(gains, corrections, given, gain)
+    state, expected, level, before = [F(0)] * len(law.states), [F(0), F(0)], F(0), [F(0)] * late
+    for e in some(random, 6, 2):
+        new = e[0] - expected[0]
+        seen = [v + c * new for v, c in zip(expected, corrections[:2], strict=True)]
+        level += corrections[2] * new
+        pushes = [gain * p + level for p in before]
+        then = [
+            product(row, seen) + product([v[i] for v in given.ahead_of_pushes], pushes)
+            for i, row in enumerate(given.ahead)
+        ]
+        asked = -gains[0] * then[0] - gains[1] * then[1] - level / gain
+        assert product(law.output, state) + product(law.feedback, e) == asked
+        pushes = [gain * asked + level, *pushes]
+        expected = [
+            product(row, seen) + product([v[i] for v in given.of_pushes], pushes)
+            for i, row in enumerate(given.of_errors)
+        ]
+        before = [asked, *before][:late]
+        state = [product(own, state) + product(fed, e) for own, fed in zip(law.update, law.measured, strict=True)]
+        assert state == [*expected, level, *before]
+
+
+def test_without_a_delay_the_errors_of_now_are_those_that_are_met():
+    given = ErrorPrediction(of_errors=((F(1), F(1)), (F(0), F(1))), of_pushes=((F(0), F(1)),))
+    law = slip_observer((F(2), F(3)), (F(1, 2), F(1, 3), F(1, 5)), given, F(4))
+    assert law.feedback == (-1 - 1 - F(1, 20), 0)
+    with pytest.raises(ParameterError, match="must be positive"):
+        slip_observer((F(2), F(3)), (F(1), F(1), F(1)), given, F(0))
