@@ -6,6 +6,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -176,9 +177,13 @@ def test_proofs_never_import_a_solver(path):
     assert not third_party(path) & SOLVERS
 
 
-def test_the_independent_checker_needs_the_standard_library_only():
-    for name in ("check.py", "guarantee.py"):
-        assert {found.split(".")[0] for found in imports(ROOT / "proofs" / name)} <= sys.stdlib_module_names
+def test_the_independent_checker_needs_the_standard_library_and_what_stands_above_in_its_table():
+    table = runpy.run_path(str(ROOT / "proofs" / "check.py"))["IMPORTS"]
+    above = set()
+    for name, own in {**table, "check": ()}.items():
+        found = {found.split(".")[0] for found in imports(ROOT / "proofs" / f"{name}.py")}
+        assert found - sys.stdlib_module_names == set(own) <= above, name
+        above.add(name)
 
 
 def loaded_by(*arguments):

@@ -117,10 +117,10 @@ def test_a_rule_explains_what_tests_hold_and_leaves_no_check_out():
 
 def test_single_mutants_and_kinds_are_explained():
     explanations = tool.Explanations()
-    limit = ("proofs/check.py", "MAX_ROOTS, MAX_LIFTS = 4, 4", "4 → 5")
+    limit = ("proofs/loop.py", "MAX_ROOTS, MAX_LIFTS = 4, 4", "4 → 5")
     assert explanations.of(limit) == "by rule"
     assert explanations.of(("quakedesign/certificates/claim.py", *limit[1:])) == ""
     assert (
-        explanations.of(("proofs/check.py", "need(x <= MAX_ROOTS, where)", "need(x <= MAX_ROOTS, where) → pass")) == ""
+        explanations.of(("proofs/loop.py", "need(x <= MAX_ROOTS, where)", "need(x <= MAX_ROOTS, where) → pass")) == ""
     )
     assert {explanations.of(key) for key in explanations.single} == {"equivalent"}

@@ -23,6 +23,7 @@ ROOT = Path(__file__).parents[2]
 SPECIFICATION = importlib.util.spec_from_file_location("polynomial_check", ROOT / "proofs" / "check.py")
 checker = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(checker)
+exact_numbers, squares, *_, polynomials, functionals, _ = map(checker.beside, checker.IMPORTS)
 
 REMOVED = object()
 
@@ -183,6 +184,11 @@ PROOFS += [multiplier_of_squares, zero, multiple]
 FUNCTIONALS = [motzkin, circle, evaluation, disc_point, orthant_without_product, multiplied_functional]
 POINTS = [below, below_on_set]
 ALL = PROOFS + FUNCTIONALS + POINTS
+
+
+@pytest.fixture(autouse=True)
+def all_steps_left():
+    exact_numbers.budget.renew()
 
 
 def verify(document):
@@ -379,11 +385,8 @@ def test_semidefiniteness_agrees_with_all_principal_minors(rank):
         matrix[i][i] += generator.choice((-1, 0, 0, 1))
         expected = all(minor >= 0 for minor in principal_minors(matrix))
         found = {
-            checker.is_positive_definite(copy.deepcopy(matrix), checker.Budget(), or_singular=True),
-            all(
-                checker.is_positive_definite(block, checker.Budget(), or_singular=True)
-                for block in checker.blocks(matrix)
-            ),
+            squares.is_positive_definite(copy.deepcopy(matrix), or_singular=True),
+            all(squares.is_positive_definite(block, or_singular=True) for block in functionals.blocks(matrix)),
         }
         assert found == {expected}
         verdicts.add(expected)
@@ -392,28 +395,28 @@ def test_semidefiniteness_agrees_with_all_principal_minors(rank):
 
 def test_blocks_are_the_connected_components():
     upper = [[1, 0, 2, 0], [0, 0, 0, 0], [0, 0, 3, 4], [0, 0, 0, 5]]
-    assert sorted(map(len, checker.blocks(upper))) == [1, 3]
-    assert list(checker.blocks([[7, 0], [0, 8]])) == [[[7]], [[8]]]
+    assert sorted(map(len, functionals.blocks(upper))) == [1, 3]
+    assert list(functionals.blocks([[7, 0], [0, 8]])) == [[[7]], [[8]]]
 
 
 # ---------------------------------------------------------------- the reduction
 
 
 def decoded(codes, size):
-    mask = (1 << checker.DIGIT) - 1
-    return {tuple(m >> checker.DIGIT * i & mask for i in range(size)) for m in codes}
+    mask = (1 << functionals.DIGIT) - 1
+    return {tuple(m >> functionals.DIGIT * i & mask for i in range(size)) for m in codes}
 
 
 def coded(monomials):
-    return {sum(a << checker.DIGIT * i for i, a in enumerate(m)) for m in monomials}
+    return {sum(a << functionals.DIGIT * i for i, a in enumerate(m)) for m in monomials}
 
 
 def survivors(size, degree, kept, inequalities=(), products=((),)):
     """Return the monomials that survive, by product, with the checker's reduction."""
     one = {(0,) * size: Fraction(1)}
     names = [f"x{i}" for i in range(size)]
-    statement = checker.Statement(names, one, one, list(inequalities), [], list(products), degree)
-    found = checker.survivors(statement, coded(kept), checker.Budget())
+    statement = polynomials.Statement(names, one, one, list(inequalities), [], list(products), degree)
+    found = functionals.survivors(statement, coded(kept))
     return {chosen: decoded(basis, size) for chosen, _, basis in found}
 
 
@@ -1127,7 +1130,7 @@ HOSTILE = {
     "case", ["large product", "repeated products", "high powers", "too many pairs", "many multiples"]
 )
 def test_work_is_bounded(case, monkeypatch):
-    monkeypatch.setattr(checker, "MAX_STEPS", 20_000)
+    monkeypatch.setattr(exact_numbers, "MAX_STEPS", 20_000)
     make, reason = HOSTILE[case]
     assert reason in refusal(make())
 
@@ -1137,7 +1140,7 @@ def test_work_is_bounded(case, monkeypatch):
 def test_the_worst_files_end_within_a_minute(case):
     make, reason = HOSTILE[case]
     text = json.dumps(make(), separators=(",", ":"))
-    assert len(text) <= checker.MAX_BYTES
+    assert len(text) <= exact_numbers.MAX_BYTES
     start = time.process_time()
     with pytest.raises(checker.Refused, match=reason):
         checker.check(text)

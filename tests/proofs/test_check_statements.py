@@ -20,12 +20,20 @@ def module(name, path):
 LOOPS = module("loops_by_hand", Path(__file__).with_name("test_check.py"))
 POLYNOMIALS = module("polynomials_by_hand", Path(__file__).with_name("test_check_polynomials.py"))
 checker = LOOPS.checker
-Term = checker.Term
+exact_numbers, squares, loops, cells, stability, equilibria, polynomials, functionals, _ = map(
+    checker.beside, checker.IMPORTS
+)
+Term = loops.Term
+
+
+@pytest.fixture(autouse=True)
+def all_steps_left():
+    exact_numbers.budget.renew()
 
 
 def loop(**parts):
     given = {"law": "own", "numbers": {}, "weights": {"x": 3, "y": 1}, "domain": "cells", "uncertain": {}}
-    return checker.Loop(**given | {"roots": {}, "lifts": {}, "field": {}} | parts)
+    return loops.Loop(**given | {"roots": {}, "lifts": {}, "field": {}} | parts)
 
 
 # ---------------------------------------------------------------- the statement
@@ -45,28 +53,28 @@ def loop(**parts):
     ],
 )
 def test_a_term_is_written_with_every_power(exponents, odd, text):
-    assert checker.term_text(Term(F(-2), (), exponents, odd), loop(lifts={"n": []})) == text
+    assert loops.term_text(Term(F(-2), (), exponents, odd), loop(lifts={"n": []})) == text
 
 
 def test_parameters_and_terms_without_effect_are_written():
     term = Term(F(3, 7), ("b", "d"), (0, 1), (False, True))
-    assert checker.term_text(term, loop()) == "3/7*b*d*y"
-    assert checker.term_text(Term(F(0), (), (0, 1), (False, True), '["1"]'), loop()) == '0 for ["1"]'
-    assert checker.sum_text([term, term], loop()) == "3/7*b*d*y + 3/7*b*d*y"
-    assert checker.sum_text([], loop()) == "0"
-    assert checker.named({"a": F(1, 2), "b": 3}) == "a = 1/2, b = 3"
-    assert checker.named({}) == "none"
+    assert loops.term_text(term, loop()) == "3/7*b*d*y"
+    assert loops.term_text(Term(F(0), (), (0, 1), (False, True), '["1"]'), loop()) == '0 for ["1"]'
+    assert loops.sum_text([term, term], loop()) == "3/7*b*d*y + 3/7*b*d*y"
+    assert loops.sum_text([], loop()) == "0"
+    assert exact_numbers.named({"a": F(1, 2), "b": 3}) == "a = 1/2, b = 3"
+    assert exact_numbers.named({}) == "none"
 
 
 def test_a_term_keeps_what_was_written_where_its_number_is_zero():
     known = loop(numbers={"k": F(2), "c": F(0)})
-    assert checker.read_term(["3", ["k"], []], "here", known).written == ""
-    assert checker.read_term(["3", ["c"], []], "here", known).written == '["3", ["c"], []]'
+    assert loops.read_term(["3", ["k"], []], "here", known).written == ""
+    assert loops.read_term(["3", ["c"], []], "here", known).written == '["3", ["c"], []]'
 
 
 def test_the_loop_is_described_line_by_line():
     document = LOOPS.nested_sign()
-    described = checker.describe(checker.read_loop(document))
+    described = loops.describe(loops.read_loop(document))
     assert described[1:] == [
         "gains and constants: c = 0, k = 2",
         "domain: cells; states with weights: x = 1, y = 1",
@@ -76,7 +84,7 @@ def test_the_loop_is_described_line_by_line():
         "dx/dt = -2*sign(x) + -1*sign(n)",
         "dy/dt = -2*sign(y) + -1*sign(n)",
     ]
-    ranged = checker.describe(checker.read_loop(LOOPS.disturbed_relay()))
+    ranged = loops.describe(loops.read_loop(LOOPS.disturbed_relay()))
     assert ranged[3:] == ["uncertain, measurable in time: d in [-1, 1]", "dx/dt = -2*sign(x) + 1*d"]
 
 
@@ -105,7 +113,7 @@ CLAIMS = {"positive": F(1, 2), "decrease": F(3)}
     ],
 )
 def test_claims_on_cells_in_words(more, m, n, lines):
-    first, *bounds, degrees, last = checker.describe_claims(loop(), CLAIMS | more, m, n)
+    first, *bounds, degrees, last = stability.describe_claims(loop(), CLAIMS | more, m, n)
     assert first == f"claims: V >= 1/2 * sum u_i^{m}; dV/dt <= -3 * sum u_i^{n}; u_i = |x_i|^(1/weight)"
     assert degrees == f"homogeneous degrees: V {m}, dV/dt {n}"
     assert [line.endswith(end) for line, end in zip([*bounds, last], lines, strict=True)] == [True] * len(lines)
@@ -113,7 +121,7 @@ def test_claims_on_cells_in_words(more, m, n, lines):
 
 @pytest.mark.parametrize(("m", "ending"), [(2, "exponentially with rate a"), (4, "with V(t) <= exp(-2*a*t)*V(0)")])
 def test_claims_on_reals_in_words(m, ending):
-    found = checker.describe_claims(loop(domain="reals"), {"positive": F(1, 2), "rate": F(3)}, m, 0)
+    found = stability.describe_claims(loop(domain="reals"), {"positive": F(1, 2), "rate": F(3)}, m, 0)
     assert found == [
         f"claims: V >= 1/2 * sum x_i^{m}; dV/dt <= -2*a*V with a = 3",
         f"homogeneous degrees: V {m}",
@@ -123,7 +131,7 @@ def test_claims_on_reals_in_words(m, ending):
 
 def equilibrium(*terms, **values):
     field = {"x": [Term(F(n), names, (a,), (True,)) for n, names, a in terms]}
-    return checker.describe_equilibrium(
+    return equilibria.describe_equilibrium(
         loop(weights={"x": 1}, field=field), {k: F(v) for k, v in values.items()}, {"x": F(1)}, {"+": F(1)}
     )
 
@@ -147,16 +155,16 @@ def test_a_refutation_in_words():
 
 
 def test_polynomials_in_words():
-    statement = checker.read_statement(POLYNOMIALS.quadratic())
-    assert checker.terms_text({}, statement) == "0"
-    assert checker.terms_text({(2, 1): F(1), (0, 0): F(-2, 3), (1, 0): F(1)}, statement) == "1*x^2*y + 1*x + -2/3"
+    statement = polynomials.read_statement(POLYNOMIALS.quadratic())
+    assert polynomials.terms_text({}, statement) == "0"
+    assert polynomials.terms_text({(2, 1): F(1), (0, 0): F(-2, 3), (1, 0): F(1)}, statement) == "1*x^2*y + 1*x + -2/3"
 
 
 # ---------------------------------------------------------------- cells
 
 
 def cell(equalities=(), inequalities=()):
-    return checker.Cell("", 2, (1, 1), {}, list(equalities), list(inequalities))
+    return cells.Cell("", 2, (1, 1), {}, list(equalities), list(inequalities))
 
 
 @pytest.mark.parametrize(
@@ -180,32 +188,31 @@ def test_signs_alone_tell_whether_a_cell_may_have_an_interior(equalities, inequa
 
 def test_powers_of_lifts_must_be_whole():
     """n of degree 3: n^(1/3) is w, n^(1/2) is none."""
-    one = checker.Cell("", 1, (1, 1), {0: 1, 1: 3}, [], [])
-    budget = checker.Budget()
-    assert checker.restrict({((), (2, F(1, 3)), (False, False)): F(5)}, one, {}, budget) == {(2, 1): 5}
+    one = cells.Cell("", 1, (1, 1), {0: 1, 1: 3}, [], [])
+    assert cells.restrict({((), (2, F(1, 3)), (False, False)): F(5)}, one, {}) == {(2, 1): 5}
     for powers in ((2, F(1, 2)), (F(1, 2), F(1))):
         with pytest.raises(checker.Refused, match="powers of lifts"):
-            checker.restrict({((), powers, (False, False)): F(5)}, one, {}, budget)
+            cells.restrict({((), powers, (False, False)): F(5)}, one, {})
 
 
 def test_the_reach_of_a_lift_is_that_of_the_lifts_in_it():
     """Of x, y, z and the lifts n(x), m(y): x + n is zero on open sets, y + n and x y + x m are not."""
-    budget, reaches = checker.Budget(), {3: {0}, 4: {1}}
+    reaches = {3: {0}, 4: {1}}
     e = {name: tuple(int(i == k) for i in range(5)) for k, name in enumerate("xyznm")}
-    assert checker.reach_of({e["y"]: 1, e["n"]: 1}, reaches, 3, budget) == {0, 1}
-    assert checker.reach_of({e["z"]: 1, e["m"]: 1}, reaches, 3, budget) == {1, 2}
-    assert checker.reach_of({e["x"]: 1}, reaches, 3, budget) == {0}
-    assert checker.reach_of({e["x"]: 1, e["m"]: 1}, reaches, 3, budget) == {0, 1}
+    assert cells.reach_of({e["y"]: 1, e["n"]: 1}, reaches, 3) == {0, 1}
+    assert cells.reach_of({e["z"]: 1, e["m"]: 1}, reaches, 3) == {1, 2}
+    assert cells.reach_of({e["x"]: 1}, reaches, 3) == {0}
+    assert cells.reach_of({e["x"]: 1, e["m"]: 1}, reaches, 3) == {0, 1}
     for form in ({e["x"]: 1, e["n"]: 1}, {e["n"]: 1}, {e["x"]: 1, e["n"]: 1, e["m"]: 1}):
         with pytest.raises(checker.Refused, match="null set"):
-            checker.reach_of(form, reaches, 3, budget)
+            cells.reach_of(form, reaches, 3)
 
 
 def nested(field, **parts):
     """Cells of a loop in x with a lift n = x, and more."""
     document = LOOPS.relay() | {"gains": {}, "lifts": {"n": LOOPS.X1}} | parts
     document["field"] = {"x": field}
-    return [one.label for one in checker.cells_with_lifts(checker.read_loop(document), checker.Budget())]
+    return [one.label for one in cells.cells_with_lifts(loops.read_loop(document))]
 
 
 def test_lifts_are_used_by_sign_or_by_power():
@@ -237,14 +244,14 @@ def test_a_parameter_of_one_point_stands_in_a_lift():
 
 def judged(obligation, witness, on_cells=True):
     try:
-        checker.check_witness(obligation, witness, on_cells, checker.Budget())
+        stability.check_witness(obligation, witness, on_cells)
     except checker.Refused as refused:
         return str(refused)
     return "proved"
 
 
 def test_where_nothing_is_to_prove_nothing_may_be_said():
-    nothing = checker.Obligation("here", {}, 1, equalities=({(1,): F(1)},), inequalities=({(1,): F(1)},))
+    nothing = stability.Obligation("here", {}, 1, equalities=({(1,): F(1)},), inequalities=({(1,): F(1)},))
     square = LOOPS.square([0], [[0]], "1")
     plain = {"obligation": "here", "multiplier": {"0": "1"}, "squares": [], "equalities": [{}], "inequalities": [[]]}
     assert judged(nothing, plain) == "proved"
@@ -259,24 +266,24 @@ def test_where_nothing_is_to_prove_nothing_may_be_said():
 
 def test_a_negative_multiplier_proves_nothing():
     """-1 times -u^2 is a square."""
-    minus = checker.Obligation("here", {(2,): F(-1)}, 1)
+    minus = stability.Obligation("here", {(2,): F(-1)}, 1)
     forged = {"obligation": "here", "squares": [LOOPS.square([0], [[1]], "1")], "equalities": [], "inequalities": []}
     assert "positive" in judged(minus, forged | {"multiplier": {"0": "-1"}})
     half = forged | {"multiplier": {"0": "1", "1": "-1"}, "squares": []}
     assert "positive" in judged(minus, half)
     assert "nonempty" in judged(
-        checker.Obligation("here", {(2,): F(-1)}, 1), forged | {"multiplier": {}, "squares": []}
+        stability.Obligation("here", {(2,): F(-1)}, 1), forged | {"multiplier": {}, "squares": []}
     )
 
 
 @pytest.mark.parametrize(("count", "said"), [(4, "proved"), (5, "0 to 4")])
 def test_there_are_as_many_squares_as_products_of_variables(count, said):
     """Four times u^2/4, five times u^2/5, in two variables."""
-    one = checker.Obligation("here", {(2, 0): F(1)}, 2)
+    one = stability.Obligation("here", {(2, 0): F(1)}, 2)
     squares = [LOOPS.square([0, 0], [[1, 0]], f"1/{count}")] * count
     document = {"obligation": "here", "multiplier": {"0,0": "1"}, "squares": squares, "equalities": []}
     assert said in judged(one, document | {"inequalities": []})
-    three = checker.Obligation("here", {(2, 0, 0): F(1)}, 3)
+    three = stability.Obligation("here", {(2, 0, 0): F(1)}, 3)
     squares = [LOOPS.square([0, 0, 0], [[1, 0, 0]], "1/8")] * 8
     document = {"obligation": "here", "multiplier": {"0,0,0": "1"}, "squares": squares, "equalities": []}
     assert judged(three, document | {"inequalities": []}) == "proved"
@@ -300,7 +307,7 @@ def test_exponents_reach_up_to_999():
 
 
 def test_steps_are_counted_with_the_square_of_the_length():
-    budget = checker.Budget()
+    budget = exact_numbers.Budget()
     budget.left = 100
     budget.spend(3, 1023)
     assert budget.left == 97
@@ -314,57 +321,57 @@ def test_steps_are_counted_with_the_square_of_the_length():
 
 
 def plain(*equalities, inequalities=(), degree=0):
-    return checker.Statement(("x",), {}, {(0,): F(1)}, inequalities, equalities, ((),), degree)
+    return polynomials.Statement(("x",), {}, {(0,): F(1)}, inequalities, equalities, ((),), degree)
 
 
 STEPS_BY_HAND = {
-    "a sum": (lambda budget: checker.add({}, (0,), F(1), budget), 6),
-    "a square, and a product of one factor": (lambda budget: checker.multiply([], [F(3)], (2,), budget), 1 + 6),
-    "a product of two factors": (lambda budget: checker.multiply([F(1), F(3)], [], (), budget), 12),
+    "a sum": (lambda: exact_numbers.add({}, (0,), F(1)), 6),
+    "a square, and a product of one factor": (lambda: exact_numbers.multiply([], [F(3)], (2,)), 1 + 6),
+    "a product of two factors": (lambda: exact_numbers.multiply([F(1), F(3)], [], ()), 12),
     "an elimination of three rows": (
-        lambda budget: checker.is_positive_definite([[int(i == j) for j in range(3)] for i in range(3)], budget), 3 + 1,
+        lambda: squares.is_positive_definite([[int(i == j) for j in range(3)] for i in range(3)]), 3 + 1,
     ),
-    "the reach of two terms": (lambda budget: checker.reach_of({(1,): F(1), (0,): F(1)}, {}, 1, budget), 2 * 6),
+    "the reach of two terms": (lambda: cells.reach_of({(1,): F(1), (0,): F(1)}, {}, 1), 2 * 6),
     "a product that is kept": (
-        lambda budget: checker.product_expander(plain(inequalities=({(1,): F(1)},)), budget)((0,)), 6 + 300,
+        lambda: polynomials.product_expander(plain(inequalities=({(1,): F(1)},)))((0,)), 6 + 300,
     ),
-    "a value of two terms": (lambda budget: checker.apply({0: 1}, 0, {0: 1, 1: 1}, budget), 2),
+    "a value of two terms": (lambda: functionals.apply({0: 1}, 0, {0: 1, 1: 1}), 2),
     "an equality of two terms beyond the degree": (
-        lambda budget: checker.check_equalities({}, plain({(1,): F(1), (0,): F(1)}), budget), 2,
+        lambda: functionals.check_equalities({}, plain({(1,): F(1), (0,): F(1)})), 2,
     ),
-    "pairs of a basis of three": (lambda budget: list(checker.survivors(plain(degree=4), set(), budget)), 6),
+    "pairs of a basis of three": (lambda: list(functionals.survivors(plain(degree=4), set())), 6),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", STEPS_BY_HAND)
 def test_steps_are_counted_before_they_are_done(name):
     work, steps = STEPS_BY_HAND[name]
-    budget = checker.Budget()
+    budget = exact_numbers.budget
     budget.left = steps
-    work(budget)
+    work()
     assert budget.left == 0
     budget.left = steps - 1
     with pytest.raises(checker.Refused, match="fewer steps"):
-        work(budget)
+        work()
 
 
 def test_polynomials_and_denominators_are_limited(monkeypatch):
-    monkeypatch.setattr(checker, "MAX_POLYNOMIAL", 2)
-    monkeypatch.setattr(checker, "MAX_DENOMINATOR_BITS", 3)
+    monkeypatch.setattr(exact_numbers, "MAX_POLYNOMIAL", 2)
+    monkeypatch.setattr(exact_numbers, "MAX_DENOMINATOR_BITS", 3)
     one, two, three = ({(i,): F(1) for i in range(n)} for n in (1, 2, 3))
-    assert checker.add_product({}, one, two, checker.Budget()) == two
+    assert exact_numbers.add_product({}, one, two) == two
     with pytest.raises(checker.Refused, match="an expanded polynomial must be of at most 2 terms"):
-        checker.add_product({}, one, three, checker.Budget())
-    assert checker.read_polynomial({"0": "1", "1": "1"}, "p", 1) == two
+        exact_numbers.add_product({}, one, three)
+    assert exact_numbers.read_polynomial({"0": "1", "1": "1"}, "p", 1) == two
     with pytest.raises(checker.Refused, match="p must be of at most 2 terms"):
-        checker.read_polynomial({"0": "1", "1": "1", "2": "1"}, "p", 1)
-    assert checker.to_integers([F(1, 7)], "g") == ([1], 7)
+        exact_numbers.read_polynomial({"0": "1", "1": "1", "2": "1"}, "p", 1)
+    assert exact_numbers.to_integers([F(1, 7)], "g") == ([1], 7)
     with pytest.raises(checker.Refused, match="g must be of common denominator"):
-        checker.to_integers([F(1, 8)], "g")
+        exact_numbers.to_integers([F(1, 8)], "g")
 
 
 def test_a_long_file_is_not_read_to_its_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(checker, "MAX_BYTES", 4)
+    monkeypatch.setattr(exact_numbers, "MAX_BYTES", 4)
     (tmp_path / "fine").write_text("éé", encoding="utf-8")
     (tmp_path / "long").write_text("ééé", encoding="utf-8")  # cut within a character
     assert checker.read_file(str(tmp_path / "fine")) == "éé"
@@ -375,23 +382,23 @@ def test_a_long_file_is_not_read_to_its_end(tmp_path, monkeypatch):
 def test_the_limits_are_those_of_the_format():
     text = (PATH.parent / "FORMAT.md").read_text(encoding="utf-8")
     for limit in (
-        f"file {checker.MAX_BYTES // 2**20} MiB; nesting {checker.MAX_NESTING}; {checker.MAX_STATES} states",
-        f"{checker.MAX_UNCERTAIN} uncertain parameters; {checker.MAX_NUMBERS} gains and constants",
-        f"{checker.MAX_TERMS} terms a state",
-        f"exponents at most {checker.MAX_EXPONENT}; {checker.MAX_OBLIGATIONS} obligations",
-        f"basis of {checker.MAX_BASIS};",
-        f"{checker.MAX_PARAMETERS} parameters in a term; {checker.MAX_ROOTS} roots; {checker.MAX_LIFTS} lifts",
-        f"weight r_i (integer 1 … {checker.MAX_WEIGHT}",
-        f"{checker.MAX_POLYNOMIAL} terms in one polynomial",
-        f"at most {checker.MAX_REDUCED} elements in a square, {checker.MAX_MONOMIALS} monomials before",
-        f"and {checker.MAX_REDUCED} after reduction",
-        f"names, different, 1 … {checker.MAX_VARIABLES} |",
-        f"no g_i twice; at most {checker.MAX_CONSTRAINTS} together",
-        f"the empty one among them, at most {checker.MAX_PRODUCTS} |",
+        f"file {exact_numbers.MAX_BYTES // 2**20} MiB; nesting {exact_numbers.MAX_NESTING}; {loops.MAX_STATES} states",
+        f"{loops.MAX_UNCERTAIN} uncertain parameters; {loops.MAX_NUMBERS} gains and constants",
+        f"{loops.MAX_TERMS} terms a state",
+        f"exponents at most {loops.MAX_EXPONENT}; {stability.MAX_OBLIGATIONS} obligations",
+        f"basis of {squares.MAX_BASIS};",
+        f"{loops.MAX_PARAMETERS} parameters in a term; {loops.MAX_ROOTS} roots; {loops.MAX_LIFTS} lifts",
+        f"weight r_i (integer 1 … {loops.MAX_WEIGHT}",
+        f"{exact_numbers.MAX_POLYNOMIAL} terms in one polynomial",
+        f"at most {squares.MAX_REDUCED} elements in a square, {functionals.MAX_MONOMIALS} monomials before",
+        f"and {squares.MAX_REDUCED} after reduction",
+        f"names, different, 1 … {polynomials.MAX_VARIABLES} |",
+        f"no g_i twice; at most {polynomials.MAX_CONSTRAINTS} together",
+        f"the empty one among them, at most {polynomials.MAX_PRODUCTS} |",
     ):
         assert limit in text, limit
-    assert checker.MAX_BYTES % 2**20 == 0
-    assert checker.MAX_DENOMINATOR_BITS == 2**14
+    assert exact_numbers.MAX_BYTES % 2**20 == 0
+    assert exact_numbers.MAX_DENOMINATOR_BITS == 2**14
 
 
 # ---------------------------------------------------------------- the command
@@ -434,9 +441,9 @@ def test_only_readable_text_is_read(written, tmp_path, capsys):
     assert "invalid: the file must be UTF-8. Received another byte at 0" in capsys.readouterr().out
     assert checker.main([str(tmp_path)]) == 2
     assert "it is no regular file" in capsys.readouterr().err
-    assert checker.main([written(b" " * (checker.MAX_BYTES + 1))]) == 1
+    assert checker.main([written(b" " * (exact_numbers.MAX_BYTES + 1))]) == 1
     assert "bytes long" in capsys.readouterr().out
-    assert checker.main([written(json.dumps(LOOPS.relay()).encode().ljust(checker.MAX_BYTES))]) == 0
+    assert checker.main([written(json.dumps(LOOPS.relay()).encode().ljust(exact_numbers.MAX_BYTES))]) == 0
     assert checker.main(["a\0b"]) == 2
 
 
@@ -483,8 +490,8 @@ def test_a_diagonal_entry_that_is_dropped_hinders_nothing_and_frees_only_what_it
     # on 1 + x^2 >= 0, squares in (1, x, x^2): x^6 has the entry of x^2 alone, so that goes; x^4 = 1 * x^4 of the plain
     # squares still balances the entry of x
     bases, factors = {(): [0, 4], (0,): [0, 1, 2]}, {(): {0: 1}, (0,): {0: 1, 2: 1}}
-    assert checker.reduce(bases, factors, {0, 2, 8}) == {(): {0, 4}, (0,): {0, 1}}
-    assert checker.reduce(bases, factors, {0, 8}) == {(): {0, 4}, (0,): set()}
+    assert functionals.reduce(bases, factors, {0, 2, 8}) == {(): {0, 4}, (0,): {0, 1}}
+    assert functionals.reduce(bases, factors, {0, 8}) == {(): {0, 4}, (0,): set()}
 
 
 def test_a_file_of_a_kind_is_a_guarantee():
@@ -497,7 +504,7 @@ def test_a_file_of_a_kind_is_a_guarantee():
 def test_a_guarantee_needs_the_module_beside_the_checker(tmp_path, monkeypatch, capsys):
     (tmp_path / "guarantee.json").write_text('{"format": 1, "kind": "guarantee"}')
     monkeypatch.setattr(checker, "__file__", str(tmp_path / "check.py"))
-    checker.guarantee_module.cache_clear()
+    monkeypatch.delitem(checker.LOADED, "guarantee", raising=False)
     assert checker.main([str(tmp_path / "guarantee.json")]) == 2
     assert "guarantee.py must stand beside check.py" in capsys.readouterr().err
 
