@@ -60,12 +60,12 @@ class Premise:
         return f"{self.required:.4g}{unit}", f"{self.certified:.4g}{unit}"
 
     def to_dict(self) -> dict:
-        """Keys of DESIGN.md and the unit."""
+        """Keys of DESIGN.md and the unit; None for what is infinite."""
         return {
             "name": self.name,
-            "required": float(self.required),
-            "certified": float(self.certified),
-            "ratio": None if self.ratio is None else float(self.ratio),
+            "required": _finite(self.required),
+            "certified": _finite(self.certified),
+            "ratio": _finite(self.ratio),
             "holds": self.holds,
             "unit": self.unit,
             "measured": self.measured,
@@ -76,3 +76,7 @@ class Premise:
 def _bound(kind: type[UpperBound] | type[LowerBound], value: Fraction | float) -> Fraction | float:
     """Bound on a number; one that is not finite, as of a run that diverges, stays as it is."""
     return value if isinstance(value, float) and not math.isfinite(value) else kind(value)
+
+
+def _finite(value: Fraction | float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)

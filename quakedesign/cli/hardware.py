@@ -1,7 +1,7 @@
 """Options about what lies around a controller: actuator and sensors, the same for every command that runs one."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
@@ -10,11 +10,11 @@ from quakedesign.cli.shared import (
     Hertz,
     Metres,
     MetresPerSecond,
-    MetresPerSecondSquared,
     Pascals,
     PascalsPerSecond,
     Seconds,
     Whole,
+    in_unit,
 )
 
 if TYPE_CHECKING:
@@ -63,8 +63,6 @@ class ActuatorOptions:
 
     def build(self, step: float) -> "Actuator":
         """Actuator for a sampling period [s]; raises `ParameterError`."""
-        from dataclasses import asdict
-
         from quakedesign.studies.hardware import actuator
 
         return actuator(step, **asdict(self))
@@ -80,14 +78,28 @@ class EstimateOptions:
     averaging
         Number of the latest readings whose mean the differentiator gets.
     differentiator_bound
-        λ_d: tell the law what a differentiator estimates from the slip.
+        λ_d in m/s^(n_d + 1): tell the law what a differentiator estimates from the slip.
+    differentiator_order
+        n_d; the paper prints 2, for which a held pressure has no λ_d.
     filter_order
-        Of the differentiator.
+        n_f of the differentiator.
     """
 
     averaging: Whole = 1
-    differentiator_bound: MetresPerSecondSquared | None = None
+    differentiator_bound: str | None = None
+    differentiator_order: Whole = 1
     filter_order: Whole = 0
+
+    @property
+    def bound(self) -> float | None:
+        """λ_d [m/s^(n_d + 1)]."""
+        if self.differentiator_bound is None:
+            return None
+        return in_unit(self.differentiator_bound, f"m/s^{self.differentiator_order + 1}", "differentiator bound")
+
+    def told(self) -> dict[str, Any]:
+        """Options in SI units."""
+        return asdict(self) | {"differentiator_bound": self.bound}
 
 
 @Parameter(name="*", group=_SENSORS)
@@ -119,8 +131,9 @@ class SensorOptions(EstimateOptions):
         return sensor(
             step,
             Measurement(slip_noise=self.slip_noise, rate_noise=self.rate_noise, seed=seed),
-            self.differentiator_bound,
+            self.bound,
             self.filter_order,
+            order=self.differentiator_order,
             bandwidth=math.inf if self.bandwidth is None else self.bandwidth,
             averaging=self.averaging,
         )

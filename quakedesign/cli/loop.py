@@ -1,6 +1,5 @@
 """Commands about one closed loop: simulate it, see what sampling does to it, export its controller."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -286,7 +285,7 @@ def export(
         folder,
         step=step,
         scheme=scheme,
-        **asdict(sensors),
+        **sensors.told(),
         force=force,
     )
     if json:

@@ -26,13 +26,17 @@ def _reader(unit: str) -> Callable[[Any, Sequence[Any]], float]:
     """Converter of an option's text, with a unit or a bare number in the SI unit."""
 
     def read(_type: Any, tokens: Sequence[Any]) -> float:
-        text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
-        try:
-            return float(text)
-        except ValueError:
-            return _with_unit(text, unit, name)
+        return in_unit(tokens[0].value, unit, (tokens[0].keyword or "value").strip("-").replace("-", " "))
 
     return read
+
+
+def in_unit(text: str, unit: str, name: str) -> float:
+    """Number of a text with a unit, or a bare one in that SI unit."""
+    try:
+        return float(text)
+    except ValueError:
+        return _with_unit(text, unit, name)
 
 
 def _whole(_type: Any, tokens: Sequence[Any]) -> int:

@@ -10,6 +10,7 @@ from quakedesign.fault import Fault
 from quakedesign.loop.sensing import (
     Averaging,
     Differentiator,
+    JointCondition,
     OutputFeedback,
     SlipStage,
     Transducer,
@@ -28,6 +29,7 @@ def sensor(
     bound: float | None,
     filter_order: int = 0,
     *,
+    order: int = 1,
     bandwidth: float = math.inf,
     averaging: int = 1,
 ) -> Measurement | OutputFeedback:
@@ -39,9 +41,11 @@ def sensor(
         Sampling period [s].
     noise : Measurement
     bound : float or None
-        λ_d [m/s²] of a differentiator with n_d = 1; None for none.
+        λ_d [m/s^(n_d + 1)] of a differentiator; None for none.
     filter_order : int
         n_f of it.
+    order : int
+        n_d of it.
     bandwidth : float
         Of the transducer [Hz].
     averaging : int
@@ -53,7 +57,12 @@ def sensor(
         For noise of a slip rate that is not measured, or for what belongs to a differentiator without one.
     """
     if bound is None:
-        given = {"filter order": filter_order != 0, "bandwidth": bandwidth != math.inf, "averaging": averaging != 1}
+        given = {
+            "differentiator order": order != 1,
+            "filter order": filter_order != 0,
+            "bandwidth": bandwidth != math.inf,
+            "averaging": averaging != 1,
+        }
         for name in (name for name, there in given.items() if there):
             raise ParameterError(f"the {name} belongs to a differentiator. Received no bound. Give both or neither.")
         return noise
@@ -65,16 +74,17 @@ def sensor(
     transducer = Transducer(deviation=noise.slip_noise, bandwidth=bandwidth, seed=noise.seed)
     stages: list[SlipStage] = [transducer] if transducer.start else []
     stages += [Averaging(samples=averaging)] if averaging != 1 else []
-    differentiator = Differentiator(bound=bound, step=step, order=1, filter_order=filter_order)
+    differentiator = Differentiator(bound=bound, step=step, order=order, filter_order=filter_order)
     return OutputFeedback(stages=tuple(stages), differentiator=differentiator)
 
 
 def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, *, scheme: str = "explicit") -> Premise:
     """Whether λ_d exceeds what slip and law ask of it, jointly with the sampling period (ERRATA 21).
 
-    The largest |x1''| comes from a run with exact states over 4000 sampling periods, n_d must be 1. The condition is
-    sufficient for the differentiator to follow, not necessary for the loop to work. Where that run diverges, nothing
-    is certified.
+    The largest |x1''| comes from a run with exact states over 4000 sampling periods. The condition is sufficient for
+    the differentiator to follow, not necessary for the loop to work. Where that run diverges, nothing is certified.
+    With n_d of 2 or more a bound of the next derivative is needed, which no held pressure has: the requirement is
+    infinite.
     """
     differentiator = seen.differentiator
     noise = max((DEVIATIONS * s.deviation for s in seen.stages if isinstance(s, Transducer)), default=0.0)
@@ -84,10 +94,9 @@ def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, 
         name="differentiator",
         required=found.required,
         certified=found.certified,
-        unit="m/s^2",
+        unit=f"m/s^{differentiator.order + 1}",
         measured=True,
-        note=f"λ_d against |x1''| <= {reached:.3g} m/s² with exact states and what the errors of the estimates, "
-        f"{found.slip_error:.2g} m and {found.rate_error:.2g} m/s, add to it through the law",
+        note=_note(differentiator.order, reached, found),
     )
     if diverged is None:
         return premise
@@ -95,6 +104,15 @@ def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, 
         f"the loop with exact states diverges at {diverged:.4g} s, so that no λ_d is enough; until then {premise.note}"
     )
     return replace(premise, certified=0.0, proved=False, note=said)
+
+
+def _note(order: int, reached: float, found: JointCondition) -> str:
+    if order > 1:
+        return f"no λ_d bounds derivative {order + 1} of the slip: its derivative 2 jumps wherever a held pressure does"
+    return (
+        f"λ_d against |x1''| <= {reached:.3g} m/s² with exact states and what the errors of the estimates, "
+        f"{found.slip_error:.2g} m and {found.rate_error:.2g} m/s, add to it through the law"
+    )
 
 
 def largest_acceleration(fault: Fault, law: Controller, *, scheme: str, step: float) -> tuple[float, float | None]:

@@ -22,6 +22,7 @@ def export_answer(
     step: float | None = None,
     scheme: str | None = None,
     differentiator_bound: float | None = None,
+    differentiator_order: int = 1,
     filter_order: int = 0,
     averaging: int = 1,
     force: bool = False,
@@ -35,7 +36,9 @@ def export_answer(
     scheme : str, optional
         ``explicit`` unless given.
     differentiator_bound : float, optional
-        λ_d [m/s²] of a differentiator with n_d = 1; the law then is told its estimates.
+        λ_d [m/s^(n_d + 1)] of a differentiator; the law then is told its estimates.
+    differentiator_order : int
+        n_d of it.
     filter_order : int
         n_f of it.
     averaging : int
@@ -52,7 +55,7 @@ def export_answer(
     """
     way, step = own_way(law, scheme, step)
     period = fault.sampling_time if step is None else step
-    seen = sensor(period, EXACT, differentiator_bound, filter_order, averaging=averaging)
+    seen = sensor(period, EXACT, differentiator_bound, filter_order, order=differentiator_order, averaging=averaging)
     chosen = sampled_scheme(way, measurement=seen)
     found = export_controller(fault, law, folder, step=step, scheme=chosen, force=force)
     premises = []

@@ -52,6 +52,8 @@ def test_a_run_that_diverges_holds_no_premise(required):
     assert type(one.required) is type(one.ratio) is float
     assert not math.isfinite(one.ratio)
     assert not one.holds
+    told = one.to_dict()
+    assert (told["required"], told["certified"], told["ratio"]) == (None, 1.0, None)
 
 
 def test_a_number_beyond_all_floats_is_a_bound_too():

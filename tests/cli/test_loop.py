@@ -54,6 +54,35 @@ def test_a_differentiator_is_told_and_judged(run):
     assert "filter_order=1" in answer["run"]["measurement"]
 
 
+@pytest.mark.parametrize("bound", ["100", "100 m/s^3"])
+def test_the_printed_differentiator_is_told_and_has_no_bound_under_a_held_pressure(run, bound):
+    """n_d = n_f = 2, as the paper prints."""
+    orders = ("--differentiator-order", "2", "--filter-order", "2")
+    code, out, _ = run(*SHORT, "--controller", "cta", "--scheme", "implicit", "--differentiator-bound", bound, *orders)
+    answer = json.loads(out)
+    assert code == 0
+    assert "order=2, filter_order=2" in answer["run"]["measurement"]
+    (premise,) = (p for p in answer["premises"] if p["name"] == "differentiator")
+    assert (premise["required"], premise["certified"], premise["unit"]) == (None, 100.0, "m/s^3")
+    assert not premise["holds"]
+    assert "jumps wherever a held pressure does" in premise["note"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--differentiator-order", "2"), "differentiator order belongs to a differentiator"),
+        (("--differentiator-order", "2", "--differentiator-bound", "1 m/s^2"), "differentiator bound"),
+        (("--differentiator-order", "0", "--differentiator-bound", "1"), "order must be a whole number of at least 1"),
+        (("--differentiator-bound", "1 m/s^3"), "differentiator bound"),
+    ],
+)
+def test_orders_that_do_not_fit_are_one_line(run, options, said):
+    code, _, err = run(*SHORT, "--controller", "cta", "--scheme", "implicit", *options)
+    assert code == 2
+    assert said in err
+
+
 def test_a_divergence_is_an_event_and_no_metric(run):
     code, out, _ = run(
         "simulate", "real-fault", "--controller", "elqr", "--scheme", "explicit", "--duration", "400", "--json"
