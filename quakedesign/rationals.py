@@ -74,6 +74,14 @@ def fraction_of(value: Any) -> Fraction:
     return Fraction(int(value.p), int(value.q))
 
 
+def fraction_of_float(value: "sp.Float") -> Fraction:
+    """Fraction of a float of SymPy: as `rational` reads it where it is one of Python's, else its exact value."""
+    import sympy as sp
+
+    near = float(value)
+    return rational(near) if sp.Float(near) == value else fraction_of(sp.Rational(value))
+
+
 def to_sympy(value: Fraction) -> "sp.Rational":
     """Rational of SymPy."""
     import sympy as sp

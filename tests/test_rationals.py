@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import nearest, rational
+from quakedesign.rationals import fraction_of_float, nearest, rational
 
 
 @pytest.mark.parametrize(
@@ -67,3 +67,15 @@ def test_the_nearest_multiple_is_at_most_half_a_step_away(value, denominator):
 def test_only_finite_numbers_are_rounded(value):
     with pytest.raises(ParameterError, match="finite"):
         nearest(value, 10)
+
+
+@pytest.mark.parametrize("value", [0.1, -2.5, 1e300, 3e-300, 0.0])
+def test_a_float_of_sympy_is_read_as_that_of_python(value):
+    assert fraction_of_float(sp.Float(value)) == rational(value)
+
+
+@pytest.mark.parametrize("written", ["0.1234567890123456789", "1e400", "-1e-400", "3.00000000000000000000001"])
+def test_a_float_beyond_python_s_is_itself(written):
+    """To the last of its digits; the nearest of Python's is another number, or none."""
+    value = sp.Float(written, 40)
+    assert abs(fraction_of_float(value) - F(written)) <= abs(F(written)) / 10**39

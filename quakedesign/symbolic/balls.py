@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.rationals import rational
+from quakedesign.rationals import fraction_of_float
 from quakedesign.symbolic.intervals import upper_end
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
@@ -116,7 +116,7 @@ def _number(e: sp.Expr) -> Any:
     if e.is_Rational:
         return arb(fmpq(int(e.p), int(e.q)))
     if e.is_Float:
-        exact = rational(repr(float(e)))
+        exact = fraction_of_float(e)
         return arb(fmpq(exact.numerator, exact.denominator))
     if e is sp.pi:
         return arb.pi()

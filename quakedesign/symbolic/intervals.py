@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 import sympy as sp
 
 from quakedesign.errors import UnsupportedError
-from quakedesign.rationals import fraction_of, rational
+from quakedesign.rationals import fraction_of, fraction_of_float, rational
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 End = Fraction | float  # the only floats are −inf and inf
@@ -90,7 +90,7 @@ def _number(node: Any) -> Interval:
     if node.is_NumberSymbol:
         near, error = rational(str(sp.N(node, 60))), Fraction(1, 10**50)
         return near - error, near + error
-    exact = fraction_of(node) if node.is_Rational else rational(repr(float(node)))
+    exact = fraction_of(node) if node.is_Rational else fraction_of_float(node)
     return exact, exact
 
 

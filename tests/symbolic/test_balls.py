@@ -341,3 +341,8 @@ def test_bounds_beyond_a_size_are_zero_or_none():
     assert upper_bound(1 + sp.exp(-x), far) <= 1 + F(1, 2**50)
     with pytest.raises(ParameterError, match="no finite bound"):
         upper_bound(sp.exp(x), far, pieces=3)
+
+
+def test_floats_of_more_digits_than_python_s_are_enclosed():
+    assert upper_bound(sp.Float("1.00000000000000000001", 30) - 1, {}) > 0
+    assert upper_bound(x * sp.Float("1e-400"), {x: (F(0), F(10**400))}) >= F(1, 2)

@@ -68,6 +68,13 @@ def test_irrational_numbers_lie_strictly_inside_of_narrow_intervals(number):
     assert high - low < F(1, 10**45)
 
 
+def test_floats_of_more_digits_than_python_s_are_enclosed():
+    long = sp.Float("0.1234567890123456789", 30)
+    low, high = interval(long, {})
+    assert low <= F(sp.Rational(long).p, sp.Rational(long).q) <= high
+    assert interval(1 / (x * sp.Float("1e-400")), {x: (F(1), F(1))})[0] > 10**399
+
+
 leaves = st.sampled_from((x, y)) | st.fractions(-3, 3, max_denominator=7).map(
     lambda v: sp.Rational(v.numerator, v.denominator)
 )
