@@ -31,6 +31,7 @@ _HOME = {
     "run_campaign": "simulation.campaign",
     "scaled_fault": "fault",
     "simulate": "simulation",
+    "stated_problems": "synthesis",
     "synthesise": "synthesis",
     "to_casadi": "simulation",
     "to_iosystem": "simulation",

@@ -19,6 +19,7 @@ from quakedesign.simulation import to_casadi as to_casadi
 from quakedesign.simulation import to_iosystem as to_iosystem
 from quakedesign.simulation.campaign import campaign_problem as campaign_problem
 from quakedesign.simulation.campaign import run_campaign as run_campaign
+from quakedesign.sos.solve.conic import stated_problems as stated_problems
 from quakedesign.studies import limits as limits
 from quakedesign.symbolic import derive as derive
 from quakedesign.synthesis import Design as Design

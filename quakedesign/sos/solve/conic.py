@@ -1,10 +1,49 @@
 """Programmes stated in cvxpy and solved by Clarabel: once, or compiled and solved again with other Parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from types import SimpleNamespace
 from typing import Any
 
 from quakedesign.sos.solve.moment import MomentProgram, options, pairs, useful
+
+_handed: ContextVar[dict[int, Any] | None] = ContextVar("handed", default=None)
+
+
+@contextmanager
+def stated_problems() -> Iterator[list[Any]]:
+    """Hand back the cvxpy problems that are solved within, each once, in the order in which they are first solved.
+
+    Parameters, variables and multipliers have the values of the last solve. To be handed over, all is solved in this
+    process, whatever `workers` says. The fastest backend to compile them is `canon_backend="COO"`. A statement about
+    one polynomial (`sos.prove`) is no cvxpy problem: compiling it would take several times as long as solving it.
+
+    Yields
+    ------
+    list of cvxpy.Problem
+        Complete when the block ends.
+    """
+    found: dict[int, Any] = {}
+    problems: list[Any] = []
+    token = _handed.set(found)
+    try:
+        yield problems
+    finally:
+        _handed.reset(token)
+        problems.extend(found.values())
+
+
+def handing_back() -> bool:
+    """Whether somebody waits for the problems that are solved."""
+    return _handed.get() is not None
+
+
+def hand_back(problem: Any) -> None:
+    """Note a problem that is about to be solved."""
+    found = _handed.get()
+    if found is not None:
+        found.setdefault(id(problem), problem)
 
 
 def solve(problem: Any, **chosen: Any) -> bool:
@@ -13,6 +52,7 @@ def solve(problem: Any, **chosen: Any) -> bool:
 
     import cvxpy as cp
 
+    hand_back(problem)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -52,6 +92,7 @@ class Compiled:
             False goes on with the solver of the last call, faster by what it has ordered and scaled; its last digits
             then depend on what was solved before.
         """
+        hand_back(self.problem)
         data, chain, inverse = self.data()
         answer = chain.solver.solve_via_data(data, not anew, False, options(accuracy), self._solvers)
         self.solver_seconds = answer.solve_time

@@ -10,6 +10,7 @@ from quakedesign.certificates import Loop, certificate_text
 from quakedesign.certificates.claim import root_enclosure
 from quakedesign.controllers import Subject
 from quakedesign.errors import CertificateError
+from quakedesign.sos.solve.conic import handing_back
 from quakedesign.synthesis.analysis.margins import necessary_limit, prove
 from quakedesign.synthesis.analysis.parametric_program import CLEAR, Sweep
 from quakedesign.workers import Processes
@@ -132,8 +133,9 @@ class Screeners:
     """
 
     def __init__(self, sheet: Sheet, workers: int) -> None:
-        self._own = Screener(sheet) if workers == 1 else None
-        self._crew = None if workers == 1 else Processes(workers, _begin, (sheet,))
+        alone = workers == 1 or handing_back()
+        self._own = Screener(sheet) if alone else None
+        self._crew = None if alone else Processes(workers, _begin, (sheet,))
 
     def __enter__(self) -> Self:
         return self

@@ -9,6 +9,7 @@ from itertools import islice
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.controllers import Subject
 from quakedesign.fault.checks import MOST_WORKERS, require_count
+from quakedesign.sos.solve.conic import handing_back
 from quakedesign.synthesis.analysis.certify import Number
 from quakedesign.synthesis.gains.dilation import scaled_norm
 from quakedesign.synthesis.gains.objectives import SmallestNorm
@@ -191,7 +192,7 @@ def _climbed(setting: Setting, first: Sequence[Loop], wanted: int, workers: int)
     """Climbs from as many starts as wanted, of those that can begin; in the order of the starts."""
     job = partial(attempt, setting)
     done: list[list[State]] = []
-    if workers == 1:
+    if workers == 1 or handing_back():
         return list(islice((states for states in map(job, first) if states), wanted))
     with Processes(workers) as crew:
         for at in range(0, len(first), workers):

@@ -3,6 +3,7 @@
 from fractions import Fraction as F
 
 import control
+import cvxpy as cp
 import numpy as np
 import pytest
 
@@ -13,6 +14,7 @@ from quakedesign.synthesis.linear.design.admissible_weights import (
     guaranteed,
     limiting_gains,
     riccati_bounds,
+    riccati_inequality,
     smallest_gain,
 )
 from quakedesign.synthesis.linear.design.nondimensional import sound_bound
@@ -47,6 +49,29 @@ def test_a_full_q_agrees_with_a_scan_over_the_split():
 
         scanned = max(worst(w) for w in 1 / (1 + np.exp(-np.linspace(-8, 8, 801))))
         assert found.limit == pytest.approx(scanned, rel=2e-4)
+
+
+def test_the_matrix_inequality_has_the_value_of_its_closed_form():
+    fault = LinearProblem.of(qd.load_fault("real-fault", box="ten-percent"))
+    for problem in (PROBLEM, fault.nondimensional(fault.scales())):
+        for _ in range(3):
+            root = tuple(tuple(F(int(v), 5) for v in row) for row in RNG.integers(-9, 9, (4, 4)))
+            Q = m.total(m.product(m.transpose(root), root), m.diagonal((F(1, 10),) * 4))
+            stated, closed = riccati_inequality(problem, Q), riccati_bounds(problem, Q)
+            assert stated.solve(solver="CLARABEL") == pytest.approx(closed.limit, rel=1e-6)
+            if all(problem.bounds):
+                parts = stated.var_dict["parts"].value
+                assert stated.value / parts[0] == pytest.approx(float(closed.split), rel=1e-4)
+
+
+def test_the_matrix_inequality_takes_further_conditions():
+    # a weight of at most 1/10, and a split of 1/2: Q ≥ 2R·diag(g1², g2², 0, 0)
+    stated = riccati_inequality(PROBLEM, m.diagonal((F(1), F(2), F(3), F(4))))
+    weight, parts = (stated.var_dict[name] for name in ("weight", "parts"))
+    for more, value in ((weight <= 0.1, 0.1), (parts == 2 * weight, 0.5)):
+        assert cp.Problem(stated.objective, [*stated.constraints, more]).solve(solver="CLARABEL") == pytest.approx(
+            value
+        )
 
 
 def test_every_smaller_weight_gives_gains_that_hold():

@@ -9,7 +9,15 @@ from typing import Any
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.design.nondimensional import sound_bound
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
-from quakedesign.synthesis.linear.plant.rational_matrices import definite, inverse, product, times, total, transpose
+from quakedesign.synthesis.linear.plant.rational_matrices import (
+    Matrix,
+    definite,
+    inverse,
+    product,
+    times,
+    total,
+    transpose,
+)
 
 _SHARE = Fraction(999_999, 1_000_000)
 
@@ -82,44 +90,53 @@ def riccati_bounds(problem: LinearProblem, Q: Sequence[Sequence[Fraction]]) -> R
         raise ParameterError(
             "every R holds where nothing is uncertain. Bounds g1, g2 that are not both 0 are expected."
         )
-    (a, c), (_, b) = _slip_part(Q)
-    d1, d2 = _largest_diagonal(a, b, c, float(g1), float(g2))
-    cost = float(g1) ** 2 / d1 + float(g2) ** 2 / d2
-    split = Fraction(1, 2)
-    if g1 and g2:
-        split = Fraction(round(float(g1) ** 2 / d1 / cost * 2**40), 2**40)
-    weight = Fraction(1 / cost) * _SHARE
-    while not guaranteed(problem, Q, weight, split):
-        weight *= _SHARE
-    return RiccatiBounds(weight=weight, split=split, limit=1 / cost)
+    limit, share = _largest_weight(_slip_part(Q), g1, g2)
+    split = share if g1 and g2 else Fraction(1, 2)
+    return RiccatiBounds(weight=limit * _SHARE, split=split, limit=float(limit))
 
 
-def _slip_part(Q: Sequence[Sequence[Fraction]]) -> tuple[tuple[float, float], tuple[float, float]]:
+def riccati_inequality(problem: LinearProblem, Q: Sequence[Sequence[Fraction]]) -> Any:
+    """The matrix inequality whose closed form is `riccati_bounds`, as a cvxpy problem to solve or to extend.
+
+    Its value is the largest R with Q ≥ R·W for some split w. With s1 = R/w and s2 = R/(1 − w) both conditions are
+    linear: Q ≥ diag(g1²s1, g2²s2, 0, 0), and diag(s1, s2) ≥ R·11ᵀ, which is R ≤ 1/(1/s1 + 1/s2).
+
+    Parameters
+    ----------
+    problem : LinearProblem
+    Q : matrix (4 × 4) of Fraction
+        In the units of the problem.
+
+    Returns
+    -------
+    cvxpy.Problem
+        In the variables `weight` (R) and `parts` (s1, s2).
+    """
+    import cvxpy as cp
+    import numpy as np
+
+    weight, parts = cp.Variable(name="weight"), cp.Variable(2, name="parts")
+    bounds = np.vstack([np.diag([float(g) ** 2 for g in problem.bounds]), np.zeros((2, 2))])
+    room = np.array([[float(v) for v in row] for row in Q]) - cp.diag(bounds @ parts)
+    return cp.Problem(cp.Maximize(weight), [room >> 0, cp.diag(parts) - weight * np.ones((2, 2)) >> 0])
+
+
+def _slip_part(Q: Sequence[Sequence[Fraction]]) -> Matrix:
     """Schur complement of Q on (x1, x2): what is left of it for the best ξ."""
     corner, lower = [row[:2] for row in Q[:2]], [row[2:] for row in Q[2:]]
     side = [row[2:] for row in Q[:2]]
-    left = total(corner, times(-1, product(side, inverse(lower), transpose(side))))
-    return (float(left[0][0]), float(left[0][1])), (float(left[1][0]), float(left[1][1]))
+    return total(corner, times(-1, product(side, inverse(lower), transpose(side))))
 
 
-def _largest_diagonal(a: float, b: float, c: float, g1: float, g2: float) -> tuple[float, float]:
-    """d1, d2 with [[a, c], [c, b]] ≥ diag(d1, d2) that minimise g1²/d1 + g2²/d2."""
-    from scipy.optimize import minimize_scalar
+def _largest_weight(part: Matrix, g1: Fraction, g2: Fraction) -> tuple[Fraction, Fraction]:
+    """1/(g1²/d1 + g2²/d2), as large as [[a, c], [c, b]] ≥ diag(d1, d2) allows, and the share of the first part.
 
-    top = a - c * c / b
-
-    def second(d1: float) -> float:
-        return b - c * c / (a - d1) if c else b
-
-    if not g2 or c == 0:
-        return top, b
-    if not g1:
-        return a, b - c * c / a
-    best = minimize_scalar(
-        lambda share: g1**2 / (share * top) + g2**2 / max(second(share * top), 1e-300),
-        bounds=(1e-9, 1 - 1e-9), method="bounded", options={"xatol": 1e-12},
-    )  # fmt: skip
-    return float(best.x) * top, second(float(best.x) * top)
+    On the edge (a − d1)(b − d2) = c² the sum is least where g1(b − d2)/d2 = g2|c|/d1, and alike for the other.
+    """
+    (a, c), (_, b) = part
+    first, second, both = g1**2 * b, g2**2 * a, g1 * g2 * abs(c)
+    whole = first + second + 2 * both
+    return (a * b - c * c) / whole, (first + both) / whole
 
 
 def limiting_gains(problem: LinearProblem, split: float) -> tuple[float, float]:

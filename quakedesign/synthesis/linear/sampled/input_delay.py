@@ -21,6 +21,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.rationals import rational
+from quakedesign.sos.solve.conic import hand_back
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Scales, Vertex
 from quakedesign.synthesis.linear.plant.rational_matrices import (
     Matrix,
@@ -157,6 +158,7 @@ def solved(program: Any, margin: Any) -> bool:
     """Whether a solver proposes something with a margin; where it breaks down, once more with firmer factorisations."""
     import cvxpy as cp
 
+    hand_back(program)
     for settings in ({}, {"static_regularization_constant": 1e-7}):
         try:
             with warnings.catch_warnings():
