@@ -28,6 +28,7 @@ def test_a_designed_loop_with_its_file(call, tmp_path):
     code, out, _ = call("real-fault", "--json", "--out", str(path))
     found = json.loads(out)
     assert (code, found["verdict"], found["certificate"]) == (0, "proved", str(path))
+    assert (found["measured"], found["slip_noise"], found["rate_noise"]) == ("slip-and-rate", "0", "0")
     assert F(found["slip_rate_error"]) <= F(3, 10**4)
     assert F(found["slip_error"]) <= F(6, 10**5)
     assert F(found["slip_rate_error"]) < F(found["peak_slip_rate"]) < F(found["slip_rate_error"]) * F(11, 10)
@@ -145,6 +146,7 @@ def test_the_slip_alone_with_noise_and_its_file(call, tmp_path):
         "with the slip alone measured, with any noise of at most 1e-06 m in the measured slip, for"
         in found["guarantee"]
     )
+    assert (found["measured"], found["slip_noise"], found["rate_noise"]) == ("slip", "1/1000000", "0")
     assert F(found["slip_rate_error"]) <= F(4, 10**4)
     assert json.loads(path.read_text())["loop"]["noise"] == {"slip": "1/1000000", "rate": "0"}
     assert check_files([path], "real-fault")[str(path)][0] == "proved"

@@ -108,6 +108,9 @@ class Answer:
             "worst_found_with_stick": _seen(self.worst_with_stick),
             "limit": _limit(self.limit),
             "step": str(self.found.held.step),
+            "measured": MEASURED[self.found.held.law.of_slip_alone],
+            "slip_noise": str(self.found.held.slip_noise),
+            "rate_noise": str(self.found.held.rate_noise),
             "law": _law(self.found.held.law),
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
