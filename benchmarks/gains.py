@@ -150,7 +150,7 @@ def catalogue() -> None:
 
 
 def standalone_checker() -> ModuleType:
-    """The checker that is a file of its own, as a module."""
+    """The standalone checker, as a module."""
     specification = importlib.util.spec_from_file_location("standalone_check", PROOFS / "check.py")
     assert specification is not None
     assert specification.loader is not None
