@@ -212,6 +212,28 @@ def test_a_state_adds_its_own_slope_to_that_of_slip(declared):
         assert found.weakens
 
 
+def test_an_arsinh_of_a_state_is_taken_by_its_logarithm():
+    """Of arsinh(v·e^{1000m})/1000, m′ = −v·m with m from 1/4 to 1/2: between m and m + log(6)/1000, slope at most m."""
+
+    class Activated(hyperbolic):
+        state_names = ("memory",)
+        state_units = ("",)
+        working_rates = (1.0, 3.0)
+
+        def coefficient(self, slip, rate, memory):
+            return sp.asinh(rate * sp.exp(1000 * memory)) / 1000
+
+        def state_rates(self, slip, rate, memory):
+            return (-rate * memory,)
+
+        def steady_state(self, rate):
+            return (1 / (1 + rate),)
+
+    found = friction_bounds(Activated(low=0.25, high=0.502, slip_slope=0.5, rate_slope=0.001))
+    assert (found.least, found.most, found.slip_slope) == (F(1, 4), F(251, 500), F(1, 2))
+    assert found.weakens
+
+
 @pytest.mark.parametrize("name", ["rate-and-state-aging", "rate-and-state-slip"])
 @pytest.mark.parametrize("what", ["least", "most", "slip_slope", "rate_slope"])
 def test_laws_with_state_reach_what_they_declare(name, what):
