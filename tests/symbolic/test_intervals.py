@@ -207,7 +207,7 @@ def test_functions_that_run_one_way_on_each_side_of_zero_have_their_hull(express
         (sp.Min(x, y), min),
         (x * y + x, lambda a, b: a * b + a),
     ],
-    ids=str,
+    ids=("sum", "product", "larger", "smaller", "both"),
 )
 def test_pairs_of_intervals_have_their_hull(expression, function):
     """For x·y + x the enclosure is that of the sum of two hulls."""
