@@ -74,13 +74,14 @@ def campaign(
     controller
         none, cta, dia or elqr.
     gains
-        published, designed, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min).
     scale
         λ of a sliding mode in place of that of the gains, decimal or p/q.
     feedforward
         none, nominal or centred.
     scheme
-        explicit (unless given), implicit, semi-implicit or compensated (sampled control), or continuous.
+        explicit (unless given), implicit, semi-implicit or compensated (sampled control), or continuous. Designed laws
+        are sampled and have their own.
     step
         Length of one step; the fault's sampling time unless given.
     substeps
@@ -130,12 +131,12 @@ def campaign(
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
     found = load_fault(fault, box=box)
     law = optional_choice(found, controller, gains, scale=scale, feedforward=feedforward)
-    way, step = own_way(law.controller if law else None, scheme, step)
+    way, step, own = own_way(law.controller if law else None, scheme, step)
     period = found.sampling_time if step is None else step
     problem = campaign_problem(
         found,
         law.controller if law else None,
-        scheme=sampled_scheme(way, substeps, actuator.build(period), sensors.build(period)),
+        scheme=sampled_scheme(way, substeps, actuator.build(period), sensors.build(period), **own),
         step=step,
         method=method,
         duration=duration,

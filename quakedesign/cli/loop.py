@@ -105,7 +105,7 @@ def simulate(
     found = load_fault(fault)
     law = optional_choice(found, controller, gains, scale=scale, feedforward=feedforward)
     pushed = None if perturbation is None else read_perturbation(perturbation)
-    way, step = own_way(law.controller if law else None, scheme, step, "continuous")
+    way, step, _ = own_way(law.controller if law else None, scheme, step, "continuous")
     period = found.sampling_time if step is None else step
     chain, told = actuator.build(period), sensors.build(period, seed)
     with progress() as tell:

@@ -7,7 +7,7 @@ from functools import cache
 from importlib.resources import files
 
 from quakedesign.arguments import check_arguments
-from quakedesign.controllers.base import Controller, Law, LoopField, Signals
+from quakedesign.controllers.base import Controller, Law, LoopField, Sampling, Signals
 from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.discovery import discovered
 from quakedesign.errors import UnknownNameError
@@ -17,6 +17,7 @@ __all__ = [
     "Controller",
     "Law",
     "LoopField",
+    "Sampling",
     "Signals",
     "SlidingMode",
     "Subject",

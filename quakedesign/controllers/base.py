@@ -48,6 +48,29 @@ class Signals:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Sampling:
+    """How a law of samples runs, and in no other way: with the scheme, the numbers and the T_s of what is proved of it.
+
+    Attributes
+    ----------
+    step : Fraction
+        T_s [s].
+    scheme : str
+        Of `quakedesign.loop.schemes`.
+    settings : tuple of (str, Fraction)
+        Numbers of the scheme by name, in its own units.
+    """
+
+    step: Fraction
+    scheme: str = "explicit"
+    settings: tuple[tuple[str, Fraction], ...] = ()
+
+    def __str__(self) -> str:
+        numbers = "".join(f", {name} {float(value)!r}" for name, value in self.settings)
+        return f"{self.scheme}{numbers}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LoopField:
     """A closed loop as an uncertain vector field, the subject of a certificate.
 
@@ -191,9 +214,14 @@ class Controller(Law):
     integral_units: ClassVar[tuple[str, ...]]
 
     @property
-    def sampling_time(self) -> float | None:
-        """T_s [s] of a law of samples, which runs at that T_s by the scheme ``explicit``; None in continuous time."""
+    def sampling(self) -> Sampling | None:
+        """How a law of samples runs; None for a law in continuous time, which any scheme runs."""
         return None
+
+    @property
+    def sampling_time(self) -> float | None:
+        """T_s [s] of a law of samples; None in continuous time."""
+        return float(self.sampling.step) if self.sampling else None
 
     @abstractmethod
     def pressure(self, signals: Signals) -> sp.Expr:

@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 
 import sympy as sp
 
-from quakedesign.controllers.base import Controller, LoopField, Signals
+from quakedesign.controllers.base import Controller, LoopField, Sampling, Signals
 from quakedesign.controllers.feed_forward import NONE, FeedForward
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
@@ -28,6 +28,8 @@ class SlidingMode(Controller):
         μ0N̂0 of eq. ps [m²/kg].
     feedforward : FeedForward
         What is added to ν from what is known of the plant; nothing unless told.
+    sampling : Sampling, optional
+        How it runs as a law of samples; None for the law in continuous time, which any scheme runs.
     """
 
     integral_units: ClassVar[tuple[str, ...]] = ("m/s^2",)
@@ -36,6 +38,7 @@ class SlidingMode(Controller):
     scale: Fraction = Fraction(1)
     divisor: Fraction = Fraction(1)
     feedforward: FeedForward = NONE
+    sampling: Sampling | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
-from quakedesign.controllers import Controller, LoopField, Signals
+from quakedesign.controllers import Controller, LoopField, Sampling, Signals
 from quakedesign.errors import UnsupportedError
 from quakedesign.loop.laws import LinearLaw
 from quakedesign.rationals import to_sympy
@@ -44,9 +44,9 @@ class SampledController(Controller):
         return partial(type(self), law=self.law, step=self.step), ()
 
     @property
-    def sampling_time(self) -> float:
-        """T_s [s]."""
-        return float(self.step)
+    def sampling(self) -> Sampling:
+        """By the scheme ``explicit``, once every T_s."""
+        return Sampling(step=self.step)
 
     @property
     def gain_units(self) -> Mapping[str, str]:  # type: ignore[override]

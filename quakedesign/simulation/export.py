@@ -20,6 +20,7 @@ from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.run import library_versions
 
 SOURCE, HEADER = "controller.c", "controller.h"
+_TOLD = ("gains", "sampling")  # in other words
 
 
 def controller_step(
@@ -35,8 +36,9 @@ def controller_step(
     step : float, optional
         T_s [s]; that of a law of samples, or the fault's sampling time, unless given.
     scheme : str or Scheme, optional
-        One that samples; ``explicit`` unless given. Of its measurement the part that runs on the controller is kept:
-        with a `Sensor` the slip is measured alone, else slip and slip rate, if the step uses it.
+        One that samples; that of a law of samples, or ``explicit``, unless given. Of its measurement the part that runs
+        on the controller is kept: with a `Sensor` the slip is measured alone, else slip and slip rate, if the step uses
+        it.
 
     Returns
     -------
@@ -48,10 +50,10 @@ def controller_step(
         For a scheme that does not sample, an actuator with a motion of its own, or a step that is not positive or not
         that of the sensor.
     """
-    scheme, step = own_way(controller, scheme, step)
+    scheme, step, own = own_way(controller, scheme, step)
     period = fault.sampling_time if step is None else step
     require_positive(step=period)
-    chosen = _software(simulation_scheme(scheme) if isinstance(scheme, str) else scheme)
+    chosen = _software(simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme)
     loop, measurement = ClosedLoop(fault, controller), {"slip": "m", "slip_rate": "m/s"}
     if isinstance(chosen.measurement, Sensor) or not _uses_rate(_function(loop, chosen, float(period), 2)[0]):
         measurement.pop("slip_rate")
@@ -161,7 +163,7 @@ def _after(loop: ClosedLoop, scheme: Sampled, counter: Any, state: Any, step: fl
 
 def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, str]:
     gains = {f"gain {n}": f"{v} {controller.gain_units[n]}" for n, v in controller.gains.items()}
-    rest = {f.name: _text(getattr(controller, f.name)) for f in fields(controller) if f.name != "gains"}
+    rest = {f.name: _text(getattr(controller, f.name)) for f in fields(controller) if f.name not in _TOLD}
     found = {"fault": fault.name, "law": controller.title, "source": controller.source, **gains, **rest}
     found |= {"scheme": scheme.name} | {name: str(value) for name, value in scheme.settings.items()}
     return found | library_versions("quakedesign", "casadi")

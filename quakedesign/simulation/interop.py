@@ -2,13 +2,18 @@
 
 from typing import Any
 
-from quakedesign.controllers import Controller
+from quakedesign.controllers import Controller, Sampling
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
+from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.steps.control_step import control_step
+from quakedesign.loop.steps.sampled_law import Law
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_numpy
+
+_SEEN = ("slip", "slip_rate", "r", "r_rate")
 
 
 def to_casadi(fault: Fault, controller: Controller | None = None) -> Any:
@@ -113,9 +118,11 @@ def _controller_system(controller: Controller) -> Any:
     import control
     import numpy as np
 
+    if controller.sampling is not None:
+        return _sampled_system(controller, controller.sampling)
     symbols = integral_symbols(controller)
     pressure, rates = law_expressions(controller)
-    inputs = {"slip": plant.x1, "slip_rate": plant.x2, "r": r, "r_rate": r_rate}
+    inputs = dict(zip(_SEEN, (plant.x1, plant.x2, r, r_rate), strict=True))
     if pressure.has(r_acceleration):
         inputs["r_acceleration"] = r_acceleration
 
@@ -123,16 +130,54 @@ def _controller_system(controller: Controller) -> Any:
         given = dict(zip((*inputs.values(), *symbols), (*u, *x), strict=True))
         return np.array([float(value) for value in to_numpy(expressions, given)])
 
-    def later(x: Any, u: Any) -> Any:
-        found = values(rates, x, u)
-        return found if controller.sampling_time is None else x + controller.sampling_time * found
-
     return control.NonlinearIOSystem(
-        lambda t, x, u, _: later(x, u),
+        lambda t, x, u, _: values(rates, x, u),
         lambda t, x, u, _: values([pressure], x, u),
-        dt=controller.sampling_time or 0,
+        dt=0,
         name=controller.name,
         inputs=list(inputs),
         outputs=["p"],
         states=[symbol.name for symbol in symbols],
+    )
+
+
+def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
+    """One step of the law's own scheme; states are the law's, and what the scheme keeps from one sample to the next."""
+    import casadi as ca
+    import control
+
+    scheme: Any = simulation_scheme(sampling.scheme, **{name: float(value) for name, value in sampling.settings})
+    found, unknown = control_step(scheme.__class__, Law.of(controller, 0.0)), ca.SX.sym("unknown")
+    own = [symbol.name for symbol in integral_symbols(controller)]
+    names = [*own, *(f"memory_{i}" for i in range(len(scheme.starts))), "held"]
+    state, seen = ca.SX.sym("state", len(names)), ca.SX.sym("seen", len(_SEEN))
+    signals = [
+        seen[:2],
+        seen[:2] - seen[2:],
+        *[unknown] * 3,
+        float(sampling.step),
+        scheme.authority or unknown,
+        state[-1],
+    ]
+    numbers = ca.DM(found.numbers)
+    pressure, after, kept, _ = found.function(ca.vertcat(*signals), state[: len(own)], numbers, state[len(own) : -1])
+    later = ca.vertcat(after, kept, pressure)
+    if ca.depends_on(later, unknown):  # r'', what r and r' will be, or B0
+        raise UnsupportedError(
+            "a system without a fault knows neither its input gain nor what comes next. Received a law for the scheme "
+            f"{sampling}, which asks for them. Use simulate, or export it."
+        )
+    used = [i for i in range(len(names)) if ca.depends_on(later, state[i]) and not ca.is_equal(later[i], state[i])]
+    fixed = [i for i in range(len(names)) if i not in used]
+    starts = ca.DM([*[0.0] * len(own), *scheme.starts, 0.0])
+    later, pressure = ca.substitute([later[used], pressure], [state[fixed]], [ca.SX(starts[fixed])])
+    step = ca.Function("step", [state[used], seen], [later, pressure])
+    return control.NonlinearIOSystem(
+        lambda t, x, u, _: step(x, u)[0].full().ravel(),
+        lambda t, x, u, _: step(x, u)[1].full().ravel(),
+        dt=float(sampling.step),
+        name=controller.name,
+        inputs=list(_SEEN),
+        outputs=["p"],
+        states=[names[i] for i in used],
     )

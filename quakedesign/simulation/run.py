@@ -32,17 +32,19 @@ def sampled_scheme(
     substeps: int = 1,
     actuator: Actuator | None = None,
     measurement: Measurement | Sensor | None = None,
+    **numbers: Any,
 ) -> Scheme:
     """Scheme with what lies around the controller, as `simulate` takes it.
 
-    An actuator without stages and a measurement without noise are none, which every scheme takes.
+    An actuator without stages and a measurement without noise are none, which every scheme takes. The numbers are those
+    that a law of samples has for its scheme, see `own_way`.
 
     Raises
     ------
     ParameterError
         For an unknown name, for settings that the scheme does not have, or that are given beside a scheme.
     """
-    settings: dict[str, Any] = {"substeps": substeps} if substeps != 1 else {}
+    settings: dict[str, Any] = numbers | ({"substeps": substeps} if substeps != 1 else {})
     settings |= {"actuator": actuator} if actuator is not None and actuator.stages else {}
     settings |= {"measurement": measurement} if measurement is not None and measurement.noisy else {}
     if isinstance(scheme, str):

@@ -52,8 +52,8 @@ def simulate(
         Length of one step [s]; that of a law of samples, or the fault's sampling time, unless given.
     scheme : str or Scheme, optional
         How the law is carried out over a step, by name, or set as wanted; see `quakedesign.loop.schemes`. All but
-        ``"continuous"`` measure and decide once per step and hold the pressure in between. Unless given, ``"explicit"``
-        for a law of samples, which has no other, and ``"continuous"`` for others.
+        ``"continuous"`` measure and decide once per step and hold the pressure in between. Unless given, that of a law
+        of samples, which has no other, and ``"continuous"`` for others.
     method : str
         Integrator with a fixed step, or, for smooth loops, ``"cvodes"`` or ``"idas"`` with a step of its own choice;
         see `quakedesign.simulation.integrators`. The latter answer at every multiple of `step`, where the run is
@@ -106,14 +106,14 @@ def simulate(
         cannot go on, or when the checkpoint is that of another run.
     """
     require_fault(fault).require_memoryless("a controlled run")
-    scheme, step = own_way(controller, scheme, step, "continuous")
+    scheme, step, own = own_way(controller, scheme, step, "continuous")
     setting = Setting.of(fault, step, duration, samples, settled_from)
     if variation:
         variation.require_within(fault)
     factors = variation.values if variation else ()
     criterion = OutcomeCriterion.of(fault, natural_peak(fault))
     loop = loop_class(plant)(fault, controller, load=load or Load(), factors=factors)
-    recorder = Recorder(loop, sampled_scheme(scheme, substeps, actuator, measurement), setting.step)
+    recorder = Recorder(loop, sampled_scheme(scheme, substeps, actuator, measurement, **own), setting.step)
     chosen = any_integrator(method)
     if issubclass(chosen, AdaptiveIntegrator):
         return run_adaptive(recorder, setting, chosen, criterion, rtol=rtol, progress=progress, checkpoint=checkpoint)

@@ -34,7 +34,7 @@ def export_answer(
     fault, law, folder, step, force
         As in `quakedesign.simulation.export_controller`.
     scheme : str, optional
-        ``explicit`` unless given.
+        That of a law of samples, or ``explicit``, unless given.
     differentiator_bound : float, optional
         λ_d [m/s^(n_d + 1)] of a differentiator; the law then is told its estimates.
     differentiator_order : int
@@ -53,10 +53,10 @@ def export_answer(
     ------
     ParameterError, OutputError
     """
-    way, step = own_way(law, scheme, step)
+    way, step, own = own_way(law, scheme, step)
     period = fault.sampling_time if step is None else step
     seen = sensor(period, EXACT, differentiator_bound, filter_order, order=differentiator_order, averaging=averaging)
-    chosen = sampled_scheme(way, measurement=seen)
+    chosen = sampled_scheme(way, measurement=seen, **own)
     found = export_controller(fault, law, folder, step=step, scheme=chosen, force=force)
     premises = []
     if isinstance(seen, OutputFeedback):

@@ -42,25 +42,28 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
 
 def own_way(
     controller: Controller | None, scheme: str | Scheme | None, step: float | None, usual: str = "explicit"
-) -> tuple[str | Scheme, float | None]:
-    """Scheme and step of a run: those that are asked for, else the usual scheme; a law of samples has its own.
+) -> tuple[str | Scheme, float | None, dict[str, Any]]:
+    """Scheme and step of a run, as asked for, else the usual scheme; a law of samples has its own, and settings for it.
 
     Raises
     ------
     ParameterError
         When a law of samples is asked to run otherwise.
     """
-    own = controller.sampling_time if controller else None
+    own = controller.sampling if controller else None
     if own is None:
-        return usual if scheme is None else scheme, step
-    chosen = "explicit" if scheme is None else scheme
+        return usual if scheme is None else scheme, step, {}
+    chosen, period = own.scheme if scheme is None else scheme, float(own.step)
+    wanted, named = {key: float(value) for key, value in own.settings}, isinstance(chosen, str)
+    told = wanted if isinstance(chosen, str) else {key: getattr(chosen, key, None) for key in wanted}
     name = chosen if isinstance(chosen, str) else chosen.name
-    if name != "explicit" or step not in (None, own):
+    if (name, told) != (own.scheme, wanted) or step not in (None, period):
+        received = "".join(f", {key} {value!r}" for key, value in told.items() if not named)
         raise ParameterError(
-            f"a law of samples runs with the scheme explicit and the step {own!r} s it was designed for. Received "
-            f"{name} and {own if step is None else step!r} s. Leave scheme and step out."
+            f"a law of samples runs with the scheme {own} and the step {period!r} s it was designed for. Received "
+            f"{name}{received} and {period if step is None else step!r} s. Leave scheme and step out."
         )
-    return chosen, own
+    return chosen, period, wanted if named else {}
 
 
 check_arguments(__name__)

@@ -76,11 +76,11 @@ def campaign_problem(
         When a value is out of range, or a scheme or integrator is unknown.
     """
     require_seed(seed)
-    scheme, step = own_way(controller, scheme, step)
+    scheme, step, own = own_way(controller, scheme, step)
     return Problem(
         fault=fault,
         controller=controller,
-        scheme=simulation_scheme(scheme) if isinstance(scheme, str) else scheme,
+        scheme=simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme,
         setting=Setting.of(fault, step, duration, 1, settled_from),
         method=integrator(method),
         plant=plant,
