@@ -15,7 +15,8 @@
 # # Closed loop, sampling and sensing
 #
 # A proof speaks about continuous time and exact states. A computer measures every $T_s$, holds its pressure in between, and reads a noisy slip.
-# This page shows what that costs, what helps, and how a controller leaves the computer as C.
+# This page shows what that costs, what helps, and how a controller leaves the computer as C. The gains are designed in continuous time, so that every way to
+# run them may be tried; without `continuous` a design has its own, with a guarantee (notebook 01).
 
 # %%
 import tempfile
@@ -29,7 +30,7 @@ import quakedesign as qd
 from quakedesign import simulation as sim
 
 fault = qd.load_fault("real-fault")
-design = qd.design(fault, "cta")
+design = qd.design(fault, "cta", continuous=True)
 law = design.controller
 print(design.verdict, {name: f"{float(value):.4g}" for name, value in design.gains.items()})
 

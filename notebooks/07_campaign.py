@@ -32,11 +32,11 @@ print(design.verdict, {name: f"{float(value):.4g}" for name, value in design.gai
 
 # %% [markdown]
 # ## The question
-# The laboratory fault for 20 s at its own T_s of 1 ms, sampled with the `compensated` scheme. Sample i is a point of a scrambled Sobol' sequence and
+# The laboratory fault for 20 s, with the law as it was designed: sampled every millisecond. Sample i is a point of a scrambled Sobol' sequence and
 # depends on the seed and on i alone: stiffness, viscosity, effective area and friction within ±10 %, amplitude and phase of the disturbance.
 
 # %%
-problem = campaign_problem(fault, design.controller, scheme="compensated", step=1e-3, duration=20.0, seed=7)
+problem = campaign_problem(fault, design.controller, duration=20.0, seed=7)
 folder = tempfile.TemporaryDirectory()
 half = run_campaign(problem, 16, Path(folder.name) / "campaign", executor=ThreadPoolExecutor(2), batch=8)
 print(half.quantiles()["max_slip_rate_error"])
@@ -56,12 +56,12 @@ print("the same digits in batches of another size:", same)
 
 # %% [markdown]
 # ## The worst samples
-# Any of them can be run again by its number, as a trajectory with everything in it.
+# Any of them can be run again by its number, as a trajectory with everything in it. None may leave what is guaranteed for all faults of the box.
 
 # %%
 metric = "max_slip_rate_error"
 worst = whole.worst(metric)
-print(worst)
+print(worst, f"guaranteed: {design.guarantee.claims.slip_rate_error:.3g} m/s", sep="\n")
 figure = whole.plot()
 
 # %%
@@ -75,4 +75,4 @@ print(f"sample {index}: {values[index]:.4g} m/s in the campaign, {trajectory.met
 
 # %%
 assert same and whole.resumed and not whole.failures
-assert trajectory.metrics.max_slip_rate_error == values[index]
+assert trajectory.metrics.max_slip_rate_error == values[index] <= design.guarantee.claims.slip_rate_error

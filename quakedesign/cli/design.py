@@ -1,6 +1,6 @@
 """The main job."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,21 +22,24 @@ from quakedesign.errors import ParameterError, UnknownNameError
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class LinearOptions:
-    """How the e-LQR is designed.
+class DesignOptions:
+    """How controllers are designed.
 
     Parameters
     ----------
     objective
-        Of the e-LQR: tracking, or peak for the smallest guaranteed slip-rate error.
+        tracking, or peak for the smallest guaranteed slip-rate error.
     continuous
-        Design the e-LQR in continuous time, as in the paper, in place of the loop that samples and holds.
+        Design in continuous time, as in the paper, in place of the loop that samples and holds with a guarantee.
     measured
         What the e-LQR that samples is told: slip-and-rate, or slip, from which it estimates the slip rate.
     slip_noise
         Bound of the error of the slip that it is told, such as '1 um', in its guarantee and in its run.
     rate_noise
         The same of the slip rate.
+    scheme
+        Of the runs of gains designed with --continuous: continuous (unless given), as in the paper, or sampled and
+        held: explicit, implicit, semi-implicit, compensated. Others run as they were designed.
     """
 
     objective: Literal["tracking", "peak"] = "tracking"
@@ -44,24 +47,31 @@ class LinearOptions:
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate"
     slip_noise: ExactMetres = "0"
     rate_noise: ExactMetresPerSecond = "0"
+    scheme: str | None = None
 
     def told(self, names: list[str]) -> dict[str, Any]:
-        """Options of `quakedesign.design`, for laws that have them.
+        """Options of `designed_comparison`.
 
         Raises
         ------
         ParameterError
-            When no e-LQR is designed.
+            For a scheme of designs that have their own, or options of the e-LQR when none is designed.
         """
-        if self != LinearOptions() and "elqr" not in names:
+        if self.scheme is not None and not self.continuous:
             raise ParameterError(
-                "--continuous, --objective, --measured and noise are for the e-LQR. "
-                f"Received --controller {', '.join(names)}. Leave them out."
+                f"--scheme is for gains designed with --continuous, others run as guaranteed. Received {self.scheme}. "
+                "Give both, or none."
             )
-        return asdict(self)
+        linear = {"measured": self.measured, "slip_noise": self.slip_noise, "rate_noise": self.rate_noise}
+        if linear != {"measured": "slip-and-rate", "slip_noise": "0", "rate_noise": "0"} and "elqr" not in names:
+            raise ParameterError(
+                f"--measured and noise are for the e-LQR. Received --controller {', '.join(names)}. Leave them out."
+            )
+        shared = {"objective": self.objective, "continuous": self.continuous}
+        return {"options": shared, "linear": linear, "scheme": self.scheme}
 
 
-_AS_USUAL = LinearOptions()
+_AS_USUAL = DesignOptions()
 
 
 @app.command
@@ -71,8 +81,7 @@ def design(
     *,
     controller: str = "all",
     box: str | None = None,
-    linear: LinearOptions = _AS_USUAL,
-    scheme: str | None = None,
+    options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     out: Path | None = None,
     force: Force = False,
@@ -80,8 +89,9 @@ def design(
 ) -> int:
     """Derive, synthesise, prove, simulate, compare with the published gains, and write a report.
 
-    Exit code 0 if every designed controller is proved, for the fault's T_s, its premise along the reference holds, and
-    its run is neither an earthquake nor diverges nor opens the fault; 1 otherwise.
+    Every designed controller runs as it is guaranteed: sampled, held over T_s. Exit code 0 if every one is proved, for
+    the fault's T_s, and its run is neither an earthquake nor diverges nor opens the fault; with --continuous, if its
+    premise along the reference holds as well; 1 otherwise.
 
     Parameters
     ----------
@@ -91,11 +101,8 @@ def design(
         cta, dia, elqr or all.
     box
         Uncertainty box: paper or ten-percent.
-    scheme
-        Of the runs of designed gains: continuous (unless given), as in the paper, or sampled and held: explicit,
-        implicit, semi-implicit, compensated. The e-LQR that samples runs as it was designed.
     published_scheme
-        Of the runs of published gains.
+        Of the runs of published gains, see --scheme.
     out
         Folder to write; ./quakedesign-FAULT unless given.
     force
@@ -107,7 +114,7 @@ def design(
     from quakedesign.report.folder import prepare
 
     names = controllers(controller)
-    options = linear.told(names)
+    told = options.told(names)
     found = load_fault(fault, box=box)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
@@ -115,14 +122,7 @@ def design(
     from quakedesign.report.folder import write_folder
 
     with progress() as tell:
-        comparison = designed_comparison(
-            found,
-            names,
-            tell,
-            linear=options,
-            scheme=scheme,
-            published_scheme=published_scheme,
-        )
+        comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
         results = write_folder(comparison, folder, force=force, tell=tell)
     if json:
         print_json(results)
@@ -153,7 +153,7 @@ def positive(comparison: Any) -> bool:
     needed = {"along_reference", "control_coefficient", "friction_slope", "sampling_time"}
     return all(
         str(entry.design.verdict) == "proved"
-        and all(p.holds for p in entry.design.premises if p.name in needed)
+        and all(p.holds for p in entry.design.conditions if p.name in needed)
         and (entry.run is None or entry.run.outcome.harmless)
         for entry in comparison.of("designed")
     )

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from quakedesign.cli.design import LinearOptions, controllers, positive
+from quakedesign.cli.design import DesignOptions, controllers, positive
 from quakedesign.cli.shared import Force, Json, app, console, print_json, print_lines, progress
 
-_AS_USUAL = LinearOptions()
+_AS_USUAL = DesignOptions()
 
 
 @app.command
@@ -15,15 +15,13 @@ def compare(
     *,
     controller: str = "all",
     box: str | None = None,
-    linear: LinearOptions = _AS_USUAL,
-    scheme: str | None = None,
+    options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     json: Json = False,
 ) -> int:
     """Design, prove, simulate and compare with the published gains as `design` does, and write nothing.
 
-    Exit code as `design`: 0 if every designed controller is proved, its premise along the reference holds, and its run
-    is neither an earthquake nor diverges nor opens the fault.
+    Exit code as `design`.
 
     Parameters
     ----------
@@ -33,11 +31,8 @@ def compare(
         Law to design: cta, dia, elqr or all.
     box
         Uncertainty box: paper or ten-percent.
-    scheme
-        Of the runs of designed gains: continuous (unless given), as in the paper, or sampled and held: explicit,
-        implicit, semi-implicit, compensated. The e-LQR that samples runs as it was designed.
     published_scheme
-        Of the runs of published gains.
+        Of the runs of published gains, see --scheme.
     json
         Print JSON with the keys of design's results.json.
     """
@@ -47,11 +42,9 @@ def compare(
     from quakedesign.report.numbers import printed, printed_lines, table
 
     names, found = controllers(controller), load_fault(fault, box=box)
-    options = linear.told(names)
+    told = options.told(names)
     with progress() as tell:
-        comparison = designed_comparison(
-            found, names, tell, linear=options, scheme=scheme, published_scheme=published_scheme
-        )
+        comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
     if json:
         beside = {"numbers": table(comparison), "printed": printed(comparison)}
         print_json({**results(comparison, stored=False), **beside})
@@ -70,8 +63,7 @@ def figures(
     *,
     controller: str = "all",
     box: str | None = None,
-    linear: LinearOptions = _AS_USUAL,
-    scheme: str | None = None,
+    options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     out: Path | None = None,
     force: Force = False,
@@ -89,11 +81,8 @@ def figures(
         Law to design: cta, dia, elqr or all.
     box
         Uncertainty box: paper or ten-percent.
-    scheme
-        Of the runs of designed gains: continuous (unless given), as in the paper, or sampled and held: explicit,
-        implicit, semi-implicit, compensated. The e-LQR that samples runs as it was designed.
     published_scheme
-        Of the runs of published gains.
+        Of the runs of published gains, see --scheme.
     out
         Folder to write; ./quakedesign-FAULT unless given.
     force
@@ -105,7 +94,7 @@ def figures(
     from quakedesign.report.folder import prepare, write_folder
 
     names, found = controllers(controller), load_fault(fault, box=box)
-    options = linear.told(names)
+    told = options.told(names)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
@@ -114,16 +103,14 @@ def figures(
     from quakedesign.report.paper_study import paper_study
 
     with progress() as tell:
-        comparison = designed_comparison(
-            found, names, tell, linear=options, scheme=scheme, published_scheme=published_scheme
-        )
+        comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
         study = paper_study(comparison, progress=tell)
         results = write_folder(comparison, folder, force=force, study=study, tell=tell)
     if json:
         print_json(results)
         return 0
-    told = ((e.label, "; ".join(run_sentences(e.run, found))) for e in comparison.entries if e.run)
-    print_lines(f"{label}: {said}" for label, said in told)
+    runs = ((e.label, "; ".join(run_sentences(e.run, found))) for e in comparison.entries if e.run)
+    print_lines(f"{label}: {said}" for label, said in runs)
     files = [(drawn["file"], drawn["paper"]) for drawn in results["figures"].values()]
     print_lines(f"{folder}/{file}" + (f": {paper} of the paper" if paper else "") for file, paper in files)
     print_lines(printed_lines(results["printed"]))

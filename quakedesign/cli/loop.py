@@ -60,18 +60,18 @@ def simulate(
     controller
         none, cta, dia or elqr.
     gains
-        published, designed, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min).
     scale
         λ of a sliding mode in place of that of the gains, decimal or p/q.
     feedforward
-        none, nominal or centred: what a sliding mode adds to ν from what is known of the fault.
+        none, nominal or centred: what a sliding mode adds to ν from what is known of the fault; not to designed gains.
     step
         Length of one step; the fault's sampling time unless given.
     duration
         The operation time unless given. Without a controller: the fault under its own disturbance.
     scheme
         continuous (unless given; the law in every stage of the integrator), or sampled and held: explicit, implicit,
-        semi-implicit, compensated. The designed e-LQR is sampled and has its own.
+        semi-implicit, compensated. Designed laws are sampled and have their own.
     weight
         Of the estimate of the disturbance in the scheme compensated, above 0, at most 1.
     authority
@@ -189,7 +189,7 @@ def sampling(
     controller
         cta, dia or elqr.
     gains
-        designed, published, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+        designed (in continuous time), published, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
     scale
         Further values of λ for a sliding mode, decimal or p/q.
     schemes
@@ -207,7 +207,7 @@ def sampling(
     from quakedesign.report.folder import prepare
     from quakedesign.report.sampling import print_sampling, write_sampling
     from quakedesign.studies.sampling import sampling_report
-    from quakedesign.studies.single import DESIGNED, chosen_controller
+    from quakedesign.studies.single import CONTINUOUS, DESIGNED, chosen_controller
     from quakedesign.synthesis import design
 
     found = load_fault(fault)
@@ -216,8 +216,8 @@ def sampling(
     with progress() as tell:
         tell("gains", 0.0)
         law = (
-            design(found, controller, continuous=controller == "elqr")
-            if gains == DESIGNED
+            design(found, controller, continuous=True)
+            if gains in (DESIGNED, CONTINUOUS)
             else chosen_controller(found, controller, gains)
         )
         report = sampling_report(found, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
@@ -255,7 +255,7 @@ def export(
     controller
         cta, dia or elqr.
     gains
-        published, designed, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min).
     scale
         λ of a sliding mode in place of that of the gains, decimal or p/q.
     feedforward

@@ -64,7 +64,8 @@ def compare(
         Add the paper's gains, where the fault has any, with their verdicts and premises.
     scheme, published_scheme : str
         Of the runs of designed and of published gains, see `quakedesign.loop.schemes`; ``continuous``, as in the
-        paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed.
+        paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed, as all
+        designs do that are not continuous.
     progress : callable, optional
         Called with what is being done and the fraction done [-].
 
@@ -82,6 +83,7 @@ def designed_comparison(
     names: Iterable[str],
     tell: Callable[[str, float], None],
     *,
+    options: Mapping[str, Any] | None = None,
     linear: Mapping[str, Any] | None = None,
     **schemes: Any,
 ) -> Comparison:
@@ -93,8 +95,10 @@ def designed_comparison(
     names : iterable of str
     tell : callable
         Progress.
+    options : mapping, optional
+        ``objective`` and ``continuous`` of `quakedesign.design`.
     linear : mapping, optional
-        Options of `quakedesign.design` for an e-LQR.
+        Its further options for an e-LQR.
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """
@@ -103,5 +107,6 @@ def designed_comparison(
     designs, wanted = [], list(names)
     for i, name in enumerate(wanted):
         tell(f"synthesis and proof of {name}", i / len(wanted))
-        designs.append(synthesise(fault, name, **(linear or {} if name == "elqr" else {})))
+        further = linear or {} if name == "elqr" else {}
+        designs.append(synthesise(fault, name, **(options or {}), **further))
     return compare(fault, designs, progress=tell, **schemes)

@@ -37,7 +37,7 @@ def _guaranteed(found: Guarantee) -> str:
 
 
 def _unmet(entry: "Entry") -> str:
-    failing = [_failing(p) for p in entry.design.premises if not p.holds]
+    failing = [_failing(p) for p in entry.design.conditions if not p.holds]
     return f", but {'; '.join(failing)}" if failing else ""
 
 

@@ -52,11 +52,13 @@ def headline(entry: "Entry") -> str:
     parts = [
         *(run_sentences(entry.run, design.fault) if entry.run else ()),
         verdict,
-        *_broken(design.premises),
+        *_broken(design.conditions),
         *([] if sampled else _held(entry.run)),
     ]
-    if design.verdict is Verdict.PROVED and all(p.holds for p in design.premises):
+    if design.verdict is Verdict.PROVED and all(p.holds for p in design.conditions):
         parts.append("every premise holds")
+    if sampled and design.certificate is not None:
+        parts.append("its base gains are proved in continuous time too")
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
         parts.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
     if entry.growth_per_step is not None:

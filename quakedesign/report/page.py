@@ -43,7 +43,8 @@ img{max-width:100%}code{background:#f3f3f3;padding:0 .2rem}</style></head><body>
 <p>Gains: {% for n, v in e.design.gains.items() %}<code>{{ n }} = {{ number(v) }}</code> {% endfor %}</p>
 <table><thead><tr><th>premise</th><th>note</th><th>required</th><th>certified</th><th>ratio</th>
 <th>holds</th></tr></thead>
-<tbody>{% for p in e.design.premises %}<tr><td>{{ p.name }}</td><td>{{ p.note }}</td>
+<tbody>{% for p in e.design.premises %}<tr><td>{{ p.name }}</td>
+<td>{{ "" if p in e.design.conditions else "certificate in continuous time: " }}{{ p.note }}</td>
 <td>{{ p.sides[0] }}</td><td>{{ p.sides[1] }}</td>
 <td>{{ "–" if p.ratio is none else "{:.3g}".format(p.ratio) }}</td><td>{{ "yes" if p.holds else "no" }}</td></tr>
 {% endfor %}</tbody></table>

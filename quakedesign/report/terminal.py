@@ -40,7 +40,12 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
             console.print(line, end="\n  ")
         console.print(headline(entry))
         console.print(f"  gains: {gains or 'none'}")
-        for premise in entry.design.premises:
+        for premise in entry.design.conditions:
+            console.print(f"  {_line(premise)}")
+        others = [premise for premise in entry.design.premises if premise not in entry.design.conditions]
+        if others:
+            console.print("  of the certificate of its base gains, in continuous time:")
+        for premise in others:
             console.print(f"  {_line(premise)}")
         if entry.design.domain is not None:
             console.print(f"  {domain_sentence(entry.design.domain)}")

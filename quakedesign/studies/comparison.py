@@ -132,13 +132,14 @@ def compared(
     for found in designs:
         entry = _entry("designed", found, schemes, tell)
         tell(f"{entry.label}: worst cases", 0.0)
-        entries.append(replace(entry, answer=attacked(fault, found.guarantee)))
+        answer = replace(attacked(fault, found.guarantee), compensation=found.compensation)
+        entries.append(replace(entry, answer=answer))
     return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
 
 
 def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell) -> Entry:
-    sampled = design.controller is not None and design.controller.sampling_time is not None
-    scheme = "explicit" if sampled else schemes[origin]
+    sampling = design.controller.sampling if design.controller else None
+    scheme = sampling.scheme if sampling else schemes[origin]
     differ = len(set(schemes.values())) > 1
     label = f"{design.title} ({origin}, {scheme})" if differ else f"{design.title} ({origin})"
     if design.controller is None:
@@ -147,41 +148,44 @@ def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell) 
     run = simulate(
         design.fault, design.controller, scheme=scheme, measurement=told, progress=lambda done: tell(label, done)
     )
-    continuous = scheme == AS_IN_THE_PAPER
-    if sampled:
-        return Entry(label=label, origin=origin, design=design, run=run)
-    if not isinstance(design.controller, SlidingMode):
-        poles = vertex_poles(sectors(design.fault), list(design.controller.gains.values()))
-        growth = amplification(poles, run.provenance["step"], run.provenance["method"]) if continuous else None
-        tell(f"{label}: held pressure and peaks", 0.0)
-        wanted = CLASSES if origin == "designed" and design.verdict is Verdict.PROVED else ()
-        classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
-        peaks = {kind: design.certified_peaks(kind) for kind in classes}
-        return Entry(
-            label=label,
-            origin=origin,
-            design=design,
-            run=run,
-            growth_per_step=growth,
-            held=design.held_loop(),
-            peaks={kind: found for kind, found in peaks.items() if isinstance(found, ContinuousPeaks)},
-        )
-    bound = float(_lipschitz(design))
-    premise = on_trajectory(design.controller, bound, run)
-    if design.verdict is not Verdict.PROVED or premise is None:
-        return Entry(label=label, origin=origin, design=design, run=run)
+    entry = Entry(label=label, origin=origin, design=design, run=run)
+    if isinstance(design.controller, SlidingMode):
+        return _sliding_mode(entry, design.controller, run, tell)
+    return entry if sampling else _linear(entry, run, tell)
+
+
+def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
+    """A linear law in continuous time: held, and its peaks."""
+    design = entry.design
+    growth = None
+    if run.provenance["scheme"] == AS_IN_THE_PAPER:
+        poles = vertex_poles(sectors(design.fault), list(design.gains.values()))
+        growth = amplification(poles, run.provenance["step"], run.provenance["method"])
+    tell(f"{entry.label}: held pressure and peaks", 0.0)
+    wanted = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
+    classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
+    peaks = {kind: design.certified_peaks(kind) for kind in classes}
+    proved = {kind: found for kind, found in peaks.items() if isinstance(found, ContinuousPeaks)}
+    return replace(entry, growth_per_step=growth, held=design.held_loop(), peaks=proved)
+
+
+def _sliding_mode(entry: Entry, law: SlidingMode, run: Trajectory, tell: Tell) -> Entry:
+    """A sliding mode: |h'| of its run, and in continuous time how often to sample and what a feed-forward would add."""
+    design, bound = entry.design, float(_lipschitz(entry.design, law))
+    premise = on_trajectory(law, bound, run)
+    if design.certificate is None or design.verdict is not Verdict.PROVED or premise is None:
+        return entry
     judged, step = design.with_premise(premise), None
-    variants: tuple[Variant, ...] = ()
-    if origin == "designed":
-        tell(f"{label}: largest sampling time", 0.0)
-        step = largest_sampling_time(design.fault, design.controller, bound) if continuous else None
-        tell(f"{label}: feed-forward", 0.0)
-        variants = design.feedforward_variants()
-    return Entry(label=label, origin=origin, design=judged, run=run, largest_step=step, variants=variants)
+    if entry.origin != "designed" or law.sampling is not None:
+        return replace(entry, design=judged)
+    if run.provenance["scheme"] == AS_IN_THE_PAPER:
+        tell(f"{entry.label}: largest sampling time", 0.0)
+        step = largest_sampling_time(design.fault, law, bound)
+    tell(f"{entry.label}: feed-forward", 0.0)
+    return replace(entry, design=judged, largest_step=step, variants=design.feedforward_variants())
 
 
-def _lipschitz(design: Design) -> Fraction:
-    assert isinstance(design.controller, SlidingMode)
+def _lipschitz(design: Design, law: SlidingMode) -> Fraction:
     if design.certificate is None or design.verdict is not Verdict.PROVED:
-        return design.controller.lipschitz_limit
-    return certified_lipschitz(design.certificate) * design.controller.scale
+        return law.lipschitz_limit
+    return certified_lipschitz(design.certificate) * law.scale

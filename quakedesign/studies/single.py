@@ -20,7 +20,7 @@ from quakedesign.studies.estimation import differentiator_premise
 from quakedesign.studies.on_trajectory import certified_bound, trajectory_premise
 from quakedesign.synthesis import design
 
-PUBLISHED, DESIGNED = ("published",), ("designed",)
+PUBLISHED, DESIGNED, CONTINUOUS = ("published",), ("designed",), ("continuous",)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +65,10 @@ def optional_choice(
 def choice(
     fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
 ) -> Choice:
-    """Controller from a law's name and ``("published",)``, ``("designed",)`` or exact gains.
+    """Controller from a law's name and ``("published",)``, ``("designed",)``, ``("continuous",)`` or exact gains.
+
+    Designed ones run as they are guaranteed, with their own scheme and T_s; those designed in continuous time, as in
+    the paper, run with any.
 
     Parameters
     ----------
@@ -86,6 +89,11 @@ def choice(
         if scale is None and feedforward == "none":
             return Choice(controller=law)
         raise ParameterError(f"a scale and a feed-forward belong to a sliding mode. Received {name}. Leave them out.")
+    if law.sampling is not None and feedforward != "none":
+        raise ParameterError(
+            "a feed-forward has no guarantee with the pressure held over T_s, as designed gains run. "
+            f"Received {feedforward}. Give --gains continuous, or leave it out."
+        )
     scaled = law if scale is None else law.scaled(_rational(scale))
     known = feed_forward(feedforward, fault, scaled.divisor)
     return Choice(
@@ -111,8 +119,8 @@ def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> tuple[Contro
                 "Give --gains designed, or the gains of the law."
             )
         return known[name], None
-    if gains == DESIGNED:
-        found = design(fault, name)
+    if gains in (DESIGNED, CONTINUOUS):
+        found = design(fault, name, continuous=gains == CONTINUOUS)
         if found.controller is None:
             raise ParameterError(f"no gains with a proof were found for {name} on {fault.name}. Give --gains.")
         return found.controller, certified_bound(found)

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
-from quakedesign.certificates.guarantee import Around, task_of
+from quakedesign.certificates.guarantee import Around, Guarantee, NoGuarantee, task_of
 from quakedesign.certificates.linear_premises import linear_premises, sectors
 from quakedesign.certificates.premises import (
     Errors,
@@ -15,13 +15,13 @@ from quakedesign.certificates.premises import (
     least_authority,
     sliding_mode_premises,
 )
-from quakedesign.controllers import Controller, SlidingMode, control_law, family
+from quakedesign.controllers import BaseGains, Controller, SlidingMode, control_law, family
 from quakedesign.controllers.feed_forward import NONE, FeedForward, feed_forward
 from quakedesign.errors import CertificateError, KinkError, ParameterError, UnknownNameError
 from quakedesign.fault import Fault, require_fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.designed import Design
-from quakedesign.synthesis.guaranteed import MEASURED, OBJECTIVES, sampled_design
+from quakedesign.synthesis.guaranteed import MEASURED, OBJECTIVES, guarantee_of, sampled_design, sampled_sliding_mode
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability
 from quakedesign.synthesis.linear.analysis.robust_stability import unstable_vertex, why_undecided
 from quakedesign.synthesis.linear.design.riccati import RiccatiDesign, riccati_design
@@ -49,12 +49,16 @@ def design(
 ) -> Design:
     """Find gains with a proof for a fault.
 
-    2-CTA, 2-DIA: base gains (families.toml) are proved for the fault's range of β and scaled by λ = ρ⁶ (ρ rational,
-    so that every scaled gain is rational) until L̄ exceeds by a tenth what the reference and the disturbance need.
-    e-LQR: feedback with an estimate of the disturbance for the loop as it runs, measured and held over the fault's T_s,
-    or over the longest T_s with a guarantee where the fault's own has none; see `Design.guarantee`. With `continuous`
-    that of the paper: Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant
-    reference in continuous time.
+    All of them run as they are guaranteed, measured and held over the fault's T_s, or over the longest T_s with a
+    guarantee where the fault's own has none; see `Design.guarantee`.
+
+    2-CTA, 2-DIA: base gains (families.toml) are proved in continuous time for the fault's range of β; λ = ρ⁶ (ρ
+    rational, so that every scaled gain is rational), weight and authority of the scheme ``compensated`` are chosen by
+    what is guaranteed. e-LQR: feedback with an estimate of the disturbance.
+
+    With `continuous` those of the paper, without a guarantee of the loop that runs. 2-CTA, 2-DIA: λ grows until L̄
+    exceeds by a tenth what the reference and the disturbance need; so does it where no T_s has a guarantee. e-LQR:
+    Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
 
     Parameters
     ----------
@@ -63,12 +67,12 @@ def design(
         ``"cta"``, ``"dia"`` or ``"elqr"``.
     feedforward : str
         What a sliding mode adds to ν from what is known of the plant: ``"none"``, ``"nominal"`` or ``"centred"``, see
-        `quakedesign.controllers.feed_forward`. It enlarges the certified domain; the e-LQR takes none.
+        `quakedesign.controllers.feed_forward`. It enlarges the certified domain in continuous time and has no guarantee
+        as it runs, so it needs `continuous`; the e-LQR takes none.
     objective : str
-        Of the e-LQR: ``"tracking"`` for small errors under slow disturbances, ``"peak"`` for the smallest guaranteed
-        slip-rate error.
+        ``"tracking"`` for small errors under slow disturbances, ``"peak"`` for the smallest guaranteed slip-rate error.
     continuous : bool
-        For the e-LQR: the paper's design in continuous time.
+        The paper's design in continuous time.
     measured : str
         What the e-LQR of samples is told: ``"slip-and-rate"``, or ``"slip"``, from which it estimates the slip rate.
     slip_noise, rate_noise : str, float or Fraction
@@ -84,7 +88,8 @@ def design(
     UnknownNameError
         For a controller that cannot be designed, or an unknown feed-forward.
     ParameterError
-        For a feed-forward with a law that takes none, options of the e-LQR with another law, or an unknown objective.
+        For a feed-forward with a law that takes none or runs sampled, an unknown objective, or one of a design in
+        continuous time.
     """
     require_fault(fault)
     if controller not in DESIGNABLE:
@@ -93,13 +98,25 @@ def design(
     added = feed_forward(feedforward, fault, least_authority(fault))
     noise = Around(slip_noise=rational(slip_noise, "slip_noise"), rate_noise=rational(rate_noise, "rate_noise"))
     told = measured != MEASURED[0] or any(noise.values())
+    if objective not in OBJECTIVES or (continuous and objective != OBJECTIVES[0]):
+        raise ParameterError(
+            f"objective must be one of {', '.join(OBJECTIVES)}, of designs that are not continuous. Received "
+            f"{objective!r}{' with continuous' if continuous else ''}. Change it."
+        )
     if issubclass(control_law(controller), SlidingMode):
-        if continuous or told or objective != OBJECTIVES[0]:
+        if told:
             raise ParameterError(
-                "continuous, objective, measured and noise are for the e-LQR. Received some of them with "
-                f"{controller}. Leave them out."
+                f"measured and noise are for the e-LQR. Received some of them with {controller}. Leave them out."
             )
-        return _design_sliding_mode(fault, controller, added)
+        if added != NONE and not continuous:
+            raise ParameterError(
+                "a feed-forward has no guarantee with the pressure held over T_s. "
+                f"Received {feedforward!r}. Design with continuous, or leave it out."
+            )
+        base, certificate = _proved_base(fault, controller)
+        if continuous:
+            return _design_scaled(fault, base, certificate, added)
+        return _design_compensated(fault, base, certificate, objective)
     if added != NONE:
         raise ParameterError(
             f"a feed-forward is part of sliding-mode laws. Received {feedforward!r} with {controller}. Leave it out."
@@ -112,29 +129,53 @@ def design(
     return _design_linear(fault) if continuous else _design_sampled(fault, objective, measured, noise)
 
 
-def _design_sliding_mode(fault: Fault, name: str, added: FeedForward) -> Design:
-    divisor = least_authority(fault)
+def _proved_base(fault: Fault, name: str) -> tuple[BaseGains, Certificate | None]:
+    """First base gains of a family that are proved for the fault's range of β, else the first of all."""
+    beta = coefficient_range(fault, least_authority(fault))
     for base in family(name):
-        assert isinstance(base.law, SlidingMode)
-        loop = sliding_mode_loop(base.law, base.lipschitz, coefficient_range(fault, divisor))
-        certificate = find_certificate(loop, control_law(name).loop_field().degree)
-        if certificate is not None:
-            break
-    else:
-        return Design(
-            fault=fault,
-            name=name,
-            verdict=Verdict.UNDECIDED,
-            controller=None,
-            certificate=None,
-            premises=(),
-            details={"reason": "no base gains of the family were proved for the fault's range of β"},
+        certificate = find_certificate(
+            sliding_mode_loop(base.law, base.lipschitz, beta), control_law(name).loop_field().degree
         )
-    needed = required_lipschitz(fault, base.law, divisor, added)
-    rho = smallest_root(needed * _HEADROOM / base.lipschitz)
-    controller = replace(base.law, scale=rho**6, divisor=divisor, feedforward=added)
-    details = {"rho": str(rho), "base_lipschitz": str(base.lipschitz), "base_source": base.source}
-    return _judged(fault, controller, certificate, details)
+        if certificate is not None:
+            return base, certificate
+    return family(name)[0], None
+
+
+def _design_compensated(fault: Fault, base: BaseGains, certificate: Certificate | None, objective: str) -> Design:
+    """Sliding mode as it runs with a guarantee; that in continuous time where no T_s has one."""
+    law = replace(_sliding(base), gains=dict(base.law.gains), divisor=least_authority(fault))
+    made, found = sampled_sliding_mode(task_of(fault), law, rational(fault.sampling_time), objective)
+    if found.runs is None:
+        paper = _design_scaled(fault, base, certificate, NONE)
+        none = NoGuarantee(reason=f"run in the scheme compensated, {found.reason}", small_gain=None)
+        return replace(paper, runs=none, details={"reason": none.reason, **paper.details})
+    details = {
+        "objective": objective,
+        "step": str(found.runs.held.step),
+        "reason": found.reason or None,
+        "rho": str(smallest_root(made.controller.scale)),
+    }
+    judged = _judged(fault, made.controller, certificate, {**details, **_origin(base)}, runs=found.runs)
+    return replace(judged, premises=(*found.premises(), *judged.premises))
+
+
+def _design_scaled(fault: Fault, base: BaseGains, certificate: Certificate | None, added: FeedForward) -> Design:
+    """Sliding mode in continuous time with the smallest scale for the fault's |h'|."""
+    law, divisor = _sliding(base), least_authority(fault)
+    if certificate is None:
+        return _without_gains(fault, law.name, "no base gains of the family were proved for the fault's range of β")
+    rho = smallest_root(required_lipschitz(fault, law, divisor, added) * _HEADROOM / base.lipschitz)
+    scaled = replace(law, gains=dict(law.gains), scale=rho**6, divisor=divisor, feedforward=added)
+    return _judged(fault, scaled, certificate, {"rho": str(rho), **_origin(base)})
+
+
+def _sliding(base: BaseGains) -> SlidingMode:
+    assert isinstance(base.law, SlidingMode)
+    return base.law
+
+
+def _origin(base: BaseGains) -> dict[str, str]:
+    return {"base_lipschitz": str(base.lipschitz), "base_source": base.source}
 
 
 def required_lipschitz(fault: Fault, law: Controller, divisor: Fraction, added: FeedForward = NONE) -> Fraction:
@@ -182,7 +223,7 @@ def _design_linear(fault: Fault) -> Design:
     try:
         found = riccati_design(fault)
     except ParameterError as error:
-        return _without_gains(fault, str(error))
+        return _without_gains(fault, "elqr", str(error))
     loop = linear_loop(fault, found.controller)
     certificate = _of_riccati(loop, found) or quadratic_certificate(loop, theta=found.theta)
     details = {
@@ -216,7 +257,7 @@ def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certifi
 def _design_sampled(fault: Fault, objective: str, measured: str, noise: Around) -> Design:
     found = sampled_design(task_of(fault), rational(fault.sampling_time), objective, measured=measured, **noise)
     if found.runs is None:
-        return _without_gains(fault, found.reason)
+        return _without_gains(fault, "elqr", found.reason)
     held = found.runs.held
     return Design(
         fault=fault,
@@ -234,14 +275,15 @@ def _design_sampled(fault: Fault, objective: str, measured: str, noise: Around) 
         },
         slip_noise=held.slip_noise,
         rate_noise=held.rate_noise,
+        runs=found.runs,
     )
 
 
-def _without_gains(fault: Fault, reason: str) -> Design:
-    """Undecided design of an e-LQR for which no gains were found."""
+def _without_gains(fault: Fault, name: str, reason: str) -> Design:
+    """Undecided design for which no gains were found."""
     return Design(
         fault=fault,
-        name="elqr",
+        name=name,
         verdict=Verdict.UNDECIDED,
         controller=None,
         certificate=None,
@@ -267,11 +309,13 @@ def assess(fault: Fault, controller: Controller) -> Design:
     """Judge given gains on a fault: verdict, certificate and premises.
 
     Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's
-    sectors. A law that certificates cannot express yet is ``UNDECIDED``.
+    sectors. A law that certificates cannot express yet is ``UNDECIDED``. The verdict on a sliding mode of samples is
+    that on its guarantee.
     """
     fault.require_memoryless("a verdict on gains")
     if not isinstance(controller, SlidingMode):
         return _judged_linear(fault, controller, quadratic_certificate(linear_loop(fault, controller)), {})
+    runs = guarantee_of(task_of(fault), controller) if controller.sampling else None
     limit = controller.lipschitz_limit / controller.scale
     beta = coefficient_range(fault, controller.divisor)
     for share in _SHARES if limit > 0 else ():
@@ -284,25 +328,32 @@ def assess(fault: Fault, controller: Controller) -> Design:
         except (CertificateError, KinkError):
             break
         if certificate is not None:
-            return _judged(fault, controller, certificate, {"base_lipschitz": str(limit * share)})
-    return _judged(fault, controller, None, {})
+            return _judged(fault, controller, certificate, {"base_lipschitz": str(limit * share)}, runs)
+    return _judged(fault, controller, None, {}, runs)
 
 
 def _judged(
-    fault: Fault, controller: Controller, certificate: Certificate | None, details: Mapping[str, Any]
+    fault: Fault,
+    controller: Controller,
+    certificate: Certificate | None,
+    details: Mapping[str, Any],
+    runs: Guarantee | NoGuarantee | None = None,
 ) -> Design:
+    """Design with its premises; the verdict is that on the certificate, or of a law of samples on what runs."""
     domain = None
     if isinstance(controller, SlidingMode):
         premises, domain = sliding_mode_premises(fault, controller, certificate)
     else:
         premises = linear_premises(fault, controller, certificate)
+    proved = certificate.check(type(controller)) if certificate is not None else Verdict.UNDECIDED
     return Design(
         fault=fault,
         name=controller.name,
-        verdict=certificate.check(type(controller)) if certificate is not None else Verdict.UNDECIDED,
+        verdict=proved if runs is None else runs.check(),
         controller=controller,
         certificate=certificate,
         premises=tuple(premises),
         domain=domain,
         details=dict(details),
+        runs=runs,
     )

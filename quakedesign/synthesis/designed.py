@@ -15,8 +15,9 @@ from quakedesign.fault import Fault
 from quakedesign.loop import SampledController, summed_integrals
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.rationals import rational
-from quakedesign.synthesis.guaranteed import Compensation, compensated, design_compensated
+from quakedesign.synthesis.guaranteed import Compensation, guarantee_of
 from quakedesign.synthesis.guaranteed.continuous import certified_peaks
+from quakedesign.synthesis.guaranteed.default_design import REACH
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
 
@@ -34,15 +35,18 @@ class Design:
     controller : Controller or None
         None only when no gains with a proof were found.
     certificate : Certificate or None
-        Proof in continuous time for the base gains (λ = 1), or the counterexample; None for a law of samples, whose
-        proof is its `guarantee`.
+        Proof in continuous time for the base gains (λ = 1), or the counterexample; None for a linear law of samples.
+        The verdict on a law of samples is that on its `guarantee`.
     premises : tuple of Premise
+        Of the guarantee of a law of samples (`reach`), and of the certificate.
     domain : Domain or None
         Certified domain of the self-consistent premise on |h'|.
     details : mapping
         What synthesis decided: exact numbers as texts.
     slip_noise, rate_noise : Fraction
         Bounds of what a law of samples is told wrongly of slip [m] and slip rate [m/s].
+    runs : Guarantee or NoGuarantee, optional
+        What was proved of the loop that runs while it was designed; None to find it when `guarantee` is asked for.
     """
 
     fault: Fault
@@ -55,16 +59,21 @@ class Design:
     details: Mapping[str, Any] = field(default_factory=dict)
     slip_noise: Fraction = Fraction(0)
     rate_noise: Fraction = Fraction(0)
+    runs: Guarantee | NoGuarantee | None = None
 
     @property
     def gains(self) -> dict[str, Fraction]:
-        """Exact gains; for a sliding mode also ``scale`` λ, ``divisor`` μ0N̂0 [m²/kg] and a feed-forward that is on."""
+        """Exact gains; for a sliding mode also ``scale`` λ, ``divisor`` μ0N̂0 [m²/kg] and a feed-forward that is on.
+
+        A sliding mode of samples has the numbers of its scheme too, ``weight`` [-] and ``authority`` B0 [m²/kg].
+        """
         law = self.controller
         if not isinstance(law, SlidingMode):
             return dict(law.gains) if law else {}
         added = {} if law.feedforward == NONE else law.feedforward.coefficients
         known = {f"feedforward_{name}": value for name, value in added.items()}
-        return {**law.gains, "scale": law.scale, "divisor": law.divisor, **known}
+        settings = dict(law.sampling.settings) if law.sampling else {}
+        return {**law.gains, "scale": law.scale, "divisor": law.divisor, **known, **settings}
 
     @property
     def title(self) -> str:
@@ -76,6 +85,12 @@ class Design:
         """What the controller is told in a run, with the noise that it is designed for; None without."""
         slip, rate = float(self.slip_noise), float(self.rate_noise)
         return Measurement(slip_noise=slip, rate_noise=rate, bounded=True) if slip or rate else None
+
+    @property
+    def conditions(self) -> tuple[Premise, ...]:
+        """Premises of what is proved first: of the guarantee of a law of samples, of the certificate of another."""
+        sampled = self.controller is not None and self.controller.sampling is not None
+        return tuple(p for p in self.premises if p.name in REACH) if sampled else self.premises
 
     def with_premise(self, premise: Premise) -> "Design":
         """Return the design with one more premise, such as one read off a run."""
@@ -113,16 +128,17 @@ class Design:
     def guarantee(self) -> Guarantee | NoGuarantee:
         """What is proved of the law as it runs, once per T_s, p held; or why nothing.
 
-        A law of samples has its own T_s; the integrals of an e-LQR in continuous time are summed over that of the
-        fault. A sliding mode runs in the scheme ``compensated``: its scale in continuous time is too small for that,
-        see `compensation`. Computed when asked for, in a second or two.
+        A law of samples has its own T_s, a sliding mode of samples runs in the scheme ``compensated``; the integrals of
+        an e-LQR in continuous time are summed over the T_s of the fault. Computed when asked for unless it is known.
         """
         law = self.controller
+        if self.runs is not None:
+            return self.runs
         if isinstance(law, SampledController):
             noise = Around(slip_noise=self.slip_noise, rate_noise=self.rate_noise)
             return guarantee(task_of(self.fault), Held(law=law.law, step=law.step, **noise))
         if isinstance(law, SlidingMode):
-            return self._guarantee_of_sliding_mode(law)
+            return guarantee_of(task_of(self.fault), law)
         summed = isinstance(law, ExtendedLQR) and law.feedback == "error" and law.limits is None and not law.offset
         if law is None or not summed:
             return NoGuarantee(
@@ -132,44 +148,13 @@ class Design:
         held = Held(law=summed_integrals(tuple(law.gains.values()), step), step=step)
         return guarantee(task_of(self.fault), held)
 
-    def compensation(self, objective: str = "tracking") -> Compensation | None:
-        """The base gains of a sliding mode as they run with a guarantee, held over T_s; None for another law.
-
-        Scale, weight and authority for the scheme ``compensated`` are chosen by what is certified, in about a second;
-        a feed-forward is left out.
-
-        Parameters
-        ----------
-        objective : str
-            ``"tracking"``, or ``"peak"`` for the smallest certified slip-rate error.
-
-        Raises
-        ------
-        ParameterError
-            For another objective.
-        """
-        if not isinstance(self.controller, SlidingMode):
+    @property
+    def compensation(self) -> Compensation | None:
+        """A sliding mode of samples with its guarantee; None for another law."""
+        law = self.controller
+        if not isinstance(law, SlidingMode) or law.sampling is None:
             return None
-        task = task_of(self.fault)
-        law = replace(self.controller.with_feedforward(NONE), gains=dict(self.controller.gains), divisor=task.authority)
-        return design_compensated(task, law, rational(self.fault.sampling_time), objective=objective)
-
-    def _guarantee_of_sliding_mode(self, law: SlidingMode) -> Guarantee | NoGuarantee:
-        """Of the scale that it has, in the scheme ``compensated``; a reason says which scale has one."""
-        other, step = self.compensation(), rational(self.fault.sampling_time)
-        assert other is not None
-        found = compensated(task_of(self.fault), law, other.weight, other.authority, step)
-        if isinstance(found, Guarantee):
-            return found
-        reason = f"run in the scheme compensated, {found.reason}"
-        if isinstance(other.found, Guarantee):
-            claims, better = other.found.claims, other.controller
-            reason += (
-                f"; with λ = {better.scale} in place of {float(law.scale):.3g}, divisor {float(better.divisor):.6g} "
-                f"m²/kg, weight {other.weight} and B0 = {float(other.authority):.6g} m²/kg the slip rate never exceeds "
-                f"{claims.peak_slip_rate:.3g} m/s, the slip stays within {claims.slip_error:.3g} m"
-            )
-        return NoGuarantee(reason=reason, small_gain=found.small_gain)
+        return Compensation(controller=law, found=self.guarantee)
 
     def held_loop(self) -> HeldLoop | None:
         """What is decided of an e-LQR when p is held over the fault's sampling time; None for another law."""

@@ -71,11 +71,18 @@ def test_wrong_combinations_are_one_line(case, capsys):
     assert reason in err
 
 
-@pytest.mark.parametrize("option", [("--continuous",), ("--objective", "peak"), ("--slip-noise", "1 um")])
-def test_options_of_the_elqr_are_refused_without_it(capsys, tmp_path, option):
-    code, _, err = run(capsys, "design", "lab-fault", "--controller", "cta", *option, "--out", str(tmp_path / "o"))
+def test_noise_is_refused_without_the_elqr(capsys, tmp_path):
+    options = ("--slip-noise", "1 um", "--out", str(tmp_path / "o"))
+    code, _, err = run(capsys, "design", "lab-fault", "--controller", "cta", *options)
     assert code == 2
-    assert "--continuous, --objective, --measured and noise are for the e-LQR" in err
+    assert "--measured and noise are for the e-LQR" in err
+
+
+def test_an_objective_is_refused_in_continuous_time(capsys, tmp_path):
+    options = ("--continuous", "--objective", "peak", "--out", str(tmp_path / "o"))
+    code, _, err = run(capsys, "design", short(tmp_path), "--controller", "cta", *options)
+    assert (code, len(err.strip().splitlines())) == (2, 1)
+    assert "of designs that are not continuous. Received 'peak' with continuous" in err
 
 
 def short(folder):

@@ -39,10 +39,11 @@ def test_compare_prints_the_keys_of_design_and_writes_nothing(short, capsys, tmp
     assert [p.name for p in tmp_path.iterdir()] == ["short.toml"]
 
 
-def test_a_law_of_samples_is_compared_as_it_was_designed(short, capsys):
-    code, out, _ = run(capsys, "compare", str(short), "--controller", "elqr", "--scheme", "compensated", "--json")
-    found = json.loads(out)["controllers"]["elqr"]
-    assert (code, found["run"]["scheme"], found["held"]) == (0, "explicit", None)
+@pytest.mark.parametrize("command", ["design", "compare", "figures"])
+def test_a_scheme_is_refused_for_laws_of_samples_which_run_as_they_were_designed(command, short, capsys):
+    code, out, err = run(capsys, command, str(short), "--controller", "cta", "--scheme", "compensated")
+    assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
+    assert "--scheme is for gains designed with --continuous" in err
 
 
 def test_designs_are_compared_in_the_scheme_asked_for(short, capsys):
@@ -75,7 +76,7 @@ def test_figures_writes_one_folder_and_says_what_is_in_it(short, capsys, tmp_pat
         ("nowhere",),
         ("lab-fault", "--controller", "pid"),
         ("lab-fault", "--box", "huge"),
-        ("lab-fault", "--scheme", "magic"),
+        ("lab-fault", "--continuous", "--scheme", "magic"),
         ("lab-fault", "--published-scheme", "magic"),
     ],
 )

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import math
+from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
 
@@ -12,10 +13,10 @@ from quakedesign.certificates import certificate_text, load_certificate, loop_of
 from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
-from quakedesign.controllers import law
+from quakedesign.controllers import family, law
 from quakedesign.fault import load_fault
 from quakedesign.sos.exact import files as polynomial_files
-from quakedesign.synthesis.guaranteed import design_held
+from quakedesign.synthesis.guaranteed import design_compensated, design_held
 
 ROOT = Path(__file__).parents[2] / "proofs"
 FILES = sorted((ROOT / "certificates").glob("*.json"))
@@ -49,7 +50,7 @@ SPECIFICATION.loader.exec_module(checker)
 
 def test_the_catalogue_is_complete():
     assert {p.stem for p in LOOPS} == {*STATEMENTS, "elqr_real-fault", "elqr_lab-fault"}
-    assert {p.stem for p in GUARANTEES} == {"guarantee_real-fault", "guarantee_lab-fault"}
+    assert {p.stem for p in GUARANTEES} == {"guarantee_real-fault", "guarantee_lab-fault", "guarantee_cta_real-fault"}
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
 
 
@@ -102,11 +103,17 @@ def test_linear_certificates_cover_their_faults(fault):
 
 @pytest.mark.parametrize("path", GUARANTEES, ids=lambda p: p.stem)
 def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
-    stored, fault = parse_guarantee(path.read_text()), load_fault(path.stem.removeprefix("guarantee_"))
+    name = path.stem.removeprefix("guarantee_").removeprefix("cta_")
+    stored, fault = parse_guarantee(path.read_text()), load_fault(name)
     assert check_files([path], fault.name)[str(path)][0] == "proved"
     assert stored.task == task_of(fault)
     assert stored.held.step == F(str(fault.sampling_time))
-    again = design_held(stored.task, stored.held.step)
+    if "cta" in path.stem:
+        base = replace(family("cta")[0].law, gains=dict(family("cta")[0].law.gains), divisor=stored.task.authority)
+        again = design_compensated(stored.task, base, stored.held.step).found
+        assert again.held.law.root.pull == stored.held.law.root.pull
+    else:
+        again = design_held(stored.task, stored.held.step)
     assert float(again.claims.slip_rate_error) == pytest.approx(float(stored.claims.slip_rate_error), rel=0.02)
     assert float(again.claims.slip_error) == pytest.approx(float(stored.claims.slip_error), rel=0.02)
 

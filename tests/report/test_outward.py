@@ -27,7 +27,7 @@ def linear():
 
 @pytest.fixture(scope="module")
 def sliding():
-    return qd.design(LAB, "cta")
+    return qd.design(LAB, "cta", continuous=True)
 
 
 def outward(bound, text):

@@ -100,7 +100,7 @@ def test_levels_of_noise_follow_from_the_task():
 def promised():
     from quakedesign.synthesis import design
 
-    return sampling_report(REAL, design(REAL, "cta"), scales=("1/1000",))
+    return sampling_report(REAL, design(REAL, "cta", continuous=True), scales=("1/1000",))
 
 
 def errors(row):

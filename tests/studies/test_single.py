@@ -49,7 +49,7 @@ def test_designed_gains_are_those_of_the_design(monkeypatch):
     law = chosen_controller(LAB, "cta", BASE)
     for found in (law, None):
         design = SimpleNamespace(controller=found, certificate=None)
-        monkeypatch.setattr(single, "design", lambda fault, name, design=design: design)
+        monkeypatch.setattr(single, "design", lambda fault, name, design=design, **_: design)
         if found is None:
             with pytest.raises(ParameterError, match="no gains with a proof"):
                 chosen_controller(LAB, "cta", ("designed",))
@@ -105,7 +105,7 @@ def test_a_certified_bound_goes_with_the_scale(monkeypatch):
     from quakedesign.studies import single
 
     law = chosen_controller(LAB, "cta", BASE)
-    monkeypatch.setattr(single, "design", lambda fault, name: law)
+    monkeypatch.setattr(single, "design", lambda fault, name, **_: law)
     monkeypatch.setattr(single, "certified_bound", lambda design: Fraction(9, 10))
     monkeypatch.setattr(type(law), "controller", property(lambda self: self), raising=False)
     found = choice(LAB, "cta", ("designed",), scale="1/3", feedforward="nominal")

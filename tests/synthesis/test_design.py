@@ -52,8 +52,8 @@ SLIDING = [pytest.param(law, v, marks=() if v in SHORT[law] else pytest.mark.slo
 
 
 @pytest.mark.parametrize(("law", "variant"), SLIDING)
-def test_a_sliding_mode_is_proved_with_its_premise_along_the_reference(variants, law, variant):
-    design = qd.design(variants[variant], law)
+def test_a_sliding_mode_in_continuous_time_is_proved_with_its_premise_along_the_reference(variants, law, variant):
+    design = qd.design(variants[variant], law, continuous=True)
     assert design.verdict is Verdict.PROVED
     assert design.certificate.check() is Verdict.PROVED
     premises = {p.name: p for p in design.premises}
@@ -120,7 +120,8 @@ def test_the_same_input_gives_the_same_digits(real):
     first, second = (qd.design(real, "elqr", continuous=True) for _ in range(2))
     assert first.gains == second.gains
     assert first.certificate == second.certificate
-    assert qd.design(real, "cta").certificate == qd.design(real, "cta").certificate
+    first, second = (qd.design(real, "cta", continuous=True) for _ in range(2))
+    assert first.certificate == second.certificate
 
 
 def test_an_unknown_controller_is_one_clear_message(real):
@@ -128,14 +129,23 @@ def test_an_unknown_controller_is_one_clear_message(real):
         qd.design(real, "pid")
 
 
+@pytest.mark.parametrize("law", ["cta", "elqr"])
+def test_options_that_do_not_go_together_are_one_message(real, law):
+    with pytest.raises(ParameterError, match=r"designs that are not continuous\. Received 'peak' with continuous"):
+        qd.design(real, law, continuous=True, objective="peak")
+    with pytest.raises(ParameterError, match="one of tracking, peak"):
+        qd.design(real, law, objective="speed")
+
+
 def test_options_of_the_elqr_are_refused_elsewhere(real):
-    more = ({"measured": "slip"}, {"slip_noise": "1e-6"}, {"rate_noise": 1e-6})
-    for options in ({"continuous": True}, {"objective": "peak"}, *more):
+    for options in ({"measured": "slip"}, {"slip_noise": "1e-6"}, {"rate_noise": 1e-6}):
         with pytest.raises(ParameterError, match="are for the e-LQR"):
             qd.design(real, "cta", **options)
-    for options in more:
         with pytest.raises(ParameterError, match="knows slip and slip rate exactly"):
             qd.design(real, "elqr", continuous=True, **options)
+
+
+def test_a_sliding_mode_has_no_bound_of_peaks_in_continuous_time(real):
     assert "no bound of peaks of 2-CTA" in assess(real, published("real-fault")["cta"]).certified_peaks().reason
 
 

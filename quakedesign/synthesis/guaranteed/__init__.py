@@ -5,10 +5,15 @@ from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.answer import Answer, answer, attacked
 from quakedesign.synthesis.guaranteed.compensated import Compensation, compensated, design_compensated
 from quakedesign.synthesis.guaranteed.continuous import CLASSES, certified_peaks
-from quakedesign.synthesis.guaranteed.default_design import SampledDesign, sampled_design
+from quakedesign.synthesis.guaranteed.default_design import (
+    SampledDesign,
+    sampled_design,
+    sampled_sliding_mode,
+)
 from quakedesign.synthesis.guaranteed.design import OBJECTIVES, design_held
 from quakedesign.synthesis.guaranteed.families import MEASURED
 from quakedesign.synthesis.guaranteed.reach import longest_delay, reached
+from quakedesign.synthesis.guaranteed.sliding import guarantee_of
 
 __all__ = [
     "CLASSES",
@@ -24,9 +29,11 @@ __all__ = [
     "compensated",
     "design_compensated",
     "design_held",
+    "guarantee_of",
     "longest_delay",
     "reached",
     "sampled_design",
+    "sampled_sliding_mode",
     "worst_found",
 ]
 

@@ -56,8 +56,6 @@ class Answer:
                 said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             return said
         said = [f"proved: {self.found.sentence()}"]
-        if self.compensation is not None:
-            said.append(self.compensation.sentence())
         for name, seen in (("worst found", self.worst), ("worst found with stick", self.worst_with_stick)):
             if seen is not None:
                 said.append(
@@ -70,7 +68,7 @@ class Answer:
             said.append(f"no controller held over this T_s keeps {errors}")
         if self._leaves_with_stick():
             said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
-        return said
+        return said if self.compensation is None else [*said, self.compensation.sentence()]
 
     @property
     def limit(self) -> SmallestPeak | None:

@@ -3,14 +3,14 @@
 from bisect import bisect_left
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
+from functools import lru_cache, partial
 from itertools import product
 from typing import Any, Unpack
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Around, Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.sector import holds
-from quakedesign.controllers import SlidingMode
+from quakedesign.controllers import Sampling, SlidingMode
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.loop import ImplicitRoot, Power
 from quakedesign.loop import compensated as compensated_law
@@ -18,7 +18,8 @@ from quakedesign.synthesis.guaranteed.design import OBJECTIVES
 from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated
 from quakedesign.synthesis.guaranteed.implicit_pull import implicit_pull
 
-_WEIGHTS = tuple(Fraction(k, 20) for k in range(2, 11))
+GUARANTEED = "compensated"
+WEIGHTS = tuple(Fraction(k, 20) for k in range(2, 11))
 _RATIOS = tuple(Fraction(k, 20) for k in range(17, 22))  # of B0 to the middle of the input gain
 _ROOM = Fraction(5, 4)  # share of the smallest peak that `tracking` may spend
 _SLOPES = tuple(Fraction(v) for v in ("1", "0.99", "0.97", "0.93", "0.88", "0.8", "0.7", "0.6"))
@@ -31,25 +32,27 @@ _ROOTS = tuple(Fraction(f"{10 ** (k / 24):.1e}") for k in range(-48, 73))  # ρ 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compensation:
-    """A sliding mode with the settings of its scheme, and what is guaranteed of both.
+    """A sliding mode that runs in the scheme ``compensated``, and what is guaranteed of it.
 
     Attributes
     ----------
     controller : SlidingMode
-    weight, authority : Fraction
-        a [-] and B0 [m²/kg] of the scheme ``compensated``.
+        A law of samples, see its `sampling`.
     found : Guarantee or NoGuarantee
     """
 
     controller: SlidingMode
-    weight: Fraction
-    authority: Fraction
     found: Guarantee | NoGuarantee
 
     @property
-    def settings(self) -> dict[str, float]:
-        """Of the scheme ``compensated`` in `simulate`."""
-        return {"weight": float(self.weight), "authority": float(self.authority)}
+    def weight(self) -> Fraction:
+        """Number a of the scheme [-]."""
+        return _settings(self.controller)["weight"]
+
+    @property
+    def authority(self) -> Fraction:
+        """B0 of the scheme [m²/kg]."""
+        return _settings(self.controller)["authority"]
 
     def sentence(self) -> str:
         """Settings for people, and how the step ends."""
@@ -77,7 +80,7 @@ class Compensation:
         """Exact numbers as texts."""
         law = self.controller
         return {
-            "scheme": "compensated",
+            "scheme": GUARANTEED,
             "gains": {name: str(v) for name, v in law.gains.items()},
             "scale": str(law.scale),
             "divisor": str(law.divisor),
@@ -131,47 +134,52 @@ def design_compensated(
     step: Fraction,
     *,
     objective: str = "tracking",
+    weights: tuple[Fraction, ...] = WEIGHTS,
     **around: Unpack[Around],
 ) -> Compensation:
     """Weight, authority and scale of a sliding mode with given base gains, chosen over certified bounds.
 
     Where the sign of the slip error holds the root, the step is deadbeat, e1 + T_s·w = 0, whatever the gains. So weight
-    and authority are chosen for the deadbeat step, on a grid: ``peak`` for the smallest certified slip-rate error,
-    ``tracking`` for the smallest slip error under a disturbance that drifts, among those whose certified slip-rate
-    error is at most a quarter above the smallest. λ = ρ⁶ is then the smallest for which the step is deadbeat, or nearly
-    so, for all errors that are claimed.
+    and authority are chosen for the deadbeat step, on a grid of `weights`: ``peak`` for the smallest certified
+    slip-rate error, ``tracking`` for the smallest slip error under a disturbance that drifts, among those whose
+    certified slip-rate error is at most a quarter above the smallest. λ = ρ⁶ is then the smallest for which the step is
+    deadbeat, or nearly so, for all errors that are claimed.
 
     Raises
     ------
     ParameterError
     """
-    weight, authority, errors = _deadbeat(task, step, objective, around)
-    law = controller
+    weight, authority, errors = _deadbeat(task, step, objective, weights, **around)
+    settings = ("weight", weight), ("authority", authority)
+    sampling = Sampling(step=step, scheme=GUARANTEED, settings=settings)
+    law = replace(controller, gains=dict(controller.gains), sampling=sampling)
     try:
         if errors is not None:
-            law = controller.scaled(_scale(controller, authority, step, errors))
+            law = law.scaled(_scale(law, authority, step, errors))
     except UnsupportedError as error:
-        return Compensation(
-            controller=law, weight=weight, authority=authority, found=NoGuarantee(reason=str(error), small_gain=None)
-        )
-    found = compensated(task, law, weight, authority, step, **around)
-    return Compensation(controller=law, weight=weight, authority=authority, found=found)
+        return Compensation(controller=law, found=NoGuarantee(reason=str(error), small_gain=None))
+    return Compensation(controller=law, found=compensated(task, law, weight, authority, step, **around))
 
 
+def _settings(law: SlidingMode) -> dict[str, Fraction]:
+    return dict(law.sampling.settings) if law.sampling else {}
+
+
+@lru_cache(maxsize=64)
 def _deadbeat(
-    task: Task, step: Fraction, objective: str, around: Around
+    task: Task, step: Fraction, objective: str, weights: tuple[Fraction, ...], **around: Unpack[Around]
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
-    """Weight and authority for a deadbeat step, and the errors that it leaves, if it has a guarantee."""
+    """Weight and authority for a deadbeat step, of any law, and the errors that it leaves, if it has a guarantee."""
     if objective not in OBJECTIVES:
         raise ParameterError(f"objective must be one of {', '.join(OBJECTIVES)}. Received {objective!r}.")
     worst, seen = replace(task, change=None), dict[tuple[Fraction, Fraction], Estimate]()
-    for weight, ratio in product(_WEIGHTS, _RATIOS):
+    for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
         found = estimated(worst, _held(_DEADBEAT, *choice, step, around))
         if found is not None and isinstance(found.bounds, Bounds):
             seen[choice] = found
     if not seen:
-        return _WEIGHTS[0], _short(task.model.gain), None
+        return weights[0], _short(task.model.gain), None
     peaks = {choice: float(_bounds(found).slip_rate_error) for choice, found in seen.items()}
     least = min(peaks, key=lambda choice: peaks[choice])
     if objective == "tracking":

@@ -1,4 +1,4 @@
-"""The default e-LQR of a fault: for its own T_s, else for the longest T_s that has a guarantee."""
+"""The default designs of a fault: for its own T_s, else for the longest T_s that has a guarantee."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -6,9 +6,20 @@ from typing import Unpack
 
 from quakedesign.certificates.guarantee import Around, Guarantee, NoGuarantee, Task
 from quakedesign.certificates.premise import Premise
+from quakedesign.controllers import SlidingMode
+from quakedesign.synthesis.guaranteed.compensated import WEIGHTS, Compensation, design_compensated
 from quakedesign.synthesis.guaranteed.design import design_held
 from quakedesign.synthesis.guaranteed.families import MEASURED
-from quakedesign.synthesis.guaranteed.reach import design_at, longest_delay, longest_step
+from quakedesign.synthesis.guaranteed.reach import (
+    design_at,
+    longest_delay,
+    longest_step,
+    reached_delay,
+    reached_step,
+)
+
+REACH = frozenset({"sampling_time", "delay"})
+"""Premises of a guarantee, see `SampledDesign.premises`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +70,7 @@ class SampledDesign:
 def sampled_design(
     task: Task, step: Fraction, objective: str = "tracking", *, measured: str = MEASURED[0], **around: Unpack[Around]
 ) -> SampledDesign:
-    """Design for a T_s [s], or for the longest shorter one that has a guarantee; the rest as in `design_held`.
+    """e-LQR for a T_s [s], or for the longest shorter one that has a guarantee; the rest as in `design_held`.
 
     Raises
     ------
@@ -80,5 +91,41 @@ def sampled_design(
         runs=found,
         reason=reason if found.held.step < step else "",
         longest_step=max(found.held.step, longest.held.step if longest else found.held.step),
+        longest_delay=delayed.held.delay if delayed else Fraction(0),
+    )
+
+
+def sampled_sliding_mode(
+    task: Task, law: SlidingMode, step: Fraction, objective: str = "tracking"
+) -> tuple[Compensation, SampledDesign]:
+    """Sliding mode with the base gains of a law for a T_s [s], or for the longest shorter one that has a guarantee.
+
+    How far others would go is looked for with the smallest weight, which has the smallest peak where T_s is long; none
+    of them knows of a delay.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown objective.
+    """
+
+    def careful(time: Fraction, delay: Fraction = Fraction(0)) -> Compensation:
+        return design_compensated(task, law, time, objective="peak", delay=delay, weights=WEIGHTS[:1])
+
+    made = design_compensated(task, law, step, objective=objective)
+    reason = made.found.reason if isinstance(made.found, NoGuarantee) else ""
+    longest = reached_step(task, step, lambda time: careful(time).found, step if reason else None)
+    if reason and longest is not None:
+        made = design_compensated(task, law, longest.held.step, objective=objective)
+        made = careful(longest.held.step) if isinstance(made.found, NoGuarantee) else made
+    if isinstance(made.found, NoGuarantee):
+        return made, SampledDesign(step=step, runs=None, reason=reason)
+    held = made.found.held
+    delayed = reached_delay(held.step, lambda delay: careful(held.step, delay).found, held.step / 8)
+    return made, SampledDesign(
+        step=step,
+        runs=made.found,
+        reason=reason,
+        longest_step=max(held.step, longest.held.step if longest else held.step),
         longest_delay=delayed.held.delay if delayed else Fraction(0),
     )

@@ -1,6 +1,7 @@
 """The implicit step of a law as a sum of signed powers, read off the expression that the scheme itself evaluates."""
 
 from fractions import Fraction
+from functools import lru_cache
 
 import sympy as sp
 
@@ -33,11 +34,17 @@ def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -
     UnsupportedError
         For a law with a feed-forward, or whose pressure is no falling sum of signed powers of the errors.
     """
-    pull, feed_forward, _ = Compensated.derive(Law.of(controller, 0.0))
+    pull, feed_forward, _ = _derived(Law.of(controller, 0.0))
     if feed_forward != 0:
         raise UnsupportedError("a law with a feed-forward has no guarantee in an implicit step. Use feedforward none.")
     numbers = {sampled_law.step: to_sympy(step), sampled_law.authority: to_sympy(authority)}
     return _terms(-pull.subs(numbers))
+
+
+@lru_cache(maxsize=256)
+def _derived(law: Law) -> tuple[sp.Expr, ...]:
+    """For every T_s and B0; searches ask for the same few scales again and again."""
+    return Compensated.derive(law)
 
 
 def _terms(expression: sp.Expr) -> tuple[Power, ...]:

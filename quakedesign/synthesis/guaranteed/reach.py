@@ -38,9 +38,14 @@ def longest_step(
     measured, **around
         As in `design_held`.
     """
+    attempt = _attempt(lambda held, near: first_held(task, held, near=near, measured=measured, **around))
+    return reached_step(task, step, attempt, most)
+
+
+def reached_step(task: Task, step: Fraction, attempt: Attempt, most: Fraction | None = None) -> Guarantee | None:
+    """The same for any kind of design, an attempt at a T_s [s]."""
     pole = _fastest_pole(task)
     first = Fraction(f"{_SHARE / pole:.3g}") if pole > 0 else step
-    attempt = _attempt(lambda held, near: first_held(task, held, near=near, measured=measured, **around))
     return _last(reached(attempt, first if most is None else min(first, most), most=most))
 
 
@@ -62,14 +67,17 @@ def longest_delay(
     task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
 ) -> Guarantee | None:
     """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
-    most = MOST_DELAY * step
 
     def search(delay: Fraction, near: np.ndarray | None) -> tuple[Guarantee | NoGuarantee, np.ndarray | None]:
         return first_held(task, step, near=near, measured=measured, **(around | {"delay": delay}))
 
     _, near = search(Fraction(0), None)
-    attempt = _attempt(search, near)
-    return _last(reached(attempt, step / 2, most=most))
+    return reached_delay(step, _attempt(search, near), step / 2)
+
+
+def reached_delay(step: Fraction, attempt: Attempt, first: Fraction) -> Guarantee | None:
+    """The same for any kind of design, an attempt at a delay [s], and the one to try first."""
+    return _last(reached(attempt, first, most=MOST_DELAY * step))
 
 
 def _attempt(search: Search, near: np.ndarray | None = None) -> Attempt:

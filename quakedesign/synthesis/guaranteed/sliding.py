@@ -5,13 +5,24 @@ from fractions import Fraction
 from typing import Unpack
 
 from quakedesign.bounds import UpperBound
-from quakedesign.certificates.guarantee import Around, NoGuarantee, Task
+from quakedesign.certificates.guarantee import Around, Guarantee, NoGuarantee, Task
 from quakedesign.controllers import SlidingMode, family
 from quakedesign.errors import ParameterError
 from quakedesign.loop.schemes import schemes
-from quakedesign.synthesis.guaranteed.compensated import Compensation, design_compensated
+from quakedesign.synthesis.guaranteed.compensated import GUARANTEED, Compensation, compensated, design_compensated
 
-GUARANTEED = "compensated"
+
+def guarantee_of(task: Task, law: SlidingMode) -> Guarantee | NoGuarantee:
+    """What is guaranteed of a sliding mode as it runs: something only of one for the scheme ``compensated``."""
+    own = law.sampling
+    if own is None or own.scheme != GUARANTEED:
+        scheme, step = ("continuous", Fraction(0)) if own is None else (own.scheme, own.step)
+        return NoGuarantee(reason=_why_none(task, type(law), scheme, step), small_gain=None)
+    settings = dict(own.settings)
+    if not {"weight", "authority"} <= settings.keys():
+        reason = f"the scheme {GUARANTEED} has a guarantee with a weight and an authority. Give both in its settings"
+        return NoGuarantee(reason=reason, small_gain=None)
+    return compensated(task, law, settings["weight"], settings["authority"], own.step)
 
 
 def sliding_mode(

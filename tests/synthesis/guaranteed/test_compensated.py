@@ -12,15 +12,12 @@ import pytest
 from quakedesign import simulate
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, task_of
-from quakedesign.controllers import control_law, published
-from quakedesign.controllers.elqr import ExtendedLQR
+from quakedesign.controllers import Sampling, control_law, published
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop import Power
-from quakedesign.loop.schemes import simulation_scheme
-from quakedesign.synthesis import Design
-from quakedesign.synthesis.guaranteed import compensated, design_compensated, worst_found
+from quakedesign.synthesis.guaranteed import compensated, design_compensated, guarantee_of, worst_found
 from quakedesign.synthesis.guaranteed.implicit_pull import implicit_pull
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
@@ -31,6 +28,7 @@ STEP, DIVISOR = F("0.184"), F(2353, 125000000000)
 CTA, DIA = ("7", "5", "2.3", "1.1"), ("25/16", "27/5", "6/5", "0")
 SETTINGS = F("0.3"), F("2.25e-8")  # weight, authority
 TASK = task_of(load_fault("real-fault"))
+CTA_GAINS = dict(zip(("k1", "k2", "k3", "k4"), map(F, CTA), strict=True))
 
 
 def law(name, gains, scale):
@@ -176,7 +174,6 @@ def test_a_run_of_the_design_stays_far_inside_its_guarantee():
     run = simulate(
         load_fault("real-fault"),
         found.controller,
-        scheme=simulation_scheme("compensated", **found.settings),
         duration=600.0,
         settled_from=100.0,
         compiled=False,
@@ -228,33 +225,23 @@ def test_published_gains_are_too_weak_for_a_deadbeat_step():
     assert found.reason.startswith("the root of the implicit step leaves its range")
 
 
-def test_designs_in_continuous_time_say_which_scale_has_a_guarantee_when_it_runs():
-    fault = load_fault("real-fault")
-    small, large = (
-        Design(
-            fault=fault, name="cta", verdict=Verdict.UNDECIDED, controller=law("cta", CTA, scale), certificate=None,
-            premises=(),
-        )
-        for scale in ("1/4000", "1")
-    )  # fmt: skip
-    assert small.guarantee.check() is Verdict.UNDECIDED
-    assert small.guarantee.sentence().startswith("none: run in the scheme compensated, the root of the implicit step")
-    made = designed("cta")
-    stated = (
-        f"with λ = {made.controller.scale} in place of 0.00025, divisor 1.8824e-08 m²/kg, weight {made.weight} and "
-    )
-    assert f"{stated}B0 = {float(made.authority):.6g} m²/kg the slip rate" in small.guarantee.sentence()
-    assert small.guarantee.sentence().endswith("never exceeds 0.000299 m/s, the slip stays within 4.12e-05 m")
-    assert large.guarantee == replace(designed("cta").found, held=large.guarantee.held)
-    for design in (small, large):
-        assert design.compensation() == designed("cta")
+def test_other_sliding_modes_have_no_guarantee_of_a_loop_that_runs():
+    """In continuous time, in another scheme, or without the numbers of it."""
+    paper = law("cta", CTA, "1/4000")
+    others = [
+        (paper, "at every instant"),
+        (replace(paper, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="implicit")), "knows no disturbance"),
+        (replace(paper, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="compensated")), "Give both in its"),
+    ]
+    for controller, words in others:
+        found = guarantee_of(TASK, controller)
+        assert found.check() is Verdict.UNDECIDED
+        assert words in found.sentence()
 
 
-def test_laws_without_a_sliding_mode_are_not_compensated():
-    gains = dict(zip(("k1", "k2", "k3", "k4"), map(F, ("6.96e8", "2.53e8", "6.02e8", "2.16e8")), strict=True))
-    linear = ExtendedLQR(gains=gains)
-    made = Design(
-        fault=load_fault("real-fault"), name="elqr", verdict=Verdict.UNDECIDED, controller=linear, certificate=None,
-        premises=(),
-    )  # fmt: skip
-    assert made.compensation() is None
+def test_the_guarantee_of_a_law_of_samples_is_that_of_its_own_numbers():
+    made, (weight, authority) = law("cta", CTA, 1), SETTINGS
+    settings = ("weight", weight), ("authority", authority)
+    sampled = replace(made, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="compensated", settings=settings))
+    assert guarantee_of(TASK, sampled) == compensated(TASK, made, *SETTINGS, STEP)
+    assert guarantee_of(TASK, designed("cta").controller) == designed("cta").found
