@@ -149,10 +149,16 @@ def controllers(name: str) -> list[str]:
 
 
 def positive(comparison: Any) -> bool:
-    """Whether every design is proved and its premises hold but for those on run and start, and its run is harmless."""
+    """Whether every design is proved and its premises hold but for those on run and start, and its run is harmless.
+
+    A design that was to run with a guarantee and found none is not.
+    """
+    from quakedesign.certificates.guarantee import NoGuarantee
+
     needed = {"along_reference", "control_coefficient", "friction_slope", "sampling_time"}
     return all(
         str(entry.design.verdict) == "proved"
+        and not isinstance(entry.design.runs, NoGuarantee)
         and all(p.holds for p in entry.design.conditions if p.name in needed)
         and (entry.run is None or entry.run.outcome.harmless)
         for entry in comparison.of("designed")

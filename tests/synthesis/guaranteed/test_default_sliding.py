@@ -6,6 +6,7 @@ from fractions import Fraction as F
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import control
 import numpy as np
@@ -14,12 +15,14 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import Verdict, load_certificate
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, task_of
+from quakedesign.cli.design import positive
 from quakedesign.controllers import Sampling
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.simulation import controller_step, simulate, to_casadi, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
+from quakedesign.studies.comparison import Entry
 from quakedesign.studies.single import chosen_controller
 from quakedesign.synthesis import assess
 from quakedesign.synthesis.guaranteed import design_compensated
@@ -185,6 +188,9 @@ def test_where_no_step_has_a_guarantee_it_is_the_design_in_continuous_time(monke
     assert (design.verdict, design.controller.sampling) == (Verdict.PROVED, None)
     assert design.guarantee.sentence() == "none: run in the scheme compensated, small gain 1.2"
     assert design.compensation is None
+    entry = Entry(label="x", origin="designed", design=design, run=None)
+    assert not positive(SimpleNamespace(of=lambda _: (entry,)))
+    assert positive(SimpleNamespace(of=lambda _: (replace(entry, design=replace(design, runs=None)),)))
 
 
 def test_gains_of_the_command_line_are_designed_either_way(unproved, monkeypatch):
