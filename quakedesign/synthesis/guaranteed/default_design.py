@@ -61,8 +61,8 @@ class SampledDesign:
                 required=Fraction(0),
                 certified=self.longest_delay,
                 unit="s",
-                note="from the measurement to the pressure: none, and the longest for which a design that knows it "
-                "has a guarantee",
+                note="from the measurement to the pressure: none, and the longest for which a design, an e-LQR that "
+                "knows it, has a guarantee",
             ),
         )
 
