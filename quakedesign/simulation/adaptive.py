@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from quakedesign.errors import ParameterError, SimulationError
@@ -16,9 +17,6 @@ from quakedesign.simulation.integrators.adaptive import AdaptiveIntegrator, Flow
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.symbolic import SignedPower
 from quakedesign.symbolic.signed_power import AbsolutePower
-
-if TYPE_CHECKING:
-    import numpy as np
 
 CHUNK = 4096
 _FEWER = 16
@@ -83,8 +81,6 @@ class SmoothMarch:
         SimulationError
             When the solver stops although nothing has diverged.
         """
-        import numpy as np
-
         wanted, vector, found = set(kept), np.array(start), [np.array(start)]
         longest = CHUNK
         while vector[0] < kept[-1] and vector[self.recorder.index("diverged")] < 0:
@@ -149,7 +145,6 @@ class _Piece:
     def of(cls, march: SmoothMarch, count: int) -> "_Piece":
         """Piece of a march."""
         import casadi as ca
-        import numpy as np
 
         recorder = march.recorder
         shares = np.arange(1, count + 1) / count

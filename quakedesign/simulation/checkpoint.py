@@ -7,15 +7,14 @@ from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zipfile import BadZipFile
+
+import numpy as np
 
 from quakedesign.errors import OutputError, SimulationError
 from quakedesign.output import write_whole
 from quakedesign.temporary import sweep
-
-if TYPE_CHECKING:
-    import numpy as np
 
 SECONDS = 30.0
 
@@ -62,8 +61,6 @@ class Checkpoint:
         SimulationError
             When it is no checkpoint, or that of another run.
         """
-        import numpy as np
-
         sweep(self.path.parent)
         try:
             with np.load(BytesIO(self.path.read_bytes()), allow_pickle=False) as held:
@@ -89,8 +86,6 @@ class Checkpoint:
         OutputError
             When the file cannot be written.
         """
-        import numpy as np
-
         if not now and monotonic() - self._written[0] < SECONDS:
             return
         content = BytesIO()

@@ -4,12 +4,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.output import write_whole
-
-if TYPE_CHECKING:
-    import numpy as np
 
 CONVENTIONS = "CF-1.11"
 

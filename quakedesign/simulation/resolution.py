@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from quakedesign.errors import SimulationError
 from quakedesign.simulation.integrators import AdaptiveIntegrator
 from quakedesign.simulation.integrators.adaptive import Flow, StoppedError
 
 if TYPE_CHECKING:
-    import numpy as np
-
     Point = tuple[float, np.ndarray]
 
 AGREEMENT = 0.02

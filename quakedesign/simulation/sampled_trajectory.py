@@ -2,13 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from quakedesign.simulation.plotting import NOTHING, Panel
 from quakedesign.simulation.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    import numpy as np
 
 Signal = tuple["np.ndarray", str, str]
 

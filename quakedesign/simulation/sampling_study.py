@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from quakedesign.controllers import Controller, SlidingMode
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Fault
@@ -216,8 +218,6 @@ def gain_sensitivity(
     duration : float, optional
         [s]; the operation time unless given.
     """
-    import numpy as np
-
     width = float(fault.box.authority)
     if not width or points < 2:
         raise ParameterError(
@@ -237,8 +237,6 @@ def gain_sensitivity(
 
 
 def _slope(levels: Sequence[float], values: Sequence[float]) -> float | None:
-    import numpy as np
-
     if len(levels) < 2 or not all(0 < v < math.inf for v in (*levels, *values)):
         return None
     return float(np.polyfit(np.log(levels), np.log(values), 1)[0])
@@ -263,8 +261,6 @@ def _study(
 
 def _errors(run: "Trajectory", matched: bool) -> dict[str, float]:
     """Largest errors of a run; that of e3 from the instants that it keeps."""
-    import numpy as np
-
     metrics, infinite = run.metrics, math.inf
     found = {"slip_error": metrics.max_slip_error, "slip_rate_error": metrics.max_slip_rate_error}
     if "diverged" in run.events:

@@ -1,15 +1,14 @@
 """Integration of smooth differential equations to a tolerance, with crossings of one level found on the way."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.simulation.integrators import adaptive_integrators
 from quakedesign.simulation.integrators.adaptive import require_tolerance
 from quakedesign.simulation.resolution import Resolution
-
-if TYPE_CHECKING:
-    import numpy as np
 
 METHODS = {"dop853": "DOP853", "radau": "Radau"}
 
@@ -70,8 +69,6 @@ class Problem:
         SimulationError
             When the method cannot go on.
         """
-        import numpy as np
-
         _check(method, rtol)
         if method in adaptive_integrators():
             return self._resolved(start, load, times, every_step=every_step, method=method, rtol=rtol)
@@ -104,7 +101,6 @@ class Problem:
         self, start: "np.ndarray", load: float, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
     ) -> Solution:
         import casadi as ca
-        import numpy as np
 
         time, y, pushed = ca.SX.sym("t"), ca.SX.sym("y", self.rates.size1_in(0)), ca.SX.sym("load")
         rates = ca.Function("rates", [time, y, pushed], [ca.densify(self.rates(y, pushed)[0])])
@@ -120,8 +116,6 @@ class Problem:
 
     def _bound(self, load: float) -> tuple[Any, Any]:
         """Field and Jacobian as functions of (t, y)."""
-        import numpy as np
-
         size = self.rates.size1_in(0)
         field = _Bound.of(self.rates, 0, load, np.empty(size))
         jacobian = _Bound.of(self.rates, 1, load, np.empty((size, size)))
@@ -148,7 +142,6 @@ class _Bound:
     @classmethod
     def of(cls, function: Any, index: int, load: float, result: "np.ndarray") -> "_Bound":
         import casadi as ca
-        import numpy as np
 
         inputs = [ca.SX.sym("y", function.size1_in(0)), ca.SX.sym("load")]
         dense: Any = ca.Function("dense", inputs, [ca.densify(function(*inputs)[index])])
@@ -167,7 +160,6 @@ class _Bound:
 
 
 def _solve(*arguments: Any, **options: Any) -> Any:
-    import numpy as np
     from scipy.integrate import solve_ivp
 
     with np.errstate(over="ignore", invalid="ignore"):  # of trial steps that are too long, and rejected for it

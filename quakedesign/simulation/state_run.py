@@ -3,7 +3,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault, FrictionLaw
@@ -12,9 +14,6 @@ from quakedesign.simulation.run import library_versions
 from quakedesign.simulation.smooth import Problem, Solution
 from quakedesign.simulation.state_plants import SpringSlider
 from quakedesign.simulation.state_trajectory import StateTrajectory
-
-if TYPE_CHECKING:
-    import numpy as np
 
 _ONSET = 10.0
 _SHARE_OF_STRETCH = 1e-3
@@ -149,8 +148,6 @@ def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
 
 
 def _wanted(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None":
-    import numpy as np
-
     if times is None:
         return None
     wanted, end = np.asarray(times, dtype=float), math.fsum(length for length, _ in pieces)
@@ -167,8 +164,6 @@ def _wanted(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None
 
 def _scales(slider: SpringSlider, start: list[float]) -> "np.ndarray":
     """Critical slip for the displacements (or a share of the stretch), 1 for the logarithms."""
-    import numpy as np
-
     length = getattr(slider.law, "critical_slip", abs(start[1]) * _SHARE_OF_STRETCH)
     return np.array([length, length, *[1.0] * (len(start) - 2)])
 
@@ -183,8 +178,6 @@ class _History:
 
     def run(self, start: list[float]) -> Solution:
         """Solution over all pieces; at a jump of the loading rate the variables are continuous."""
-        import numpy as np
-
         parts: list[Solution] = []
         y, now = np.array(start), 0.0
         for length, load in self.pieces:
@@ -203,8 +196,6 @@ class _History:
         return self._joined(parts)
 
     def _joined(self, parts: list[Solution]) -> Solution:
-        import numpy as np
-
         time = np.concatenate([parts[0].time[:1], *(part.time[1:] for part in parts)])
         values = np.concatenate([parts[0].values[:, :1], *(part.values[:, 1:] for part in parts)], axis=1)
         if self.wanted is not None:
@@ -215,8 +206,6 @@ class _History:
 
     def load_point(self, time: "np.ndarray") -> "np.ndarray":
         """Displacement of the far end [m]."""
-        import numpy as np
-
         ends = np.cumsum([0.0, *(length for length, _ in self.pieces)])
         passed = np.cumsum([0.0, *(length * load for length, load in self.pieces)])
         return np.interp(time, ends, passed)
@@ -225,8 +214,6 @@ class _History:
 def _trajectory(
     name: str, slider: SpringSlider, history: _History, solution: Solution, level: float, area: float
 ) -> StateTrajectory:
-    import numpy as np
-
     loaded = history.load_point(solution.time)
     friction, excess = (row.full().ravel() for row in slider.readings.map(len(solution.time))(solution.values))
     return StateTrajectory(
@@ -259,8 +246,6 @@ def _energy(
     slider: SpringSlider, area: float, loaded: "np.ndarray", values: "np.ndarray", friction: "np.ndarray"
 ) -> EnergyBudget:
     """Budget of an area [m²] from forces along the paths of block and load point, both resolved by the instants."""
-    import numpy as np
-
     slip, stretch, rate = values[0], values[1], np.exp(values[2])
 
     def gained(energy: "np.ndarray") -> float:

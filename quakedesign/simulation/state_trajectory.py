@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.simulation.energy import EnergyBudget
 from quakedesign.simulation.recording import Recording
-
-if TYPE_CHECKING:
-    import numpy as np
 
 SIGNALS = {
     "load_point": ("displacement of the load point", "m"),
@@ -70,8 +69,6 @@ class StateTrajectory(Recording):
     @property
     def recurrence_intervals(self) -> "np.ndarray":
         """Times between successive onsets [s]."""
-        import numpy as np
-
         return np.diff(self.onsets)
 
     @property
@@ -80,8 +77,6 @@ class StateTrajectory(Recording):
 
         Between the instants of `time` by straight lines. `Fault.moment_of` makes it a seismic moment.
         """
-        import numpy as np
-
         below = self.slip_rate <= self.onset_rate
         falls = np.flatnonzero(~below[:-1] & below[1:])
         ends = [next((i for i in falls if self.time[i + 1] > onset), None) for onset in self.onsets]

@@ -3,13 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.simulation.backend import RADIX, Backend
 from quakedesign.simulation.checkpoint import Checkpoint
-
-if TYPE_CHECKING:
-    import numpy as np
 
 GOLDEN = (5**0.5 - 1) / 2
 
@@ -36,8 +35,6 @@ class Advancer:
     @classmethod
     def of(cls, backend: Backend, start: list[float]) -> "Advancer":
         """Advancer at a starting vector."""
-        import numpy as np
-
         vector = np.array(start)
         calls, owners = zip(*(_bound(function, vector) for function in backend.functions), strict=True)
         return cls(vector, calls, owners)
@@ -51,8 +48,6 @@ class Advancer:
 
 
 def _bound(function: Any, vector: "np.ndarray") -> tuple[Callable[[], None], Any]:
-    import numpy as np
-
     result = np.empty_like(vector)
     buffer, evaluate = function.buffer()
     buffer.set_arg(0, vector.data)
@@ -89,8 +84,6 @@ def march(
     Python runs between two calls, so that the user can interrupt and sees the progress; what was kept until then is in
     the checkpoint, if there is one, and the next march goes on from there.
     """
-    import numpy as np
-
     found = (checkpoint.read() if checkpoint else []) or [advancer.vector.copy()]
     advancer.vector[:] = found[-1]
     try:

@@ -3,16 +3,15 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.simulation.energy import EnergyBudget
 from quakedesign.simulation.metrics import Metrics
 from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
 from quakedesign.simulation.plotting import NOTHING, Panel, figure, stress_figure
 from quakedesign.simulation.recording import Recording
-
-if TYPE_CHECKING:
-    import numpy as np
 
 SIGNALS = {
     "slip": ("slip x1", "m"),
@@ -126,7 +125,6 @@ class Trajectory(Recording):
     def response(self) -> Any:
         """The run as python-control's TimeResponseData: outputs slip [m] and slip_rate [m/s], input p [Pa]."""
         import control
-        import numpy as np
 
         motion = np.vstack([self.slip, self.slip_rate])
         states = np.vstack([motion, self.integrals])

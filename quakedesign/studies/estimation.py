@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from quakedesign.certificates.premises import Premise
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
@@ -120,8 +122,6 @@ def largest_acceleration(fault: Fault, law: Controller, *, scheme: str, step: fl
 
     The second entry is the time [s] of its divergence, after which nothing counts, or None.
     """
-    import numpy as np
-
     window = min(WINDOW * step, fault.reference.operation_time)
     run = simulate(fault, law, scheme=scheme, step=step, duration=window, samples=WINDOW)
     steps = np.abs(np.diff(run.slip_rate)) / np.diff(run.time)

@@ -8,14 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.errors import OutputError, SimulationError
 from quakedesign.output import write_whole
 from quakedesign.temporary import FAMILY, sweep
-
-if TYPE_CHECKING:
-    import numpy as np
 
 MANIFEST, BATCHES = "campaign.json", "batches"
 _RESULTS = ("results.json", "samples.csv", "distribution.png", "sample-*.nc")
@@ -156,8 +155,6 @@ class Ledger:
         return found
 
     def _pairs(self, path: Path) -> "list[tuple[np.ndarray, np.ndarray]]":
-        import numpy as np
-
         try:
             with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as held:
                 fingerprint, starts, ends = str(held["fingerprint"]), held["starts"], held["ends"]
@@ -177,8 +174,6 @@ class Ledger:
         OutputError
             When it cannot be written.
         """
-        import numpy as np
-
         content = BytesIO()
         np.savez(content, fingerprint=np.array(self.fingerprint), starts=starts, ends=ends)
         name = hashlib.sha256(np.ascontiguousarray(starts).tobytes()).hexdigest()[:16]

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 _DECADES = 30.0
 
 
@@ -30,8 +32,6 @@ def figure(title: str, caption: str, shown: Mapping[str, tuple[Any, Mapping[floa
 
 
 def _distribution(axis: Any, name: str, values: Any, marks: Mapping[float, float | None]) -> None:
-    import numpy as np
-
     known = values[~np.isnan(values)]
     finite = np.sort(known[np.isfinite(known)])
     axis.step(finite, np.arange(1, len(finite) + 1) / max(1, len(known)), where="post", color="#0072B2")

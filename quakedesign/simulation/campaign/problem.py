@@ -3,7 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
@@ -23,9 +25,6 @@ from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import Setting, library_versions, loop_class, run
 from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.simulation.variation import Variation
-
-if TYPE_CHECKING:
-    import numpy as np
 
 _NOT_COMPARED = ("settled_from", "steps", "seconds")
 
@@ -138,8 +137,6 @@ class Problem:
 
     def start(self, sample: Sample) -> "np.ndarray":
         """Vector of a sample at time zero."""
-        import numpy as np
-
         return np.array(self.recorder(sample).start(self.setting.settled_from))
 
     def _loop(self, variation: Variation) -> Any:

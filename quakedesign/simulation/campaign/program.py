@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.simulation.backend import Backend, compiler, ladder, shared_library
 from quakedesign.simulation.stepping import Advancer
 from quakedesign.temporary import temporary_folder
-
-if TYPE_CHECKING:
-    import numpy as np
 
 Mover = Callable[["np.ndarray", int], None]
 
@@ -157,8 +156,6 @@ def mover(program: Program) -> Mover:
 
 
 def _machine_code(content: bytes, folder: Path, size: int) -> Mover:
-    import numpy as np
-
     library = folder / "loaded.so"
     library.write_bytes(content)
     advance = ctypes.CDLL(str(library)).advance_samples

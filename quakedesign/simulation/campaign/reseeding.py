@@ -3,6 +3,8 @@
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
+import numpy as np
+
 Value = TypeVar("Value")
 
 
@@ -30,7 +32,5 @@ def _walk(value: Any, seed: int, count: list[int]) -> Any:
 
 
 def _derived(seed: int, count: list[int]) -> int:
-    import numpy as np
-
     count[0] += 1
     return int(np.random.SeedSequence(seed, spawn_key=(count[0],)).generate_state(1)[0])

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.errors import ParameterError
 from quakedesign.output import write_whole
@@ -18,9 +20,6 @@ from quakedesign.simulation.campaign.space import UNITS
 from quakedesign.simulation.metrics import EVENTS, StickMetrics
 from quakedesign.simulation.outcome import KINDS, Outcome
 from quakedesign.simulation.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    import numpy as np
 
 LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 SHOWN = 5
@@ -88,8 +87,6 @@ class Campaign:
         ParameterError
             When the samples have no such metric.
         """
-        import numpy as np
-
         require_metric(metric, self.metrics)
         return np.array([math.nan if result is None else badness(result, metric) for result in self.results]) * (
             -1 if metric in _LESS_IS_WORSE else 1

@@ -4,12 +4,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from quakedesign.simulation.campaign.space import Sample, Space
-
-if TYPE_CHECKING:
-    import numpy as np
 
 FIRST_SPAN = 0.25
 

@@ -5,15 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_nonnegative
 from quakedesign.simulation.variation import Variation, names
-
-if TYPE_CHECKING:
-    import numpy as np
 
 MOST_SAMPLES = 2**20
 PERIODIC = frozenset({"phase"})
@@ -117,7 +116,6 @@ def point(seed: int, index: int, dimension: int) -> "np.ndarray":
 
 @lru_cache(maxsize=8)
 def _points(seed: int, dimension: int, exponent: int) -> "np.ndarray":
-    import numpy as np
     from scipy.stats import qmc
 
     return qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(seed)).random_base2(exponent)
@@ -125,8 +123,6 @@ def _points(seed: int, dimension: int, exponent: int) -> "np.ndarray":
 
 def noise_seed(seed: int, index: int) -> int:
     """Seed of the noise of sample number `index`."""
-    import numpy as np
-
     return int(np.random.SeedSequence(seed, spawn_key=(index,)).generate_state(1)[0])
 
 

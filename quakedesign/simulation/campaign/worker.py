@@ -1,11 +1,8 @@
 """What runs in a worker: one batch of samples, in slices, so that it can be interrupted."""
 
-from typing import TYPE_CHECKING
+import numpy as np
 
 from quakedesign.simulation.campaign.program import Program, mover
-
-if TYPE_CHECKING:
-    import numpy as np
 
 SLICE = 200_000  # steps of all samples together in one call of compiled code, which is deaf: a fraction of a second
 
@@ -20,8 +17,6 @@ def advance(program: Program, starts: "np.ndarray", steps: int) -> "np.ndarray":
         Shape (samples, size).
     steps : int
     """
-    import numpy as np
-
     move = mover(program)
     vectors = np.array(starts, dtype=np.float64, order="C", ndmin=2)
     slice_ = max(1, SLICE // len(vectors))

@@ -3,12 +3,11 @@
 from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from quakedesign.errors import ParameterError
-
-if TYPE_CHECKING:
-    import numpy as np
 
 TIGHTEST = 1e-13
 LOOSEST = 1e-3
@@ -68,7 +67,6 @@ class AdaptiveIntegrator(ABC):
             For another tolerance.
         """
         import casadi as ca
-        import numpy as np
 
         require_tolerance(rtol)
         size, count = rates.size1_in(1), rates.size1_in(2)
@@ -120,8 +118,6 @@ class Flow:
         StoppedError
             When the tolerance cannot be met, or a value is not finite.
         """
-        import numpy as np
-
         try:
             found = self.solver(x0=y / self.scales, p=[time, length, *parameters])
         except RuntimeError as error:

@@ -1,5 +1,7 @@
 """A polynomial as arrays of floating point, for its values and derivatives; nothing here decides."""
 
+import numpy as np
+
 from quakedesign.sos.exact.polynomial import Polynomial
 
 
@@ -7,27 +9,19 @@ class Arrays:
     """A polynomial as arrays, for values and gradients at many points."""
 
     def __init__(self, polynomial: Polynomial, variables: int) -> None:
-        import numpy as np
-
         self.exponents = np.array(list(polynomial), dtype=np.int64).reshape(-1, variables)
         self.coefficients = np.array([float(c) for c in polynomial.values()])
 
     def __call__(self, x) -> float:
         """Value at a point."""
-        import numpy as np
-
         return float(self.coefficients @ np.prod(np.asarray(x)[None, :] ** self.exponents, axis=1))
 
     def at(self, points):
         """Values at points, one a row."""
-        import numpy as np
-
         return np.prod(points[:, None, :] ** self.exponents[None, :, :], axis=2) @ self.coefficients
 
     def gradient(self, x):
         """Gradient at a point."""
-        import numpy as np
-
         x = np.asarray(x)
         result = np.zeros(len(x))
         for i in range(len(x)):
@@ -39,8 +33,6 @@ class Arrays:
 
     def hessian(self, x):
         """Matrix of second derivatives at a point."""
-        import numpy as np
-
         x, size = np.asarray(x), len(x)
         result = np.zeros((size, size))
         for i in range(size):

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+import numpy as np
+
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, evaluate, monomial
 from quakedesign.sos.exact.squares import Element, as_element
@@ -178,7 +180,6 @@ def at_kernels(
 
 def _kernel(block: Block, gram, threshold: float, tolerance: float, scale: Sequence[Fraction]) -> list[Row]:
     """Rational basis of the eigenspace of small eigenvalues, in the simplest fractions of the unscaled variables."""
-    import numpy as np
     from scipy.linalg import qr
 
     values, vectors = np.linalg.eigh(gram)

@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from quakedesign.sos.exact.polynomial import degree
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.arrays import Arrays
@@ -21,8 +23,6 @@ def _polynomial(statement: Statement) -> Arrays:
 
 def violation(statement: Statement, points: Any) -> Any:
     """Largest relative violation of the inequalities at points (one a row); zero inside."""
-    import numpy as np
-
     worst, size = np.zeros(len(points)), len(statement.variables)
     for g in statement.inequalities:
         scale = Arrays({e: abs(c) for e, c in g.items()}, size).at(np.abs(points))
@@ -32,8 +32,6 @@ def violation(statement: Statement, points: Any) -> Any:
 
 def by_value(statement: Statement, candidates: Sequence[Sequence[float]]) -> list[Sequence[float]]:
     """Candidates by the polynomial's value over their size, those of the set before all others."""
-    import numpy as np
-
     if not candidates:
         return []
     points = np.array(candidates, dtype=float)
@@ -49,8 +47,6 @@ def lowest_samples(statement: Statement) -> list[list[float]]:
     A sample outside is moved along the segment to one inside until it is on the boundary. None are found for a set that
     is thin, such as one with equalities.
     """
-    import numpy as np
-
     if statement.equalities:
         return []
     random = np.random.default_rng(_SEED)
@@ -76,8 +72,6 @@ def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[flo
 
     They lie in the direction that increases all active constraints the fastest; none where no direction does.
     """
-    import numpy as np
-
     point = np.asarray(x, dtype=float)
     direction = _into(statement, point)
     if direction is None:
@@ -92,7 +86,6 @@ def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[flo
 
 def _into(statement: Statement, point: Any) -> Any:
     """Direction, of largest coordinate at most 1, along which the slowest active constraint grows the fastest."""
-    import numpy as np
     from scipy.optimize import linprog
 
     rows = []

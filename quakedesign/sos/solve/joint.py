@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from threading import Lock
 from typing import Any
 
+import numpy as np
+
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, product
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.conic import Compiled, in_cones
@@ -132,8 +134,6 @@ class JointProgram:
         ValueError
             When a monomial occurs that the structure does not have.
         """
-        import numpy as np
-
         within = limits or Limits(radii=[1.0] * self._count)
         kind = len(within.bounds), len(within.shares)
         if kind not in self._stated:
@@ -151,8 +151,6 @@ class JointProgram:
 
     def _row(self, polynomials: Sequence[Mapping[Exponents, Any]]) -> Any:
         """Coefficients of one polynomial for every demand, beside each other."""
-        import numpy as np
-
         return np.concatenate([shape.vector(p) for shape, p in zip(self._shapes, polynomials, strict=True)])
 
 

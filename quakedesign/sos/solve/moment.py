@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from quakedesign.sos.exact.polynomial import Exponents
 
 SOLVER = "Clarabel"
@@ -73,8 +75,6 @@ class MomentProgram:
     """
 
     def __init__(self, blocks: Sequence[Shape], relations: Sequence[Mapping[Exponents, float]] = ()) -> None:
-        import numpy as np
-
         self.blocks = tuple(blocks)
         entries = [_entries(b) for b in blocks]
         extra = np.array([e for r in relations for e in r], dtype=np.int64)
@@ -105,7 +105,6 @@ class MomentProgram:
 
     def _solve(self, target: Mapping[Exponents, float], accuracy: float, most: float) -> Solution | None:
         import clarabel
-        import numpy as np
 
         cost = np.append(self.vector(target), most)
         if self._solver is None or self._accuracy != accuracy:
@@ -147,7 +146,6 @@ class MomentProgram:
 
         The unknowns are the values of L and one more; `more` has further entries.
         """
-        import numpy as np
         from scipy import sparse
 
         rows, columns, values, diagonal = self.localizing
@@ -168,7 +166,6 @@ class MomentProgram:
     def interior(self, target: Mapping[Exponents, float], value: float) -> Mapping[Exponents, float] | None:
         """Functional with L(target) = value < 0 and the largest smallest eigenvalue; None if none is found."""
         import clarabel
-        import numpy as np
 
         cost = self.vector(target)
         count = 1 + self.relation_count
@@ -187,7 +184,6 @@ class MomentProgram:
 
     def triangles(self) -> Any:
         """Sparse map from L to the upper triangles of all localizing matrices, column by column, below each other."""
-        import numpy as np
         from scipy import sparse
 
         rows, columns, values, diagonal = self.localizing
@@ -210,8 +206,6 @@ class MomentProgram:
         ValueError
             When a monomial cannot be produced.
         """
-        import numpy as np
-
         vector = np.zeros(len(self.keys))
         for e, c in target.items():
             if e not in self.index:
@@ -222,8 +216,6 @@ class MomentProgram:
 
 def useful(answer: Any) -> bool:
     """Whether an answer of the solver is worth looking at; its status is no verdict."""
-    import numpy as np
-
     finite = np.all(np.isfinite(answer.x)) and np.all(np.isfinite(answer.z))
     return str(answer.status) in _USEFUL and bool(finite)
 
@@ -239,7 +231,6 @@ def _zero(size: int):
 
 def _localizing(blocks: Sequence[Shape], entries: list, where, width: int):
     """Rows, columns and values of all localizing matrices below each other, and the rows of their diagonals."""
-    import numpy as np
     from scipy import sparse
 
     rows, columns, values, diagonal = [], [], [], []
@@ -280,8 +271,6 @@ def settings(accuracy: float):
 
 
 def _unique(stacked: list):
-    import numpy as np
-
     together = np.concatenate(stacked)
     span = together.max(axis=0).astype(object) + 1
     if int(np.prod(span)) < 2**62:
@@ -295,22 +284,16 @@ def _unique(stacked: list):
 @lru_cache(maxsize=256)
 def pairs(size: int):
     """Rows and columns of the upper triangle, column by column; read-only."""
-    import numpy as np
-
     columns, rows = np.tril_indices(size)
     rows.flags.writeable = columns.flags.writeable = False
     return rows, columns
 
 
 def _diagonal(size: int):
-    import numpy as np
-
     return np.arange(1, size + 1).cumsum() - 1
 
 
 def _unit_vector(size: int):
-    import numpy as np
-
     vector = np.zeros(size * (size + 1) // 2)
     vector[_diagonal(size)] = 1.0
     return vector
@@ -318,8 +301,6 @@ def _unit_vector(size: int):
 
 def _entries(block: Shape):
     """Exponents (terms × pairs × variables) and factors of the scaled upper triangle of L(g·m mᵀ)."""
-    import numpy as np
-
     basis = np.array(block.basis, dtype=np.int64)
     rows, columns = pairs(len(basis))
     sums = basis[rows] + basis[columns]
@@ -331,7 +312,6 @@ def _entries(block: Shape):
 
 def _congruence(face):
     """Sparse map from the scaled triangle of M to that of F M Fᵀ."""
-    import numpy as np
     from scipy import sparse
 
     face = np.asarray(face, dtype=float)
@@ -343,8 +323,6 @@ def _congruence(face):
 
 
 def _full(triangle, size: int):
-    import numpy as np
-
     rows, columns = pairs(size)
     matrix = np.zeros((size, size))
     values = np.where(rows == columns, 1.0, 1 / np.sqrt(2.0)) * triangle

@@ -4,6 +4,8 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import chain
 
+import numpy as np
+
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, evaluate
 from quakedesign.sos.exact.proofs import Point, holds
 from quakedesign.sos.exact.statement import Statement
@@ -18,8 +20,6 @@ _SIMPLE = (Fraction(0), Fraction(1), Fraction(-1), Fraction(1, 2), Fraction(2))
 
 def polished_zeros(statement: Statement, candidates: Sequence[Sequence[float]]) -> list[list[float]]:
     """Candidates where the polynomial nearly vanishes, after Newton steps on its gradient; different ones only."""
-    import numpy as np
-
     p = Arrays(statement.polynomial, len(statement.variables))
     found: list[list[float]] = []
     for x in candidates:
@@ -48,7 +48,6 @@ def local_minima(
 
 
 def _on_sphere(statement: Statement, hints, starts: int) -> Iterator[list[float]]:
-    import numpy as np
     from scipy.optimize import minimize
 
     size = len(statement.variables)
@@ -97,14 +96,10 @@ def _on_sphere(statement: Statement, hints, starts: int) -> Iterator[list[float]
 
 
 def _state(v, signed):
-    import numpy as np
-
     return np.where(signed, v**2, v)
 
 
 def _lifted(hint, signed, homogeneous: bool):
-    import numpy as np
-
     x = np.where(signed, np.sqrt(np.abs(hint)), hint)
     return x if homogeneous else np.append(x, 1.0)
 
@@ -114,7 +109,6 @@ def _unit(size: int, index: int) -> Exponents:
 
 
 def _constrained(statement: Statement, hints, starts: int) -> Iterator[list[float]]:
-    import numpy as np
     from scipy.optimize import minimize
 
     size = len(statement.variables)

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.errors import PolynomialError
 from quakedesign.rationals import nearest, rational
 from quakedesign.sos.exact.answer import Answer, Positivity
@@ -155,7 +157,6 @@ class Program:
     def _inside(self, best: float, room: float) -> Solution | None:
         """Proved decision after giving up some of the optimum for the largest margin."""
         import cvxpy as cp
-        import numpy as np
 
         margin = cp.Variable()
         constraints = [*self._constraints(margin), margin <= 1]
@@ -200,8 +201,6 @@ class Program:
         return constraints
 
     def _value(self, affine: Mapping[Exponents, Fraction]) -> Any:
-        import numpy as np
-
         zero = (0,) * len(self.decisions)
         units = [tuple(int(i == j) for j in range(len(zero))) for i in range(len(zero))]
         return np.array([float(affine.get(u, 0)) for u in units]) @ self._vector + float(affine.get(zero, 0))
@@ -279,7 +278,6 @@ def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fra
 def _membership(vector: Any, parts: Sequence[Mapping], template: Statement, margin: Any) -> list[Any]:
     """Equation between the coefficients of the polynomial and of a sum of squares with margin."""
     import cvxpy as cp
-    import numpy as np
 
     blocks = initial_blocks(template)
     rows = [r for _, _, r in relations(template)]
@@ -328,8 +326,6 @@ def _sparse(entries, index: Mapping[Exponents, int], size: int) -> Any:
 
 
 def _definite(vector: Any, rows: list[list[dict]], margin: Any) -> Any:
-    import numpy as np
-
     size = len(rows)
     zero = (0,) * vector.shape[0]
     total: Any = np.array([[float(entry.get(zero, 0)) for entry in row] for row in rows])

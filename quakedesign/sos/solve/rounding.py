@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.rationals import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, product, times
 from quakedesign.sos.exact.proofs import Square, SumOfSquares, identity_holds, residual
@@ -141,7 +143,6 @@ class _System:
 
     def _choose(self):
         """Independent rows and columns, by pivoted QR, with the exact square matrix between them."""
-        import numpy as np
         from flint import fmpq, fmpq_mat
         from scipy.linalg import qr
 

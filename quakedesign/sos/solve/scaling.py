@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+import numpy as np
+
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, monomial, rescaled
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares
 from quakedesign.sos.exact.squares import Element, Square
@@ -108,8 +110,6 @@ def _log2(value: Fraction) -> float:
 
 def _balance(statement: Statement) -> tuple[Fraction, ...]:
     """Powers of two that bring the coefficients of every polynomial as near to each other as they can."""
-    import numpy as np
-
     size = len(statement.variables)
     rows, sides = [], []
     polynomials = (statement.polynomial, *statement.inequalities, *statement.equalities)

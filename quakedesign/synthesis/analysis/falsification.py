@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from itertools import combinations, product
 from typing import Any
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.symbolic.terms import Term
 
@@ -90,15 +92,11 @@ class _Field:
     """The field of a loop in floating point, for many columns of states and parameters at once."""
 
     def __init__(self, loop: Loop) -> None:
-        import numpy as np
-
         self.loop, self.states = loop, list(loop.states)
         self.weights = np.array(list(loop.states.values()), dtype=float)[:, None]
 
     def rates(self, x: Any, parameters: Mapping[str, Any]) -> Any:
         """x' for states of shape (n, columns)."""
-        import numpy as np
-
         known = dict(zip(self.states, x, strict=True))
         for lift, terms in self.loop.lifts.items():
             known[lift] = self._sum(terms, known, parameters)
@@ -106,8 +104,6 @@ class _Field:
         return np.array(columns)
 
     def _sum(self, terms: Sequence[Term], known: Mapping[str, Any], parameters: Mapping[str, Any]) -> Any:
-        import numpy as np
-
         total: Any = 0.0
         for term in terms:
             part: Any = float(term.coefficient)
@@ -121,8 +117,6 @@ class _Field:
 
     def growths(self, plays: Sequence[tuple[_Play, ...]], steps: int, pace: float, seed: int) -> Any:
         """Largest growth in e-foldings of every play over all starts, the beginning of the run left out."""
-        import numpy as np
-
         x = np.tile(np.random.default_rng(seed).normal(size=(len(self.states), _STARTS)), len(plays))
         middle, ends = self._parameters()
         growth = np.zeros(x.shape[1])
@@ -143,8 +137,6 @@ class _Field:
 
     def _followed(self, plays: Sequence[_Play]) -> tuple[Any, Any, Any]:
         """Rows of the two signs that every column multiplies, in states, rates and a one; and the sign before them."""
-        import numpy as np
-
         rows = {name: i for i, name in enumerate((*self.states, *(f"{s}'" for s in self.states), ""))}
         pairs = np.array([[rows[name] for name in (*play.names, "")[:2]] for play in plays])
         return (*np.repeat(pairs, _STARTS, axis=0).T, np.repeat([play.sign for play in plays], _STARTS))

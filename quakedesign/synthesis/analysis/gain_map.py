@@ -7,6 +7,8 @@ from itertools import pairwise
 from math import log10
 from time import perf_counter
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.controllers import Subject
 from quakedesign.errors import ParameterError
@@ -274,8 +276,6 @@ def _prove(
 
 def _drawn(reached: Mapping[Place, int], proved: Mapping[Place, int], count: int, seed: int) -> list[tuple[Place, int]]:
     """Random points that were not tried yet, each with its own level."""
-    import numpy as np
-
     inside = sorted(p for p, k in reached.items() if k and p not in proved)
     chosen = np.random.default_rng(seed).permutation(len(inside))[:count]
     return [(inside[i], reached[inside[i]]) for i in sorted(chosen.tolist())]

@@ -5,6 +5,8 @@ from fractions import Fraction
 from math import factorial, prod
 from typing import Any
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligation
 from quakedesign.certificates.witnesses import statement_of
@@ -34,7 +36,6 @@ class Cones:
 
     def __init__(self, rows: Sequence[Row], loop: Loop, monomials: Sequence[Term], scale: Sequence[Fraction]) -> None:
         import cvxpy as cp
-        import numpy as np
         from scipy import sparse
 
         shapes = [shape_of(_template(row, loop, scale)) for row in rows]
@@ -58,8 +59,6 @@ class Cones:
 
     def solve(self, parts: Any, accuracy: float) -> tuple[float, Any, Any] | None:
         """Margin, a_j and L for the values of all parts, in the order of the rows; None if the solver fails twice."""
-        import numpy as np
-
         self._numbers.value = np.bincount(self.slots, parts)
         if not self.compiled.solve(accuracy, anew=False) and not self.compiled.solve(accuracy):
             return None

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.polynomial import monomial
@@ -165,8 +167,6 @@ class Sweep:
 
     def _features(self, values: Mapping[str, float]) -> Any:
         """Value of every product of names."""
-        import numpy as np
-
         return np.array([_product(values, names) for names in self.products])
 
     def _slopes(self, values: Mapping[str, float], per_product: Any) -> dict[str, float]:
@@ -182,8 +182,6 @@ class _Numbers:
     """The coefficients of a sweep in the units of one scale; without conditions all scales share a programme."""
 
     def __init__(self, sweep: Sweep, scale: tuple[Fraction, ...], cones: Cones | None) -> None:
-        import numpy as np
-
         self.cones = cones or Cones(sweep.rows, sweep.loop, sweep.monomials, scale)
         self.sizes = tuple(monomial(scale, exponents_of(t, sweep.loop.states)) for t in sweep.monomials)
         order = {names: i for i, names in enumerate(sweep.products)}
@@ -197,8 +195,6 @@ class _Numbers:
 
     def pace(self, features: Any) -> float:
         """Largest coefficient of all −V̇_j."""
-        import numpy as np
-
         with np.errstate(over="ignore", invalid="ignore"):
             merged = np.bincount(self.cones.slots[self.rate], (self.coefficients * features[self.products])[self.rate])
         if not np.isfinite(merged).all():
@@ -207,8 +203,6 @@ class _Numbers:
 
     def solve(self, features: Any, pace: float, accuracy: float) -> tuple[float, list[float], Any, float] | None:
         """Margin, decision, derivative of the margin in every product, and seconds; None if the solver fails."""
-        import numpy as np
-
         weights = np.where(self.rate, self.coefficients / pace, self.coefficients)
         found = self.cones.solve(weights * features[self.products], accuracy)
         if found is None:

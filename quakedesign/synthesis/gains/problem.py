@@ -4,6 +4,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.controllers import Subject, family, model_of
 from quakedesign.errors import ParameterError, UnknownNameError
@@ -105,8 +107,6 @@ def begin_with(asked: Question, seed: int) -> Iterator[Loop]:
 
     Random ones of any size where there are none in the literature.
     """
-    import numpy as np
-
     yield from sorted(asked.known, key=lambda one: _beyond(asked.setting, one))
     loop, rng = asked.loop, np.random.default_rng(seed)
     while True:

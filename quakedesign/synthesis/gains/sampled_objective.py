@@ -5,6 +5,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.certificates.premises import coefficient_range, least_authority
 from quakedesign.controllers import SlidingMode, control_law
@@ -194,7 +196,6 @@ def _tried(
     trial: Sampling, asked: Question, begin: Sequence[Fraction], rounds: int
 ) -> dict[float, tuple[Fraction, ...]]:
     """Screened gains by their errors, from some gains on."""
-    import numpy as np
     from scipy.optimize import minimize
 
     base = {name: float(k) for name, k in zip(asked.loop.gains, begin, strict=True)}

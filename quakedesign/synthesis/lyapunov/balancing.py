@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.polynomial import monomial
@@ -17,8 +19,6 @@ def balance(loop: Loop) -> tuple[Fraction, ...]:
     Least squares on the logarithms; the first state keeps its scale. A nested power counts as that of each of its
     terms.
     """
-    import numpy as np
-
     states = tuple(loop.states)
     rows, sides = [], []
     for terms in loop.field.values():

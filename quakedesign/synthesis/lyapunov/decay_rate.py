@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
+import numpy as np
 import sympy as sp
 
 from quakedesign.certificates import Loop
@@ -99,8 +100,6 @@ def _margin(one: Obligation, loop: Loop, scale: Sequence[Fraction]) -> float:
 
 def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
     """Smallest −V̇/V^{n/m} over sampled points: an estimate of κ from above."""
-    import numpy as np
-
     obligations = Obligations(loop, lyapunov)
     m = degree([p for _, p in obligations.function()], "V")
     found = [np.inf]
@@ -116,8 +115,6 @@ def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
 
 def _lifted(points, one: Obligation):
     """Points with the variables of nested powers, and which of them are in the cell."""
-    import numpy as np
-
     kept = np.full(len(points), True)
     for equality in one.equalities:
         position = points.shape[1]
@@ -134,7 +131,6 @@ def _lifted(points, one: Obligation):
 
 def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
     """Linear form with coefficients ≥ 0 next to the m-th root of a form, in the mean of the squared shares."""
-    import numpy as np
     from scipy.optimize import nnls
 
     points = _points(potential, m)
@@ -147,8 +143,6 @@ def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
 
 def _points(potential: Polynomial, m: int):
     """Directions spread over a cell (k × n), every variable in the unit in which V is one on its axis."""
-    import numpy as np
-
     size = len(next(iter(potential)))
     corners = [abs(float(potential.get(tuple(m * (i == j) for j in range(size)), 0))) for i in range(size)]
     units = np.array([c ** (-1 / m) if c > 0 else 1.0 for c in corners])
@@ -157,8 +151,6 @@ def _points(potential: Polynomial, m: int):
 
 
 def _values(polynomial: Polynomial, points):
-    import numpy as np
-
     exponents = np.array(list(polynomial), dtype=float)
     coefficients = np.array([float(c) for c in polynomial.values()])
     return np.prod(points[:, None, :] ** exponents[None, :, :], axis=2) @ coefficients

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligation, Obligations
 from quakedesign.errors import CertificateError
@@ -137,8 +139,6 @@ class _Search:
     def __init__(
         self, loop: Loop, degree: int, monomials: Sequence[Term], rows: Sequence[tuple[Obligation, ...]], seed: int
     ) -> None:
-        import numpy as np
-
         self.loop, self.degree, self.rows = loop, degree, rows
         self.scale = balance(loop)
         self.sizes = [monomial(self.scale, exponents_of(t, loop.states)) for t in monomials]
@@ -191,7 +191,6 @@ class _Search:
 
     def best(self) -> tuple[float, Any]:
         """Largest margin t with line·a ≥ t on all lines and |a_j| ≤ 1, and a."""
-        import numpy as np
         from scipy.optimize import linprog
 
         A = np.hstack([-np.array(self.lines), np.ones((len(self.lines), 1))])
@@ -202,8 +201,6 @@ class _Search:
 
     def refine(self, decision: Any) -> bool:
         """Add the worst of many new points; False where none is worse than those at hand."""
-        import numpy as np
-
         known = len(self.lines)
         tight = np.argsort(np.array(self.lines) @ decision)[: 2 * len(decision)]
         for i in range(_MORE):
@@ -220,7 +217,6 @@ class _Search:
 
     def exact(self) -> Dual | None:
         """Weights of a basic solution, solved for exactly."""
-        import numpy as np
         from scipy.optimize import linprog
 
         A = np.vstack([np.array(self.lines).T, np.ones(len(self.lines))])

@@ -2,6 +2,8 @@
 
 from fractions import Fraction
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligations
 from quakedesign.sos import Polynomial
@@ -15,8 +17,6 @@ def quadratic_matrix(loop: Loop, lyapunov: tuple[Term, ...]):
 
 
 def _matrix(polynomial: Polynomial, size: int):
-    import numpy as np
-
     full = np.zeros((size, size))
     for exponents, c in polynomial.items():
         i, *rest = [k for k, e in enumerate(exponents) for _ in range(e)]
@@ -27,8 +27,6 @@ def _matrix(polynomial: Polynomial, size: int):
 
 def quadratic_margin(loop: Loop, lyapunov: tuple[Term, ...]) -> Fraction:
     """Lower bound on the smallest eigenvalue of a quadratic V, 1/trace of the inverse; a proposal, not a proof."""
-    import numpy as np
-
     V = quadratic_matrix(loop, lyapunov)
     scale = 1 / np.sqrt(np.abs(np.diag(V)))
     inverse = np.linalg.inv(scale[:, None] * V * scale[None, :]) * scale[:, None] * scale[None, :]
@@ -37,7 +35,6 @@ def quadratic_margin(loop: Loop, lyapunov: tuple[Term, ...]) -> Fraction:
 
 def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
     """Largest a with V' ≤ −2aV at every vertex, for a quadratic V; floating point, may be negative."""
-    import numpy as np
     from scipy.linalg import eigh
 
     obligations = Obligations(loop, lyapunov)

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
 from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.certificates.obligations import Obligation, claimed, different
@@ -51,7 +53,6 @@ class CommonQuadratic:
 
     def __init__(self, polytope: Polytope) -> None:
         import cvxpy as cp
-        import numpy as np
 
         self.polytope, size = polytope, len(polytope.states)
         matrices = polytope.floats()
@@ -67,8 +68,6 @@ class CommonQuadratic:
 
     def __call__(self, rate: float = 0.0) -> Proposal | None:
         """V that decreases at least at a rate [1/s] everywhere, with the largest margin; None if none is found."""
-        import numpy as np
-
         self._rate.value = rate / self.scaling.pace
         if not solve(self._problem) or self._margin.value is None or not self._margin.value > _LEAST_MARGIN:
             return None
@@ -261,7 +260,6 @@ def _feedback(sectors: Sectors, rate: float, limits: Sequence[float]) -> tuple[l
     from itertools import product
 
     import cvxpy as cp
-    import numpy as np
 
     units = 1 / np.array(limits)
     chain = np.zeros((4, 4))

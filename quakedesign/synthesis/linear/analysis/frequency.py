@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
+
 from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
 
 
@@ -54,7 +56,6 @@ def circle_limit(loop: ErrorLoop, beta: Fraction, rate: Fraction, least: Fractio
     1/max Re G(jω) of G(z) = z²/(characteristic polynomial with s = least): for one sector and a constant β no quadratic
     V does better (Yakubovich, Kalman, Popov).
     """
-    import numpy as np
     from scipy.optimize import minimize_scalar
 
     a3, a2, a1, a0 = (float(c) for c in characteristic(loop, beta, least, rate))
@@ -109,8 +110,6 @@ class FrequencyFacts:
 
 def frequency_facts(loop: ErrorLoop, corner: Sequence[Fraction]) -> FrequencyFacts:
     """Margins of L(z) = βb(k2z³ + k1z² + k3z + k4)/(z²(z² + wz − s)) and norms of the closed loop at one vertex."""
-    import numpy as np
-
     beta, slip, rate = corner
     k1, k2, k3, k4 = loop.gains
     closed = [float(c) for c in characteristic(loop, beta, slip, rate)]
@@ -141,7 +140,6 @@ def frequency_facts(loop: ErrorLoop, corner: Sequence[Fraction]) -> FrequencyFac
 def _crossings(feedback: Sequence[float], plant: Sequence[float]) -> dict[str, list[float]]:
     """All factors on the gain, phases [deg] and scaled delays at which −1 is crossed; none without feedback."""
     import control
-    import numpy as np
 
     if not any(feedback):
         return {"gain": [], "phase": [], "delay": []}

@@ -11,6 +11,8 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.synthesis.linear.analysis.inverse_optimality_problem import NOTHING, Question
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, diagonal, total
 
@@ -48,16 +50,12 @@ def _moments(F: Matrix) -> tuple[Fraction, ...]:
 
 def _signals() -> tuple[Any, Any]:
     """X and the four moments of single frequencies (4 × n)."""
-    import numpy as np
-
     X = np.logspace(*_GRID)
     return X, np.array([X**2, X**3, X, np.ones_like(X)])
 
 
 def _margin(question: Question, split: Fraction, sizes: Sequence[Fraction]) -> float:
     """Least of π(X) over Σ sizes·(X², X³, X, 1), on a grid and at both ends."""
-    import numpy as np
-
     _, z = _signals()
     moments = _moments(question.F(question.P((Fraction(0),) * 6), bound_of(question, split)))
     inner = np.array([float(v) for v in moments]) @ z / (np.array([float(v) for v in sizes]) @ z)
@@ -127,8 +125,6 @@ def near(value: float | Fraction, bits: int) -> Fraction:
 
 def candidates(question: Question) -> Iterator[tuple[Fraction, ...]]:
     """Moments of single frequencies, then of two, most promising first."""
-    import numpy as np
-
     start = question.F(question.P((Fraction(0),) * 6), question.fixed_bound or NOTHING)
     slopes = np.array([float(v) for v in _moments(start)])
     g = [0.0, 0.0] if question.fixed_bound is not None else [float(v) for v in question.inside.bounds]
@@ -152,8 +148,6 @@ def _frequency(square: float, weight: Fraction = Fraction(1)) -> tuple[Fraction,
 
 def _pairs(slopes: Any, g: Sequence[float], X: Any, z: Any) -> Iterator[tuple[Fraction, ...]]:
     """Two frequencies whose admissible splits do not overlap: slower ones need more for slip, faster ones for rate."""
-    import numpy as np
-
     coarse = slice(None, None, 20)
     X, z = X[coarse], z[:, coarse]
     best: tuple[float, int, int, float] = (np.inf, 0, 0, 0.0)

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.plant import rational_matrices as matrices
 from quakedesign.synthesis.linear.plant.rational_matrices import (
@@ -88,7 +90,6 @@ def _scaled(a: Matrix, g: Matrix, q: Matrix, units) -> tuple[Matrix, Matrix, Mat
 def _propose(a: Matrix, g: Matrix, q: Matrix) -> Any:
     """Floating-point X from python-control, with BR⁻¹Bᵀ = G by its eigenvalues."""
     import control
-    import numpy as np
 
     A, G, Q = (np.array([[float(v) for v in row] for row in m]) for m in (a, g, q))
     values, vectors = np.linalg.eigh(G)
@@ -105,7 +106,6 @@ def _propose(a: Matrix, g: Matrix, q: Matrix) -> Any:
 
 def _refined(a: Matrix, g: Matrix, q: Matrix, proposal: Any) -> tuple[Matrix, Fraction]:
     """Newton steps, Lyapunov equations in floating point, residuals exact; the best X and its relative residual."""
-    import numpy as np
     from scipy.linalg import solve_continuous_lyapunov
 
     best = rounded(proposal, 100)

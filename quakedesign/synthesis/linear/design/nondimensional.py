@@ -5,6 +5,8 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.design.algebraic_riccati import METHOD
@@ -33,8 +35,6 @@ class ScaledDesign:
     def __init__(
         self, problem: LinearProblem, scales: Scales, wanted: Specifications, weights: Weights | None = None
     ) -> None:
-        import numpy as np
-
         self.outside, self.scales = problem, scales
         self.inside = problem.nondimensional(scales)
         self.rate = wanted.rate * scales.time
@@ -60,7 +60,6 @@ class ScaledDesign:
             When the time scales of the plant lie too far apart.
         """
         import control
-        import numpy as np
 
         used = self.best_split(R) if split is None else split
         try:
@@ -142,8 +141,6 @@ def vertex_poles(needed: Sectors, gains: Sequence[float | Fraction]) -> list[com
     """Closed-loop poles [1/s] at all vertices of the uncertainty, for gains in SI."""
     from itertools import product
 
-    import numpy as np
-
     b, poles = float(needed.authority), list[complex]()
     for beta, s, w in product(needed.beta, needed.slip, needed.rate):
         feedback = [-float(beta) * b * float(k) for k in gains]
@@ -165,6 +162,4 @@ def _root(excess: Callable[[float], float], low: float, high: float, tolerance: 
 
 def floats(matrix: Any) -> Any:
     """Array of floats."""
-    import numpy as np
-
     return np.array([[float(v) for v in row] for row in matrix])

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.controllers import control_law
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.fault import Fault
@@ -149,8 +151,6 @@ def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesig
 
 
 def _eigenvalues(matrix: Any) -> Any:
-    import numpy as np
-
     return np.linalg.eigvals(floats(matrix))
 
 

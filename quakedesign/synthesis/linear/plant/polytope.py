@@ -6,6 +6,8 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
+import numpy as np
+
 from quakedesign.certificates import Loop
 from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.errors import ParameterError
@@ -34,14 +36,10 @@ class Polytope:
 
     def floats(self) -> list[Any]:
         """Vertices as arrays (n × n)."""
-        import numpy as np
-
         return [np.array([[float(v) for v in row] for row in matrix]) for matrix in self.vertices.values()]
 
     def slowest(self) -> float:
         """Largest real part of an eigenvalue of a vertex [1/s]; no V decays faster than its negative."""
-        import numpy as np
-
         return max(float(np.linalg.eigvals(A).real.max()) for A in self.floats())
 
 
@@ -173,7 +171,6 @@ def modal_scaling(polytope: Polytope, entries: Sequence[Sequence[float]]) -> Mod
     entries : sequence of sequence of float
         Columns through which the disturbances, or the uncertainty, enter.
     """
-    import numpy as np
     from scipy.linalg import matrix_balance
 
     modes, moduli = _modes(np.mean(polytope.floats(), axis=0))
@@ -191,8 +188,6 @@ def modal_scaling(polytope: Polytope, entries: Sequence[Sequence[float]]) -> Mod
 
 def _modes(mean: Any) -> tuple[Any, Any]:
     """Real eigenvectors as columns (real and imaginary part of a pair) and the moduli of their eigenvalues."""
-    import numpy as np
-
     values, vectors = np.linalg.eig(mean)
     columns, moduli = [], []
     for pole, vector in zip(values, vectors.T, strict=True):

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Vertex
 from quakedesign.synthesis.linear.plant.rational_matrices import (
     Matrix,
@@ -145,7 +147,6 @@ def clock_proof(
 def _propose(problem: LinearProblem, K: Sequence[Fraction], lengths: Sequence[Fraction], degree: int) -> list[Any]:
     """P_0 … P_D with the largest margin, in units in which all parts of the law are as large."""
     import cvxpy as cp
-    import numpy as np
 
     own = balanced_units(K)
     units = (*own, law_unit(K, own))

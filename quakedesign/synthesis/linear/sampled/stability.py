@@ -8,6 +8,8 @@ from fractions import Fraction
 from itertools import count
 from typing import Any
 
+import numpy as np
+
 from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError
@@ -187,8 +189,6 @@ def _widths(cell: Cell, box: Cell) -> list[float]:
 
 def largest_radius(problem: LinearProblem, gains: Sequence[Fraction], step: float, integration: str = "exact") -> float:
     """Largest spectral radius of a period over the vertices of the box, in floating point."""
-    import numpy as np
-
     push = [float(problem.sectors.authority * k) for k in gains]
     radii = []
     for beta, s, w in problem.vertices():
@@ -265,8 +265,6 @@ def _all_shorter(
 
 def _first_refuted(problem: LinearProblem, gains: Sequence[Fraction], judged: Any) -> tuple[Fraction, Verdict]:
     """Period that is refuted, twice one that is not, from the fastest pole of the vertices on; or the longest tried."""
-    import numpy as np
-
     loops = [np.array([[float(v) for v in row] for row in problem.loop(v, gains)]) for v in problem.vertices()]
     fastest = max(float(np.abs(np.linalg.eigvals(m)).max()) for m in loops)
     step = rational(f"{0.5 / fastest:.3e}")

@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.errors import ParameterError
 
 INTEGRATIONS = ("exact", "euler")
@@ -99,15 +101,12 @@ def held_matrix(step: float, beta: float, s: float, w: float, push: Sequence[flo
     push : sequence of 4 float
         b·K.
     """
-    import numpy as np
-
     F, G = held_plant(step, s, w, integration)
     return F - beta * np.outer(G, push)
 
 
 def held_plant(step: float, s: float, w: float, integration: str = "exact") -> tuple[Any, Any]:
     """F (4 × 4) and G (4) of x⁺ = Fx + G·u for an acceleration u held over a step [s]."""
-    import numpy as np
     from scipy.linalg import expm
 
     chain = np.zeros((5, 5))
