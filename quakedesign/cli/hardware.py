@@ -1,5 +1,6 @@
 """Options about what lies around a controller: actuator and sensors, the same for every command that runs one."""
 
+import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -123,8 +124,6 @@ class SensorOptions(EstimateOptions):
 
     def build(self, step: float, seed: int = 0) -> "Measurement | Sensor":
         """Measurement or sensor for a sampling period [s] and a seed of the noise; raises `ParameterError`."""
-        import math
-
         from quakedesign.simulation import Measurement
         from quakedesign.studies.estimation import sensor
 

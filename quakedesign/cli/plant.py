@@ -1,5 +1,6 @@
 """Commands about the fault itself: what it is, its equations, its scaling, the paper's errata."""
 
+import re
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -28,8 +29,6 @@ def fault(fault: FaultName, /, *, box: Box = None, output: Output = PLAIN) -> in
 
 def _plain(expression: Any) -> str:
     """Text of a SymPy expression with its LaTeX names made plain, such as k_hat."""
-    import re
-
     return re.sub(r"\\hat\{\\?(\w+)\}", r"\1_hat", str(expression)).replace("\\", "")
 
 

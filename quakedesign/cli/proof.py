@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -108,8 +109,6 @@ def _certify_on_fault(
     out: Path | None, force: bool, output: Output,
 ) -> int:  # fmt: skip
     """Verdict on an e-LQR."""
-    from time import perf_counter
-
     from quakedesign.controllers.elqr import ExtendedLQR
     from quakedesign.fault import load_fault
     from quakedesign.report.linear import verdict_lines

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
@@ -73,8 +74,6 @@ def synthesise(
     out
         File for the certificate, which is written whole or not at all.
     """
-    from time import perf_counter
-
     from quakedesign.synthesis.gains.objectives import OBJECTIVES
 
     if objective not in (*OBJECTIVES, "sampled"):

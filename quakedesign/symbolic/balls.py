@@ -9,6 +9,7 @@ from operator import methodcaller, mul
 from typing import Any
 
 import sympy as sp
+from flint import arb, fmpq
 
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.rationals import fraction_of_float
@@ -22,8 +23,6 @@ Work = list[tuple[int, Operation, list[int]]]
 
 def ball(low: Fraction, high: Fraction) -> Any:
     """Ball that contains the interval [low, high]."""
-    from flint import arb, fmpq
-
     ends = [arb(fmpq(v.numerator, v.denominator)) for v in (low, high)]
     return ends[0].union(ends[1])
 
@@ -111,8 +110,6 @@ def _depending(work: Work, index: int) -> Work:
 
 
 def _number(e: sp.Expr) -> Any:
-    from flint import arb, fmpq
-
     if e.is_Rational:
         return arb(fmpq(int(e.p), int(e.q)))
     if e.is_Float:
@@ -162,8 +159,6 @@ def _smaller(a: Any, b: Any) -> Any:
 
 
 def _power(exponent: sp.Expr) -> Operation:
-    from flint import arb, fmpq
-
     if exponent.is_Integer:
         n = abs(int(exponent))
         if exponent.is_positive:
@@ -189,8 +184,6 @@ def _integer_power(base: Any, n: int) -> Any:
 
 
 def _monotone(exponent: sp.Expr, *, signed: bool) -> Operation:
-    from flint import arb, fmpq
-
     if not exponent.is_Rational:
         return _without(f"the exponent {exponent}")
     power = arb(fmpq(int(exponent.p), int(exponent.q)))

@@ -11,7 +11,9 @@ from functools import reduce
 from math import inf
 from typing import Any, NoReturn
 
+import flint
 import sympy as sp
+from flint import arb, fmpq
 
 from quakedesign.errors import UnsupportedError
 from quakedesign.rationals import fraction_of, fraction_of_float, rational
@@ -164,8 +166,6 @@ def _power(base: Interval, exponent: sp.Expr) -> Interval:
 
 
 def _root(x: End, exponent: sp.Rational, *, up: bool) -> End:
-    from flint import arb, fmpq
-
     power = fmpq(int(exponent.p), int(exponent.q))
     return x if isinstance(x, float) else _end(lambda: arb(fmpq(x.numerator, x.denominator)) ** arb(power), up=up)
 
@@ -188,8 +188,6 @@ def _rising(function: Any, x: Interval) -> Interval:
 
 
 def _rise(function: Any, x: End, *, up: bool) -> End:
-    from flint import arb, fmpq
-
     if isinstance(x, float):
         return _RISING[function][x == inf]
     return _end(lambda: getattr(arb(fmpq(x.numerator, x.denominator)), function.__name__)(), up=up)
@@ -197,8 +195,6 @@ def _rise(function: Any, x: End, *, up: bool) -> End:
 
 def _end(evaluate: Callable[[], Any], *, up: bool) -> End:
     """Upper or lower end of a ball that is evaluated with `_BITS` bits."""
-    import flint
-
     with flint.ctx.workprec(_BITS):
         return upper_end(evaluate()) if up else -upper_end(-evaluate())
 
@@ -220,8 +216,6 @@ def upper_end(ball: Any) -> End:
 
 def _wave(name: str) -> Callable[[list[Interval]], Interval]:
     def operation(arguments: list[Interval]) -> Interval:
-        from flint import arb, fmpq
-
         low, high = arguments[0]
         if isinstance(low, float) or isinstance(high, float):
             return -_ONE, _ONE
@@ -277,7 +271,6 @@ _OPERATIONS: dict[Any, Callable[[list[Interval]], Interval]] = {
 
 def _rounded(a: Interval) -> Interval:
     """The interval, rounded outwards where its ends have grown long."""
-    from flint import arb, fmpq
 
     def end(x: End, *, up: bool) -> End:
         if isinstance(x, float) or max(x.numerator.bit_length(), x.denominator.bit_length()) <= _LONGEST:

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 import sympy as sp
+from flint import arb, ctx
 
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
@@ -198,8 +199,6 @@ def _parts(expression: sp.Expr) -> list[sp.Expr]:
 
 def _enclosed(terms: list[sp.Expr], box: Box) -> Interval:
     """Enclosure of Σ terms/Σ |terms| over a box: more digits at a point, more pieces on a range."""
-    from flint import ctx
-
     before = ctx.prec
     try:
         for ctx.prec in _PRECISIONS:
@@ -229,8 +228,6 @@ def _over_pieces(terms: list[sp.Expr], box: Box) -> Interval:
 
 
 def _ratio(terms: list[sp.Expr], box: Box) -> Interval:
-    from flint import arb
-
     balls = [enclose(t, box) for t in terms]
     total, size = sum(balls, start=arb(0)), sum((abs(b) for b in balls), start=arb(0))
     whole = (Fraction(-1), Fraction(1))

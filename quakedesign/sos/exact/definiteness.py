@@ -6,6 +6,8 @@ from itertools import islice
 from math import lcm
 from typing import TypeVar
 
+from flint import fmpz_mat
+
 from quakedesign.sos.exact.work import length, longest, spend
 
 Entry = TypeVar("Entry", int, Fraction)
@@ -55,8 +57,6 @@ def positive_definite_integers(rows: Sequence[Sequence[int]]) -> bool:
     Its eigenvalues are real, so they are positive if and only if the coefficients of its characteristic polynomial
     alternate in sign, none of them zero.
     """
-    from flint import fmpz_mat
-
     bits = max((abs(v).bit_length() for row in rows for v in row), default=0)
     spend(1 + len(rows) ** 4 * (bits + 10) // 100_000)  # modulo one prime after another, some nanoseconds each
     coefficients = reversed(fmpz_mat(rows).charpoly().coeffs())

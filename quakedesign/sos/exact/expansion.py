@@ -5,6 +5,8 @@ from fractions import Fraction
 from math import comb, prod
 from typing import Any, NamedTuple, NoReturn
 
+from flint import fmpq
+
 from quakedesign.errors import PolynomialError
 from quakedesign.rationals import fraction_of
 
@@ -68,8 +70,6 @@ class Expansion:
 
     def number(self, token: Token) -> Terms:
         """Constant polynomial of a decimal."""
-        from flint import fmpq
-
         mantissa, _, exponent = token.text.lower().partition("e")
         whole, _, decimals = mantissa.partition(".")
         if len(mantissa) > DIGITS or len(exponent) > 5 or abs(int(exponent or "0")) > DIGITS:
@@ -85,8 +85,6 @@ class Expansion:
 
     def variable(self, token: Token) -> Terms:
         """Polynomial of one name."""
-        from flint import fmpq
-
         return {self._units[token.text]: fmpq(1)}
 
     def negative(self, terms: Terms, token: Token) -> Terms:
@@ -123,8 +121,6 @@ class Expansion:
 
     def power(self, base: Terms, token: Token) -> Terms:
         """p to the whole number that the token must be."""
-        from flint import fmpq
-
         if not token.text.isdigit() or len(token.text) > 9 or int(token.text) > DEGREE:
             expected = f"a whole number from 0 to {DEGREE} as exponent"
             refuse(self._text, token, expected, "Write for example x^2; only digits make an exponent.")

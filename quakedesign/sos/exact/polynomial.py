@@ -7,6 +7,8 @@ from itertools import combinations_with_replacement
 from operator import add
 from typing import Any
 
+from flint import fmpq, fmpq_mpoly_ctx
+
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.work import expanded, length, longest, spend
 
@@ -18,15 +20,11 @@ Polynomial = Mapping[Exponents, Fraction]
 @cache
 def ring(variables: int) -> Any:
     """Multivariate polynomial ring over ℚ (python-flint context)."""
-    from flint import fmpq_mpoly_ctx
-
     return fmpq_mpoly_ctx.get([f"u{i}" for i in range(variables)], "degrevlex")
 
 
 def element(polynomial: Polynomial, variables: int) -> Any:
     """Element of the ring."""
-    from flint import fmpq
-
     spend(len(polynomial), longest(polynomial.values()))  # all over one denominator
     entries = {e: fmpq(c.numerator, c.denominator) for e, c in polynomial.items() if c}
     return ring(variables).from_dict(entries)

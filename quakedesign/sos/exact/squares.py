@@ -7,6 +7,8 @@ from fractions import Fraction
 from math import lcm
 from typing import NamedTuple
 
+from flint import fmpq, fmpq_mat, fmpz_mat
+
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.definiteness import full_matrix, over_common_denominator, positive_definite_integers
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, ring, times
@@ -77,8 +79,6 @@ def in_echelon_form(square: Square) -> Square:
     """The same square with a basis in which every element has a monomial of its own."""
     if has_own_monomials(square.basis):
         return square
-    from flint import fmpq, fmpq_mat
-
     polynomials = [as_polynomial(b) for b in square.basis]
     support = sorted({e for p in polynomials for e in p})
     size = len(polynomials)
@@ -125,8 +125,6 @@ def _in_monomials(basis: Sequence[Element], gram: IntegerGram) -> tuple[list[Exp
         if len(set(exponents)) != len(exponents):
             raise ValueError("a monomial occurs twice in a basis.")
         return exponents, gram
-    from flint import fmpz_mat
-
     support = sorted({e for b in basis for e in as_polynomial(b)})
     bits = longest(c for b in basis for c in as_polynomial(b).values())
     spend(len(support) * len(basis) * (len(support) + len(basis)), bits + _bits(gram.rows))

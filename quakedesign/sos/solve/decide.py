@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from flint import fmpq, fmpq_mat
+
 from quakedesign.rationals import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree
 from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds, identity_holds
@@ -206,8 +208,6 @@ def block_sizes(statement: Statement) -> dict[str, list[int]]:
 
 def _project(values: dict[Exponents, Fraction], rows) -> dict[Exponents, Fraction]:
     """Nearest-looking values that satisfy every relation: the pivots follow from the others."""
-    from flint import fmpq, fmpq_mat
-
     keys = sorted({e for r in rows for e in r} | set(values), key=lambda e: (sum(e), e), reverse=True)
     index = {e: i for i, e in enumerate(keys)}
     matrix = [[fmpq(0)] * len(keys) for _ in rows]

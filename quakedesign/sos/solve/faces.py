@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
+from flint import fmpq, fmpq_mat
 
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, evaluate, monomial
@@ -55,8 +56,6 @@ class Block:
 
     def restricted(self, kernel: Sequence[Row]) -> "Block | None":
         """Block whose Gram matrix has the given vectors (in the present basis) in its kernel; None if empty."""
-        from flint import fmpq, fmpq_mat
-
         if not kernel:
             return self
         reduced, rank = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in kernel]).rref()
@@ -147,8 +146,6 @@ def modulo(blocks: Sequence[Block], relations: Sequence[Polynomial]) -> list[Blo
 
 
 def _modulo(block: Block, relations: Sequence[Polynomial]) -> Block | None:
-    from flint import fmpq, fmpq_mat
-
     order = sorted(block.monomials, key=lambda e: (sum(e), e), reverse=True)
     index = {e: i for i, e in enumerate(order)}
     inside = [r for r in relations if all(e in index for e in r)]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import chain
+from itertools import chain, islice, product
 
 import numpy as np
 
@@ -178,8 +178,6 @@ def on_quadric(
     equality: Polynomial, near: Sequence[Fraction], scale: Sequence[Fraction]
 ) -> Iterator[tuple[Fraction, ...]]:
     """Rational points of a quadric near a given one: second intersections of lines through a rational point of it."""
-    from itertools import islice, product
-
     size = len(near)
     simple = (tuple(v / s for v, s in zip(p, scale, strict=True)) for p in product(_SIMPLE, repeat=size))
     seeds = (p for p in islice(simple, 5000) if evaluate(equality, p) == 0)

@@ -1,7 +1,7 @@
 """Positivity with decision variables: solved by cvxpy and Clarabel, rounded, and proved polynomial by polynomial."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -263,8 +263,6 @@ def _grid(width: Fraction) -> int:
 
 
 def _with_polynomial(template: Statement, polynomial: Mapping[Exponents, Fraction]) -> Statement:
-    from dataclasses import replace
-
     return replace(template, polynomial=polynomial)
 
 

@@ -5,6 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from flint import fmpq, fmpq_mat
 
 from quakedesign.rationals import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, product, times
@@ -127,8 +128,6 @@ class _System:
         return change
 
     def _solve(self, missing: Polynomial) -> dict[int, Fraction] | None:
-        from flint import fmpq, fmpq_mat
-
         if self.pivots is None:
             self.pivots = self._choose()
         rows, chosen, matrix = self.pivots
@@ -143,7 +142,6 @@ class _System:
 
     def _choose(self):
         """Independent rows and columns, by pivoted QR, with the exact square matrix between them."""
-        from flint import fmpq, fmpq_mat
         from scipy.linalg import qr
 
         keys = sorted({e for c in self.columns for e in c})

@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from flint import fmpq, fmpq_mat
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligation, Obligations
@@ -238,8 +239,6 @@ class _Search:
 
 def _null_vector(rows: Sequence[Sequence[Fraction]]) -> list[Fraction] | None:
     """Positive w with Σ w_i row_i = 0, where it is unique up to its size."""
-    from flint import fmpq, fmpq_mat
-
     entries = [[fmpq(v.numerator, v.denominator) for v in column] for column in zip(*rows, strict=True)]
     reduced, rank = fmpq_mat(entries).rref()
     if rank != len(rows) - 1:

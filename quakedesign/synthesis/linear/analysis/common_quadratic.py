@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -257,8 +258,6 @@ def sector_loop(controller: Any, sectors: Sectors) -> Loop:
 
 def _feedback(sectors: Sectors, rate: float, limits: Sequence[float]) -> tuple[list[float] | None, float]:
     """Gains of the program in the limits' own units: x_i counted in 1/limit_i, time in 1/pace, p in its own."""
-    from itertools import product
-
     import cvxpy as cp
 
     units = 1 / np.array(limits)

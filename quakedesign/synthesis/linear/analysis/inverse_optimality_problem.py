@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from flint import arb, fmpq
+
 from quakedesign.rationals import fraction_of
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.plant.rational_matrices import (
@@ -73,8 +75,6 @@ def moment_matrix(z: Sequence[Fraction]) -> Matrix:
 
 def refutes(question: Question, z: Sequence[Fraction]) -> bool:
     """Whether moments prove that no P exists, exactly: Z ≥ 0, not 0, and tr(Z F) ≤ 0 for every admissible D."""
-    from flint import arb, fmpq
-
     z1, z2, z3, z4 = z
     if min(z) < 0 or not any(z) or z2 * z3 < z1**2 or z1 * z4 < z3**2:
         return False

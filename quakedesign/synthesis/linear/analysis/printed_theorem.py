@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from flint import arb, arb_mat, fmpq
+
 from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.certificates.premises import least_authority, plant_ranges
 from quakedesign.fault import Fault, load_fault
@@ -169,7 +171,6 @@ def switched_growth(problem: LinearProblem, gains: Sequence[Fraction], switching
 
     |trace Mⁿ| ≤ 4ϱⁿ bounds the spectral radius ϱ of the 4 × 4 period M from below.
     """
-    from flint import arb, arb_mat, fmpq
 
     def ball(v: Fraction) -> Any:
         return arb(fmpq(v.numerator, v.denominator))

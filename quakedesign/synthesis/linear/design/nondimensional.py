@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -139,8 +140,6 @@ def sound_bound(bounds: Sequence[Fraction], split: Fraction) -> Matrix:
 
 def vertex_poles(needed: Sectors, gains: Sequence[float | Fraction]) -> list[complex]:
     """Closed-loop poles [1/s] at all vertices of the uncertainty, for gains in SI."""
-    from itertools import product
-
     b, poles = float(needed.authority), list[complex]()
     for beta, s, w in product(needed.beta, needed.slip, needed.rate):
         feedback = [-float(beta) * b * float(k) for k in gains]

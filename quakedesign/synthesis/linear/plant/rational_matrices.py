@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+from flint import arb, fmpq, fmpq_mat
+
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.definiteness import positive_definite
 
@@ -77,8 +79,6 @@ def diagonal(values: Sequence[Fraction]) -> Matrix:
 
 def inverse(a: Rows) -> Matrix:
     """A⁻¹; ZeroDivisionError for a singular matrix."""
-    from flint import fmpq, fmpq_mat
-
     found = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in a]).inv()
     return tuple(tuple(fraction_of(v) for v in row) for row in found.tolist())
 
@@ -101,8 +101,6 @@ def riccati_residual(a: Rows, g: Rows, q: Rows, x: Rows) -> Matrix:
 
 def frobenius(a: Rows) -> Fraction:
     """Rigorous upper bound on the Frobenius norm, tight to about 1e-15."""
-    from flint import arb, fmpq
-
     square = sum((v * v for row in a for v in row), Fraction(0))
     end = arb(fmpq(square.numerator, square.denominator)).sqrt().upper().fmpq()
     return fraction_of(end)
@@ -115,8 +113,6 @@ def definite(a: Rows) -> bool:
 
 def characteristic(a: Rows) -> tuple[Fraction, ...]:
     """Coefficients of det(zI − A), highest power first."""
-    from flint import fmpq, fmpq_mat
-
     found = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in a]).charpoly()
     return tuple(fraction_of(c) for c in reversed(found.coeffs()))
 

@@ -9,6 +9,7 @@ from itertools import count
 from typing import Any
 
 import numpy as np
+from flint import ctx
 
 from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
@@ -155,8 +156,6 @@ class _Task:
 
     def _unstable(self, point: Sequence[Fraction]) -> bool:
         """Whether a condition is surely violated at a point, with more digits where the plant grows far in a period."""
-        from flint import ctx
-
         for bits in _BITS:
             with ctx.workprec(bits):
                 found = self.conditions(tuple((v, v) for v in point))

@@ -15,6 +15,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from flint import arb, arb_mat, fmpq
 
 from quakedesign.errors import ParameterError
 
@@ -23,8 +24,6 @@ INTEGRATIONS = ("exact", "euler")
 
 def ball(value: Fraction) -> Any:
     """Ball about a rational."""
-    from flint import arb, fmpq
-
     return arb(fmpq(value.numerator, value.denominator))
 
 
@@ -35,8 +34,6 @@ def interval(low: Fraction, high: Fraction) -> Any:
 
 def response(sigma: Any, omega: Any) -> tuple[Any, Any, Any, Any]:
     """Impulse response g of g'' = σg − ωg' after a unit of time, and its three iterated integrals (balls)."""
-    from flint import arb, arb_mat
-
     o, one = arb(0), arb(1)
     chain = [[-omega, sigma, o, o, o]] + [[one if j == i else o for j in range(5)] for i in range(4)]
     column = arb_mat(chain).exp().tolist()
