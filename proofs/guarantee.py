@@ -6,11 +6,11 @@ impulse responses in integers, multiples of 2^-BITS, each with a bound of its er
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain, pairwise, product
-from math import ceil, comb
+from math import ceil, comb, lcm
 from typing import Any
 
 BITS = 192
@@ -25,6 +25,12 @@ LATE = 1 << 12  # what is left of the past after those is below a 4096th
 LARGEST = 1 << 2 * BITS  # entries beyond 2^BITS
 HALVINGS = 7
 CELLS = 10  # how often the range of e1 is halved
+MODES, PI = 8, Fraction(314159265358979323846, 10**20)  # of a layer of rock; PI is below pi by less than SHORT of it
+SHORT = Fraction(1, 10**20)
+SHORTEST = 32  # a layer takes at least the 32nd part of a step
+EVEN = [Fraction(i, PIECES) for i in range(PIECES + 1)]
+HALVES = [Fraction(i, 2) for i in range(3)]
+BENT = [Fraction(i, 128) for i in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)]  # after a step into a layer
 
 RATIONAL = re.compile(r"-?(0|[1-9][0-9]{0,399})(/[1-9][0-9]{0,399})?")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -319,12 +325,24 @@ def root_within(root: Root, step: Fraction, slip: Fraction, rate: Fraction) -> b
 
 
 @dataclass
+class Fade:
+    """At most height*e^(-rate*t) + floor, t after the event with this number."""
+
+    event: int
+    height: Fraction
+    rate: Fraction
+    floor: Fraction
+
+
+@dataclass
 class Loop:
     """Flow x' = Ax, then events (map, time until the next one; none in continuous time), inputs, the implicit step.
 
     The first two inputs flow; those of the implicit step and of the noise, if there are any, enter with the first
     event. `noise` bounds what the measured e1 and e2 are off, an input each where it is not 0. Without events there may
     be two inputs more, the second and third derivatives of the reference.
+    With a layer of rock a fourth output bounds what its modes leave out; where `fade` is given, that is one more
+    input, the last one.
     """
 
     flow: list[Row]
@@ -334,16 +352,23 @@ class Loop:
     root: Root | None
     step: Fraction
     noise: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
+    cuts: Sequence[Fraction] = tuple(EVEN)
+    past_cuts: Sequence[Fraction] = tuple(EVEN)
+    fade: Fade | None = None
 
 
 def read_loop(value: Any, task: Task) -> Loop:
-    """Build the error loop: e1, e2, the law's states, pressures on their way, valve, with a lag the fault's."""
+    """Build the error loop: e1, e2, the law's states, pressures on their way, valve, and what lies behind it.
+
+    That is: where there is a lag, the well's pressure less the valve's; modes of a layer of rock, less the well's.
+    Where a layer has no lag before it, the last state is the last step of the valve.
+    """
     if type(value) is dict and "rates" in value:
         return read_continuous(value, task)
-    more = [k for k in ("root", "noise") if type(value) is dict and k in value]
+    more = [k for k in ("root", "noise", "diffusion") if type(value) is dict and k in value]
     parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
     given = keys(value, "loop", *parts, *more)
-    implicit = "root" in more
+    implicit, layered = "root" in more, "diffusion" in more
     root = read_root(given["root"]) if implicit else None
     step, delay, lag = (number(given[k], k) for k in ("step", "delay", "lag"))
     need(step > 0 and 0 <= delay <= MAX_PERIODS * step and lag >= 0, "step > 0, delay of 0 to 8 steps, lag >= 0")
@@ -352,17 +377,28 @@ def read_loop(value: Any, task: Task) -> Loop:
     output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2 + implicit)
     noise = read_noise(given["noise"]) if "noise" in more else (Fraction(0), Fraction(0))
     need(implicit or not noise[1] or uses_rate(seen, feedback), "noise of the slip rate needs a law that measures it")
+    time = number(given["diffusion"], "diffusion") if layered else Fraction(0)
+    need(not layered or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
     whole, part = delay // step, delay % step
     waiting = int(whole) + (part > 0)
-    size = 2 + n + waiting + (lag > 0) + 1
+    behind, stepped = (lag > 0) + MODES * layered, layered and lag == 0
+    size = 2 + n + waiting + 1 + behind + stepped
     need(size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
     valve = 2 + n + waiting
+    path = range(valve + 1, valve + 1 + behind)
+    modes = path[lag > 0 :] if layered else range(0)
 
+    push = [Fraction(i == valve or (lag > 0 and i == valve + 1)) for i in range(size)]
     flow = zeros(size)
     flow[0][1] = Fraction(1)
-    flow[1][0], flow[1][1], flow[1][valve] = sum(task.s) / 2, -sum(task.w) / 2, sum(task.beta) / 2
     if lag > 0:
-        flow[1][valve + 1], flow[valve + 1][valve + 1] = flow[1][valve], -1 / lag
+        flow[valve + 1][valve + 1] = -1 / lag
+    for k, mode in enumerate(modes):
+        push[mode], flow[mode][mode] = mode_share(k), -mode_rate(k, time)
+        if lag > 0:
+            flow[mode][valve + 1] = 1 / lag
+    flow[1] = [sum(task.beta) / 2 * v for v in push]
+    flow[1][0], flow[1][1] = sum(task.s) / 2, -sum(task.w) / 2
 
     rest = [Fraction(0)] * (size - 2 - n)  # behind it the column of w
     asked = [*(task.b * v for v in (*feedback[:2], *output)), *rest, task.b * sum(feedback[2:])]
@@ -374,24 +410,39 @@ def read_loop(value: Any, task: Task) -> Loop:
         sample[place] = [*unit(size)[queue[i - 1]], Fraction(0)] if i else asked
     arrival = unit(size)
     arrival[valve] = unit(size)[valve - 1]
-    pressures = [Fraction(0)] * (2 + n) + [Fraction(-1)] * (waiting + 1) + [Fraction(0)] * (lag > 0)
+    pressures = [Fraction(0)] * (2 + n) + [Fraction(-1)] * (waiting + 1) + [Fraction(0)] * (behind + stepped)
     still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(update)]
     drift = [
         *pressures[:2],
         *(-v / task.b for v in steady_states(still, output, [Fraction(0)] * n, Fraction(1))),
         *pressures[2 + n :],
     ]
-    push = [Fraction(i >= valve) for i in range(size)]
-    if lag > 0:  # the fault's pressure stays while the valve's jumps
-        last = arrival if part else sample
-        last[valve + 1] = [p - v for p, v in zip([*push, Fraction(0)], last[valve], strict=False)]
+    last = arrival if part else sample
+    change = [v - (i == valve) for i, v in enumerate(last[valve])]
+    for i in path[:1] if lag > 0 else path:  # it stays while the valve's pressure jumps
+        last[i] = [v - c for v, c in zip(last[i], change, strict=True)]
+    if stepped:
+        last[-1] = change
     slope = sum(root.slopes) / (2 * step) if root else Fraction(0)
     events = [([[line[0] - slope * line[size], *line[1:size]] for line in sample], part or step)]
     events += [(arrival, step - part)] if part else []
     inputs = [unit(size)[1], drift, *([[line[size] for line in sample]] if root else [])]
     told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
     inputs += [entry for entry, off in zip(told, noise, strict=True) if off]
-    return Loop(flow, events, [unit(size)[0], unit(size)[1], push], inputs, root, step, noise)
+    outputs = [unit(size)[0], unit(size)[1], push]
+    if not layered:
+        return Loop(flow, events, outputs, inputs, root, step, noise)
+    high, rate, floor = abs(mode_share(MODES)), mode_rate(MODES, time), 6 * MODES * SHORT
+    if lag > 0:
+        left = (high / rate + floor * time) / lag
+        return Loop(
+            flow, events, [*outputs, [left * v for v in unit(size)[valve + 1]]], inputs, root, step, noise, BENT, HALVES
+        )
+    height, floor = high * (1 + 1 / (rate * step)), floor * (1 + time / step)
+    most = height + floor
+    fade = Fade(int(part > 0), height / most, rate, floor / most)
+    outputs, inputs = [*outputs, [most * v for v in unit(size)[-1]]], [*inputs, unit(size)[1]]
+    return Loop(flow, events, outputs, inputs, root, step, noise, BENT, HALVES, fade)
 
 
 def read_noise(value: Any) -> tuple[Fraction, Fraction]:
@@ -404,6 +455,16 @@ def read_noise(value: Any) -> tuple[Fraction, Fraction]:
 def uses_rate(measured: list[Row], feedback: Row) -> bool:
     """Whether a law without an implicit step does anything with the slip rate."""
     return any(line[1] for line in (*measured, feedback))
+
+
+def mode_rate(number: int, time: Fraction) -> Fraction:
+    """How fast a mode of a layer decays, from below, for L^2/D = time."""
+    return ((2 * number + 1) * PI / 2) ** 2 / time
+
+
+def mode_share(number: int) -> Fraction:
+    """What a mode of a layer takes of a step, its size from above."""
+    return (-1) ** number * 4 / ((2 * number + 1) * PI)
 
 
 def read_continuous(value: Any, task: Task) -> Loop:
@@ -544,43 +605,90 @@ def exponential(flow: list[Row], time: Fraction) -> Fixed:
     return total
 
 
+def exponentials(flow: list[Row], times: Row) -> list[Fixed]:
+    """The same of several times, as powers of that of the longest time that goes into all of them."""
+    grain = times[0] / lcm(*((times[0] / time).numerator for time in times))
+    found = {1: exponential(flow, grain)}
+
+    def power(k: int) -> Fixed:
+        if k not in found:
+            half = power(k // 2)
+            found[k] = half * half * found[1] if k % 2 else half * half
+        return found[k]
+
+    return [power(int(time / grain)) for time in times]
+
+
 # ---------------------------------------------------------------- L1 norms
 
 
 @dataclass
 class Flow:
-    """One event and the flow after it, cut into pieces, for one input; `sudden` if it enters with the event alone."""
+    """One event and the flow after it, cut into pieces, for one input.
+
+    It enters at every time, with the event alone (`sudden`), or less and less (`masses`, of every piece).
+    """
 
     event: Fixed
-    piece: Fraction
-    step: Fixed
+    pieces: Row
+    steps: list[Fixed]
+    nears: list[Fixed]
     whole: Fixed
-    ends: list[Fixed]
-    slopes: list[Fixed]
-    bends: list[Fixed]
-    bend: Fixed
-    near: Fixed
+    entry: Fixed
+    generator: Fixed
+    moved: set[int]
     sudden: bool
+    masses: list[tuple[Fraction, Fraction]]
+
+    def ends(self, start: int = 0) -> list[Fixed]:
+        """Impulse response from the start of a piece on, at the ends of pieces."""
+        found = [self.entry]
+        for step in self.steps[start:]:
+            found.append(step * found[-1])
+        return found
+
+    def slope(self, now: Fixed, i: int) -> Fixed:
+        """Bound of the first derivative over a piece that begins like this."""
+        return (self.nears[i] * (self.generator * now).size()).size()
+
+    def bend(self, now: Fixed, i: int) -> Fixed:
+        """The same of the second derivative."""
+        return (self.nears[i] * (self.generator * (self.generator * now)).size()).size()
 
 
-def cut(loop: Loop, entry: Row, sudden: bool) -> list[Flow]:
-    """Impulse responses over every flow, and bounds of their first two derivatives on every piece."""
+def cut(loop: Loop, cuts: Sequence[Fraction], entry: Row, sudden: bool, fade: Fade | None = None) -> list[Flow]:
+    """Flows with their pieces between the cuts, for one input."""
     flows = []
     generator = fixed(loop.flow)
+    moved = {i for i, v in enumerate(entry) if v}  # by the flow, at least
+    moved = following = {i for i, line in enumerate(loop.flow) if any(line[j] for j in moved)}
+    while following:
+        following = {i for i, line in enumerate(loop.flow) if any(line[j] for j in moved)} - moved
+        moved = moved | following
     for place, (event, duration) in enumerate(loop.events):
         entry = [Fraction(0)] * len(entry) if sudden and place else entry
-        h = duration / PIECES
-        step = exponential(loop.flow, h)
-        near = exponential(majorant(loop.flow), h).size()
-        ends, power = [column(entry)], fixed(unit(len(entry)))
-        for _ in range(PIECES):
-            ends.append(step * ends[-1])
-            power = step * power
-        slopes = [near * (generator * end).size() for end in ends[:-1]]
-        bends = [near * (generator * (generator * end)).size() for end in ends[:-1]]
-        jump = fixed(event)
-        flows.append(Flow(jump, h, step, power * jump, ends, slopes, bends, generator * generator, near, sudden))
+        lengths = [(b - a) * duration for a, b in pairwise(cuts)]
+        steps = exponentials(loop.flow, lengths)
+        nears = [near.size() for near in exponentials(majorant(loop.flow), lengths)]
+        whole = fixed(event)
+        for step in steps:
+            whole = step * whole
+        masses = []
+        if fade:
+            between = loop.events[fade.event : place] if place >= fade.event else loop.events[fade.event :]
+            since = sum((length for _, length in between), Fraction(0))
+            since += sum((length for _, length in loop.events[:place]), Fraction(0)) if place < fade.event else 0
+            masses = [mass(fade, since + c * duration, h) for c, h in zip(cuts, lengths, strict=False)]
+        flows.append(Flow(fixed(event), lengths, steps, nears, whole, column(entry), generator, moved, sudden, masses))
     return flows
+
+
+def mass(fade: Fade, start: Fraction, length: Fraction) -> tuple[Fraction, Fraction]:
+    """Bounds of the integral of the weight over a piece, and of its first moment about the start."""
+    x = fade.rate * start
+    height = fade.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24)  # e^x is larger than this sum
+    moment = height * min(1 / fade.rate**2, length**2 / 2) + fade.floor * length**2 / 2
+    return height * min(1 / fade.rate, length) + fade.floor * length, moment
 
 
 def majorant(flow: list[Row]) -> list[Row]:
@@ -588,19 +696,26 @@ def majorant(flow: list[Row]) -> list[Row]:
     return [[max(v, Fraction(0)) if i == j else abs(v) for j, v in enumerate(line)] for i, line in enumerate(flow)]
 
 
-def pieces(flow: Flow, later: Fixed) -> Fixed:
-    """Columns whose sum of absolute values, after any row, bounds the integral over a flow that `later` follows."""
+def pieces(flow: Flow, later: Fixed | None) -> Fixed:
+    """Columns whose sum of absolute values, after any row, bounds the integral over a flow that `later` may follow."""
+    ends = flow.ends()
     if flow.sudden:
-        return later * flow.ends[-1]
-    weights = [flow.piece / (2 if i in (0, PIECES) else 1) for i in range(PIECES + 1)]
-    ends = [(later * end).scaled(weight) for end, weight in zip(flow.ends, weights, strict=True)]
-    bent = flow.bends[0]
-    for other in flow.bends[1:]:
-        bent = bent + other
-    rest = (later.size() * bent).size().scaled(flow.piece**3 / 12).size()
+        return later * ends[-1] if later else ends[-1]
+    if flow.masses:
+        summed = [(flow.ends(i)[-1], m) for i, (m, _) in enumerate(flow.masses)]
+        rests = [(flow.slope(flow.ends(i + 1)[-1], i), m) for i, (_, m) in enumerate(flow.masses)]
+    else:
+        around = [a + b for a, b in pairwise([Fraction(0), *flow.pieces, Fraction(0)])]
+        summed = [(end, width / 2) for end, width in zip(ends, around, strict=True)]
+        rests = [(flow.bend(ends[i], i), h**3 / 12) for i, h in enumerate(flow.pieces)]
+    bound = [sum(bent.rows[j][0] * weight for bent, weight in rests) for j in range(len(flow.event.rows))]
+    rest = Fixed([[ceil(v) if j in flow.moved else 0] for j, v in enumerate(bound)])
+    if later:
+        summed, rest = [(later * end, weight) for end, weight in summed], (later.size() * rest).size()
     corner = [i for i, (v,) in enumerate(rest.rows) if v]
     diagonal = Fixed([[v if i == j else 0 for j in corner] for i, (v,) in enumerate(rest.rows)])
-    return ends[0].beside(*ends[1:], diagonal)
+    first, *others = (end.scaled(weight) for end, weight in summed)
+    return first.beside(*others, diagonal)
 
 
 @dataclass
@@ -623,11 +738,12 @@ class Past:
 
 def past(flows: list[Flow], rows: int) -> Past:
     """Sum 2^j periods until what is left is below a 256th of every unit row's sum."""
-    size = len(flows[0].event.rows)
-    period, parts = fixed(unit(size)), []
+    period, parts = None, []
     for flow in reversed(flows):
         parts.append(pieces(flow, period))
-        period = period * flow.whole
+        period = period * flow.whole if period else flow.whole
+    assert period is not None
+    size = len(period.rows)
     first, *others = parts
     columns = first.beside(*others)
     sums = columns.sums()
@@ -643,34 +759,72 @@ def past(flows: list[Flow], rows: int) -> Past:
     raise Refused(f"the nominal loop must be stable, and seen to be within {2**DOUBLINGS} periods")
 
 
-def gains(loop: Loop, entry: Row, sudden: bool) -> list[list[Fraction]]:
-    """Bounds of e1, e2 and the push for an input of size 1, on every piece of the period."""
+def gains(loop: Loop, entry: Row, sudden: bool, fade: Fade | None = None) -> list[list[Fraction]]:
+    """Bounds of every output for an input of size 1, on every piece of the period."""
     if not loop.events:
         return [[v] for v in flow_gains(loop, entry)]
-    flows, size = cut(loop, entry, sudden), len(loop.flow)
+    size, many = len(loop.flow), len(loop.outputs)
+    flows, early = (cut(loop, cuts, entry, sudden, fade) for cuts in (loop.cuts, loop.past_cuts))
     start = fixed(loop.outputs)
-    before = past(flows, len(flows) * (3 * (PIECES + 1) + size))
-    found: list[list[Fraction]] = [[], [], []]
+    square = flows[0].generator * flows[0].generator
+    before = past(early, len(flows) * (many * len(loop.cuts) + size))
+    found: list[list[Fraction]] = [[] for _ in loop.outputs]
     for number_of, flow in enumerate(flows):
         phases = [start]
-        for _ in range(PIECES):
-            phases.append(phases[-1] * flow.step)
+        for step in flow.steps:
+            phases.append(phases[-1] * step)
         stack = phases[0].above(*phases[1:], fixed(unit(size))) * flow.event
-        earlier = integral(flows[:number_of], before, stack)
+        earlier = integral(early[:number_of], before, stack)
         units = Fixed([[v] for v in earlier[-size:]])
-        bent = [(((phases[i] * flow.bend).size() * flow.near).size() * units).sums() for i in range(PIECES)]
-        for k in range(3):
-            ends = [(start * end).sums()[k] for end in flow.ends]
-            bends, slopes = ([(start.size() * v).sums()[k] for v in part] for part in (flow.bends, flow.slopes))
-            areas = [
-                (one + other) * flow.piece / 2 + bend * flow.piece**3 / 12
-                for (one, other), bend in zip(pairwise(ends), bends, strict=True)
-            ]
-            total = [earlier[3 * i + k] + (ends[i] if sudden else sum(areas[:i])) for i in range(PIECES + 1)]
-            for i in range(PIECES):
-                most = bent[i][k] + (bends if sudden else slopes)[i]
-                found[k].append((max(total[i], total[i + 1]) + most * flow.piece**2 / 8) / (1 << BITS))
+        news = list(since_event(flow, start))
+        for i, h in enumerate(flow.pieces):
+            bent = (((phases[i] * square).size() * flow.nears[i]).size() * units).sums()
+            for k in range(many):
+                first, last, more = (part[k] for part in news[i])
+                larger = max(earlier[many * i + k] + first, earlier[many * (i + 1) + k] + last)
+                found[k].append((larger + more + bent[k] * h**2 / 8) / (1 << BITS))
     return found
+
+
+def since_event(flow: Flow, outputs: Fixed) -> Iterator[tuple[Row, Row, Row]]:
+    """What came since the event, in every piece: bounds at both ends, and of what may lie above both of them."""
+    ends, size = flow.ends(), outputs.size()
+    heights = [sums_of(outputs * end) for end in ends]
+    total = [Fraction(0)] * len(size.rows)
+    for i, h in enumerate(flow.pieces):
+        bend, slope = sums_of(size * flow.bend(ends[i], i)), sums_of(size * flow.slope(ends[i], i))
+        if flow.sudden:
+            yield heights[i], heights[i + 1], [v * h**2 / 8 for v in bend]
+        elif flow.masses:
+            yield faded(flow, outputs, i)
+        else:
+            parts = zip(total, heights[i], heights[i + 1], bend, strict=True)
+            following = [v + (a + b) * h / 2 + c * h**3 / 12 for v, a, b, c in parts]
+            yield total, following, [v * h**2 / 8 for v in slope]
+            total = following
+
+
+def faded(flow: Flow, outputs: Fixed, i: int) -> tuple[Row, Row, Row]:
+    """The same of what fades: pieces that have passed, and all that the present one may bring."""
+    size, chord = outputs.size(), flow.pieces[i] ** 2 / 8
+    first, last = [Fraction(0)] * len(size.rows), [Fraction(0)] * len(size.rows)
+    ends = [sums_of(outputs * now) for now in (flow.entry, flow.steps[i] * flow.entry)]
+    bent = sums_of(size * flow.bend(flow.entry, i))
+    more = [flow.masses[i][0] * (max(a, b) + c * chord) for a, b, c in zip(*ends, bent, strict=True)]
+    for p, (heavy, moment) in enumerate(flow.masses[:i]):
+        now, later = flow.ends(p)[i - p], flow.ends(p + 1)[i - p - 1]
+        slope = sums_of(size * (flow.nears[p] * flow.slope(later, i)).size())
+        bent = sums_of(size * flow.bend(now, i))
+        here, there = sums_of(outputs * now), sums_of(outputs * (flow.steps[i] * now))
+        first = [v + heavy * a for v, a in zip(first, here, strict=True)]
+        last = [v + heavy * a for v, a in zip(last, there, strict=True)]
+        more = [v + heavy * a * chord + moment * b for v, a, b in zip(more, bent, slope, strict=True)]
+    return first, last, more
+
+
+def sums_of(values: Fixed) -> Row:
+    """Upper bounds of one column."""
+    return [Fraction(v) for v in values.sums()]
 
 
 def flow_gains(loop: Loop, entry: Row) -> Row:
@@ -725,7 +879,7 @@ def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:
     """Bounds for rows that act after the given flows of this period, and before the event of the next."""
     if not flows:
         return before.of(rows)
-    own = (rows * pieces(flows[-1], fixed(unit(len(before.far.rows))))).sums()
+    own = (rows * pieces(flows[-1], None)).sums()
     return [a + b for a, b in zip(own, integral(flows[:-1], before, rows * flows[-1].whole), strict=True)]
 
 
@@ -734,7 +888,11 @@ def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:
 
 def bounds(task: Task, loop: Loop) -> tuple[Row, Fraction]:
     """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee); the best of both classes."""
-    found = [gains(loop, entry, place > 1) for place, entry in enumerate(loop.inputs)]
+    fades = len(loop.inputs) - 1 if loop.fade else None
+    found = [
+        gains(loop, entry, place > 1 and place != fades, *[loop.fade] * (place == fades))
+        for place, entry in enumerate(loop.inputs)
+    ]
     proved, refusals = [], []
     for one in [task] if task.change is None else [task, replace(task, change=None)]:
         try:
@@ -762,6 +920,12 @@ def of_class(task: Task, loop: Loop, found: list[list[list[Fraction]]]) -> tuple
     if not loop.events and len(loop.inputs) == 4:
         own += [task.reference_acceleration, task.reference_jerk]
         shares += [[Fraction(0)] * 3] * 2
+    if len(loop.outputs) > 3:  # the last one bounds what the modes of a layer leave out
+        shares = [[*share, Fraction(0)] for share in shares]
+        if loop.fade:
+            own.append(Fraction(0))
+            shares.append([Fraction(0)] * 4)
+        shares[-1 if loop.fade else 0][3] = task.beta[1]
     table = [
         [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
         for share in shares
@@ -773,7 +937,7 @@ def of_class(task: Task, loop: Loop, found: list[list[list[Fraction]]]) -> tuple
         max(sum(g * v for g, v in zip(at, sizes, strict=True)) for at in zip(*of, strict=True))
         for of in zip(*found, strict=True)
     ]
-    return [peaks[0], peaks[1], peaks[2] + shifted], small
+    return [peaks[0], peaks[1], sum(peaks[2:]) + shifted], small
 
 
 def solve(table: list[Row], own: Row) -> Row:
@@ -847,6 +1011,7 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
     when = "for a pressure that acts at once (continuous time), which no sampled controller has"
     if "step" in loop:
         when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s"
+        when += f", rock of L^2/D = {loop['diffusion']} s" if "diffusion" in loop else ""
     kind = f"|phi| <= {lower(task.amplitude)} m/s^2"
     if task.change is not None:
         kind += f", |phi'| <= {lower(task.change)} m/s^3, phi(0) = 0"

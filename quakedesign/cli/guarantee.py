@@ -32,6 +32,7 @@ def guarantee(
     step: ExactSeconds | None = None,
     delay: ExactSeconds = "0",
     lag: ExactSeconds = "0",
+    diffusion: ExactSeconds = "0",
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
     slip_noise: ExactMetres = "0",
     rate_noise: ExactMetresPerSecond = "0",
@@ -64,7 +65,9 @@ def guarantee(
     delay
         From the measurement to the pressure at the valve.
     lag
-        Time constant between the valve and the fault.
+        Time constant between the valve and the fault, or the well where there is a diffusion.
+    diffusion
+        L²/D of the rock between well and fault; the designed e-LQR carries a model of it.
     measured
         What the designed e-LQR is told: slip-and-rate, or slip, from which it estimates the slip rate.
     slip_noise
@@ -100,6 +103,7 @@ def guarantee(
         step=None if step is None else rational(step, "step"),
         delay=rational(delay, "delay"),
         lag=rational(lag, "lag"),
+        diffusion=rational(diffusion, "diffusion"),
         measured=measured,
         slip_noise=rational(slip_noise, "slip noise"),
         rate_noise=rational(rate_noise, "rate noise"),

@@ -5,8 +5,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Force, Output
-from quakedesign.cli.shared import app, new_file
+from quakedesign.cli.shared import Force, Json, app, new_file, print_json, print_lines
 
 Text = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
@@ -24,7 +23,7 @@ def sos(
     verbose: Annotated[bool, Parameter(negative="")] = False,
     out: Path | None = None,
     force: Force = False,
-    output: Output = PLAIN,
+    json: Json = False,
 ) -> int:
     """Decide whether a polynomial is a sum of squares, with proof either way. Exit code 0 only if it is.
 
@@ -46,6 +45,10 @@ def sos(
         Show the sizes of the Gram matrices before and after the exact reduction.
     out
         File for the proof (proofs/FORMAT.md).
+    force
+        Replace an existing file.
+    json
+        Print JSON.
     """
     from quakedesign.sos import prove
     from quakedesign.sos.exact.files import plain_proof
@@ -65,5 +68,8 @@ def sos(
         "seconds": answer.seconds,
         "versions": dict(answer.versions),
     }
-    output.show(found, sentences(answer, verbose=verbose))
+    if json:
+        print_json(found)
+    else:
+        print_lines(sentences(answer, verbose=verbose))
     return 0 if found["verdict"] == "sos" else 1

@@ -3,8 +3,9 @@
 from quakedesign.arguments import check_arguments
 from quakedesign.loop.compensation import compensated
 from quakedesign.loop.continuous import ContinuousLaw, continuous_loop, exact_integrals
-from quakedesign.loop.held import held_loop
+from quakedesign.loop.held import SHORTEST, held_loop
 from quakedesign.loop.implicit_root import ImplicitRoot, Power
+from quakedesign.loop.internal_model import PathModel, estimate_through_path
 from quakedesign.loop.laws import (
     NOISES,
     LinearLaw,
@@ -13,17 +14,22 @@ from quakedesign.loop.laws import (
     disturbance_estimate,
     summed_integrals,
 )
+from quakedesign.loop.layer import Layer
 from quakedesign.loop.observer import ErrorPrediction, slip_observer
-from quakedesign.loop.periodic import PeriodicLoop, Segment
+from quakedesign.loop.periodic import Fading, PeriodicLoop, Segment
 from quakedesign.loop.running import SampledController
 
 __all__ = [
     "NOISES",
+    "SHORTEST",
     "ContinuousLaw",
     "ErrorPrediction",
+    "Fading",
     "ImplicitRoot",
+    "Layer",
     "LinearLaw",
     "Model",
+    "PathModel",
     "PeriodicLoop",
     "Power",
     "Prediction",
@@ -32,6 +38,7 @@ __all__ = [
     "compensated",
     "continuous_loop",
     "disturbance_estimate",
+    "estimate_through_path",
     "exact_integrals",
     "held_loop",
     "slip_observer",

@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import pairwise
 
 Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
+
+EVEN: Row = tuple(Fraction(i, 8) for i in range(9))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,10 +19,41 @@ class Segment:
     jump : tuple of rows
     duration : Fraction
         [s], positive.
+    ends, past_ends : tuple of Fraction
+        Where bounds cut the flow into pieces, for outputs and for what is past: shares of the duration from 0 to 1.
     """
 
     jump: Matrix
     duration: Fraction
+    ends: Row = EVEN
+    past_ends: Row = EVEN
+
+    def pieces(self, *, past: bool = False) -> tuple[Fraction, ...]:
+        """Lengths [s]."""
+        return tuple(self.duration * (b - a) for a, b in pairwise(self.past_ends if past else self.ends))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fading:
+    """An input b·w that dies out after the jump of a segment: |w| ≤ W·(height·e^{−rate·θ} + floor) a time θ after it.
+
+    Attributes
+    ----------
+    entry : tuple of Fraction
+        b.
+    first : int
+        Number of the segment, from 0.
+    height, floor : Fraction
+        [-], not negative.
+    rate : Fraction
+        [1/s], positive.
+    """
+
+    entry: Row
+    first: int
+    height: Fraction
+    rate: Fraction
+    floor: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +74,8 @@ class PeriodicLoop:
         Rows c with y = cx.
     sampled : dict of str to tuple of Fraction
         j_i by the name of an input that adds j_i·w_i to the state once a period, with the jump of the first segment.
+    fading : dict of str to Fading
+        Inputs of which only what a jump leaves is known.
     """
 
     states: tuple[str, ...]
@@ -48,6 +84,7 @@ class PeriodicLoop:
     inputs: dict[str, Row]
     outputs: dict[str, Row]
     sampled: dict[str, Row] = field(default_factory=dict)
+    fading: dict[str, Fading] = field(default_factory=dict)
 
     @property
     def period(self) -> Fraction:

@@ -173,3 +173,27 @@ def test_noise_that_is_none_is_refused_in_a_line(call, options, said):
     code, _, err = call("real-fault", *options)
     assert code == 2
     assert said in err
+
+
+def test_gains_that_know_nothing_of_the_rock_say_what_fails(call):
+    code, out, _ = call("real-fault", "--gains", *GAINS, "--diffusion", "1 s")
+    assert code == 1
+    assert out.startswith("none: ")
+    code, _, err = call("real-fault", "--gains", *GAINS, "--diffusion", "1 ms")
+    assert code == 2
+    assert "diffusion must take at least T_s/32, here 0.00575 s, or nothing. Received 0.001 s" in err
+
+
+@pytest.mark.slow
+def test_a_fault_behind_a_well_with_its_file(call, tmp_path):
+    path = tmp_path / "well.json"
+    more = ("--step", "50 ms", "--diffusion", "1 s", "--objective", "peak", "--json", "--out", str(path))
+    code, out, _ = call("real-fault", *more)
+    found = json.loads(out)
+    assert (code, found["verdict"]) == (0, "proved")
+    assert F(found["slip_rate_error"]) <= F(22, 10**5)
+    assert F(found["slip_rate_error"]) / 2 <= found["worst_found"]["slip_rate_error"] <= F(found["slip_rate_error"])
+    for seen in ("worst_found", "worst_found_with_stick"):
+        assert found[seen]["slip_error"] <= F(found["slip_error"])
+        assert found[seen]["slip_rate_error"] <= F(found["slip_rate_error"])
+    assert check_files([path], "real-fault")[str(path)][0] == "proved"

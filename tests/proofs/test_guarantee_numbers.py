@@ -431,7 +431,7 @@ def test_what_is_left_of_a_past_of_few_units_is_a_small_share_to_the_last_one(en
     """The past ends where |Ψ|·S ≤ S/256 exactly, all errors counted, and has at most S·256/255."""
     none = checker.Fixed([[0]])
     whole = checker.Fixed([[int(F(decay) * UNIT)]])
-    flow = checker.Flow(none, F(1), none, whole, [checker.Fixed([[entry]])], [], [], none, none, True)
+    flow = checker.Flow(none, [], [], [], whole, checker.Fixed([[entry]]), none, set(), True, [])
     found = checker.past([flow], 1)
     ((far,),), ((left,),) = found.far.size().rows, found.left.rows
     total = left * 255 // 256

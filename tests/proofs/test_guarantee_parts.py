@@ -208,9 +208,11 @@ def unless(error, work, *arguments):
 
 @pytest.mark.usefixtures("coarse")
 def test_both_build_the_same_loop_of_a_law_that_is_held():
-    random, built = Random(2), 0
+    random, built, layers = Random(2), 0, set()
     for i in range(60):
         (task, read), held = some_tasks()[i % 4], some_held(random)
+        if i % 3 and held.delay < 3 * held.step:
+            held = replace(held, diffusion=F(i, 7) * held.step)
         raw = document_of(Guarantee(task=task, held=held, claims=some_claims(random)))
         ours = unless(ParameterError, held.loop, task)
         theirs = unless(checker.Refused, checker.read_loop, raw["loop"], read)
@@ -220,8 +222,15 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             assert theirs.flow == [list(line) for line in ours.flow]
             jumps = [([list(line) for line in s.jump], s.duration) for s in ours.segments]
             assert theirs.events == jumps
-            assert theirs.outputs == [list(ours.outputs[y]) for y in OUTPUTS]
+            assert theirs.outputs == [list(line) for line in ours.outputs.values()]
+            assert all(list(theirs.cuts) == list(s.ends) for s in ours.segments)
+            assert all(list(theirs.past_cuts) == list(s.past_ends) for s in ours.segments)
+            fades = [(f.first, f.height, f.rate, f.floor) for f in ours.fading.values()]
+            given = theirs.fade
+            assert fades == ([(given.event, given.height, given.rate, given.floor)] if given else [])
+            layers.add((held.diffusion > 0, held.lag > 0, given.event if given else None))
             entries = [ours.inputs["acceleration"], ours.inputs["drift"], *ours.sampled.values()]
+            entries += [f.entry for f in ours.fading.values()]
             assert theirs.inputs == list(map(list, entries))
             assert (theirs.step, theirs.root is None) == (ours.period, held.law.root is None)
             assert theirs.noise == (held.slip_noise, held.rate_noise)
@@ -232,6 +241,7 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             claim = Guarantee(task=task, held=held, claims=some_claims(random))
             assert parse_guarantee(guarantee_text(claim)) == claim
     assert built > 25
+    assert {(True, True, None), (True, False, 0), (True, False, 1)} <= layers
 
 
 @pytest.mark.usefixtures("coarse")

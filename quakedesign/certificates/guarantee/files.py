@@ -70,6 +70,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         own |= {"of_reference": _texts(claim.law.of_reference)} if any(claim.law.of_reference) else {}
     else:
         law, times = claim.held.law, {name: str(getattr(claim.held, name)) for name in _TIMES}
+        times |= {"diffusion": str(claim.held.diffusion)} if claim.held.diffusion else {}
         own = {"update": [_texts(row) for row in claim.held.law.update]}
         root = claim.held.law.root
         own |= {} if root is None else {"root": _root_document(root)}
@@ -142,13 +143,15 @@ def _task(raw: dict[str, Any]) -> Task:
 
 
 def _held(raw: Any) -> Held:
-    given = {"root", "noise"} & set(raw) if isinstance(raw, dict) else set[str]()
+    given = {"root", "noise", "diffusion"} & set(raw) if isinstance(raw, dict) else set[str]()
     with_keys(raw, {*_TIMES, "update", *_LAW} | given)
     root = _read_root(raw["root"]) if "root" in given else None
     law = LinearLaw(update=_square(raw, "update"), root=root, **_rest(raw))
     noise = with_keys(raw["noise"], set(_NOISE)) if "noise" in given else {}
     bounds = {f"{name}_noise": read_rational(value) for name, value in noise.items()}
-    return Held(law=law, **{name: read_rational(raw[name]) for name in _TIMES}, **bounds)
+    diffusion = read_rational(raw["diffusion"]) if "diffusion" in given else Fraction(0)
+    need(diffusion > 0 or "diffusion" not in given, "diffusion must be positive where it is given")
+    return Held(law=law, diffusion=diffusion, **{name: read_rational(raw[name]) for name in _TIMES}, **bounds)
 
 
 def _continuous(raw: Any) -> ContinuousLaw:

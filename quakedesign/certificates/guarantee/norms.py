@@ -20,14 +20,20 @@ continued periodically to the past and the integral taken over (−∞, t]. That
 **Sampled inputs.** Where Σ j·w_k enters with the jumps at kT and |w_k| ≤ W for every k up to t, |cx(t)| ≤ W·Σ|cΦ(t,
 kT)j|: the same with a sum in place of the integral. A period has the one column e^{Aτ}j without a remainder, the flow
 since the last jump adds |ce^{Aθ}j|, which is within (β − α)²/8·max|cA²e^{Aσ}j| of its chord.
+
+**Fading inputs.** Where |w(τ)| ≤ W·ω(τ) with a weight ω of the phase, let Ω ≥ ∫ω and Ω′ ≥ ∫(τ − α)ω over a piece that
+begins at α. There |cΦ(t, τ)b| ≤ |cΦ(t, α)b| + (τ − α)·max|cΦA·b|, so Ω|cΦ(t, α)b| + Ω′·max|…| stands in place of
+the trapezoidal sum. Of the flow since the last jump, a piece that has passed adds Ω|ce^{A(θ − α)}b|, which is within (β
+− α)²/8·Ω·max|cA²e^{Aσ}b| of its chord, and Ω′ times the largest slope; the piece in which θ lies adds at most
+Ω·max|ce^{Aσ}b|. Since e^{−x} ≤ 1/(1 + x + x²/2 + x³/6 + x⁴/24) = E(x), the weight he^{−λθ} + f has Ω = hE(λα)·min(1/λ,
+ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import reduce
-from itertools import accumulate, pairwise
-from operator import add, mul
+from itertools import accumulate
+from operator import mul
 from typing import Any
 
 from flint import arb, arb_mat, ctx
@@ -36,20 +42,17 @@ from quakedesign.certificates.guarantee.ball_matrices import (
     absolute,
     ball,
     beside,
-    column,
     identity,
-    majorant,
     matrix,
     upper,
 )
+from quakedesign.certificates.guarantee.responses import Flow, Response, responses
 from quakedesign.errors import ParameterError
 from quakedesign.loop import PeriodicLoop
 
 _BITS = 128
-_PIECES = 8
 _SMALL = Fraction(1, 1 << 8)  # share of the sums that the tail may be
 _MOST_DOUBLINGS = 13
-_ZERO = Fraction(0)
 
 
 def norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
@@ -64,12 +67,9 @@ def norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
         flow = matrix(loop.flow)
         rows = matrix(tuple(loop.outputs.values()))
         found: dict[tuple[str, str], tuple[Fraction, ...]] = {}
-        for name, entry in (loop.inputs | loop.sampled).items():
-            sudden = name in loop.sampled
-            entries = [column(entry), *[column(entry) * (not sudden)] * (len(loop.segments) - 1)]
-            parts = zip(loop.segments, entries, strict=True)
-            flows = [_Flow.of(flow, matrix(s.jump), s.duration / _PIECES, b, sudden=sudden) for s, b in parts]
-            gains = _gains(flows, _Past.of(flows), rows)
+        flows, earlier = ([Flow.of(flow, part, past=past) for part in loop.segments] for past in (False, True))
+        for name in (*loop.inputs, *loop.sampled, *loop.fading):
+            gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name)), rows)
             found |= {
                 (output, name): tuple(map(upper, worst)) for output, worst in zip(loop.outputs, gains, strict=True)
             }
@@ -77,83 +77,25 @@ def norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Flow:
-    """One segment in balls.
-
-    Attributes
-    ----------
-    jump, step, whole : arb_mat
-        J, e^{Ah} of one piece, and e^{Aτ}J of the segment.
-    piece : arb
-        h.
-    response : list of arb_mat
-        e^{Ahi}b at the ends of the pieces.
-    curvature, slope : list of arb_mat
-        Upper bounds of |A²e^{Aσ}b| and |Ae^{Aσ}b| on every piece.
-    square, within : arb_mat
-        A², and an upper bound of |e^{Aσ}| on the first piece: e^{Mh} with |A| off the diagonal and max(A, 0) on it.
-    sudden : bool
-        Whether b enters with the jump alone.
-    """
-
-    jump: Any
-    step: Any
-    whole: Any
-    piece: Any
-    response: list[Any]
-    curvature: list[Any]
-    slope: list[Any]
-    square: Any
-    within: Any
-    sudden: bool
-
-    @classmethod
-    def of(cls, flow: Any, jump: Any, piece: Fraction, entry: Any, *, sudden: bool) -> "_Flow":
-        h = ball(piece)
-        step, within = (flow * h).exp(), absolute((majorant(flow) * h).exp())
-        response = list(accumulate([step] * _PIECES, lambda now, e: e * now, initial=entry))
-        return cls(
-            jump=jump,
-            step=step,
-            whole=reduce(mul, [step] * _PIECES) * jump,
-            piece=h,
-            response=response,
-            curvature=[within * absolute(flow * (flow * now)) for now in response[:-1]],
-            slope=[within * absolute(flow * now) for now in response[:-1]],
-            square=flow * flow,
-            within=within,
-            sudden=sudden,
-        )
-
-    def columns(self, later: Any) -> tuple[list[Any], Any]:
-        """Weighted ends of the pieces, mapped by what comes later, and the remainders' entries."""
-        if self.sudden:
-            return [later * self.response[-1]], column((_ZERO,) * later.nrows())
-        half = self.piece / 2
-        ends = [later * now * (half if i in (0, _PIECES) else self.piece) for i, now in enumerate(self.response)]
-        rest = absolute(later) * reduce(add, self.curvature)
-        return ends, absolute(rest * (self.piece**3 / 12))
-
-
-@dataclass(frozen=True, slots=True)
 class _Past:
     """Everything before the first jump of a period: columns of K periods, and what bounds the rest."""
 
+    parts: list[Response]
     columns: Any
     far: Any
     bound: Any
 
     @classmethod
-    def of(cls, flows: list[_Flow]) -> "_Past":
-        size = flows[0].jump.nrows()
+    def of(cls, parts: list[Response]) -> "_Past":
+        size = parts[0].of.jump.nrows()
         later, ends, rest = identity(size), list[Any](), arb_mat(size, 1)
-        for flow in reversed(flows):
-            own, remainder = flow.columns(later)
-            ends, rest, later = [*own, *ends], rest + remainder, later * flow.whole
-        return cls._summed(later, beside([*ends, _diagonal(rest)]))
+        for part in reversed(parts):
+            own, remainder = part.columns(later)
+            ends, rest, later = [*own, *ends], rest + remainder, later * part.of.whole
+        return cls._summed(parts, later, beside([*ends, _diagonal(rest)]))
 
     @classmethod
-    def _summed(cls, period: Any, columns: Any) -> "_Past":
+    def _summed(cls, parts: list[Response], period: Any, columns: Any) -> "_Past":
         sums = _row_sums(columns)
         for _ in range(_MOST_DOUBLINGS):
             following = period * columns
@@ -162,56 +104,40 @@ class _Past:
             far = absolute(period) * _as_column(sums)
             shares = [a / b for a, b in zip(far.entries(), sums, strict=True) if not a == 0]
             if all(share < ball(_SMALL) for share in shares):
-                return cls(columns, period, _as_column(sums) / (1 - ball(_SMALL)))
+                return cls(parts, columns, period, _as_column(sums) / (1 - ball(_SMALL)))
         raise ParameterError(
             f"the nominal loop must be stable. Received one that is not seen to be in {2**_MOST_DOUBLINGS} periods. "
             "Change the gains, or shorten T_s."
         )
 
-    def of_rows(self, rows: Any) -> list[Any]:
-        """N of every row."""
-        near, far = _row_sums(rows * self.columns), absolute(rows * self.far) * self.bound
-        return [a + b for a, b in zip(near, far.entries(), strict=True)]
+    def of_rows(self, rows: Any, segment: int) -> list[Any]:
+        """N of every row that acts just before a segment: those before it in this period, and all that is earlier."""
+        if segment == 0:
+            near, far = _row_sums(rows * self.columns), absolute(rows * self.far) * self.bound
+            return [a + b for a, b in zip(near, far.entries(), strict=True)]
+        before = self.parts[segment - 1]
+        ends, rest = before.columns(identity(rows.ncols()))
+        own = _row_sums(rows * beside([*ends, _diagonal(rest)]))
+        return [a + b for a, b in zip(own, self.of_rows(rows * before.of.whole, segment - 1), strict=True)]
 
 
-def _gains(flows: list[_Flow], past: _Past, outputs: Any) -> list[list[Any]]:
+def _gains(parts: list[Response], past: _Past, outputs: Any) -> list[list[Any]]:
     """Bounds for every output, on every piece of every segment."""
     size, count = outputs.ncols(), outputs.nrows()
     found: list[list[Any]] = [[] for _ in range(count)]
-    for number, flow in enumerate(flows):
-        phases = list(accumulate([flow.step] * _PIECES, mul, initial=outputs))
+    for number, part in enumerate(parts):
+        flow = part.of
+        phases = list(accumulate(flow.steps, mul, initial=outputs))
         rows = _above([*phases, identity(size)]) * flow.jump
-        before = _before(flows[:number], past, rows)
+        before = past.of_rows(rows, number)
         units = _as_column(before[-size:])
         for k in range(count):
-            own = _since_jump(flow, outputs, k)
-            total = [before[i * count + k] + own[i] for i in range(_PIECES + 1)]
-            for i, (start, end) in enumerate(pairwise(total)):
-                bent = (absolute(phases[i] * flow.square) * flow.within * units)[k, 0]
-                bent += (absolute(outputs) * (flow.curvature if flow.sudden else flow.slope)[i])[k, 0]
-                found[k].append(start.max(end) + bent * flow.piece**2 / 8)
+            row = arb_mat([outputs.tolist()[k]])
+            for i, (start, end, more) in enumerate(part.since_jump(row)):
+                bent = (absolute(phases[i] * flow.square) * flow.within[i] * units)[k, 0]
+                larger = (before[i * count + k] + start).max(before[(i + 1) * count + k] + end)
+                found[k].append(larger + more + bent * flow.chord(i))
     return found
-
-
-def _before(flows: list[_Flow], past: _Past, rows: Any) -> list[Any]:
-    """Bounds for rows that act just before a segment: the segments before it in this period, and the past."""
-    if not flows:
-        return past.of_rows(rows)
-    ends, rest = flows[-1].columns(identity(rows.ncols()))
-    own = _row_sums(rows * beside([*ends, _diagonal(rest)]))
-    return [a + b for a, b in zip(own, _before(flows[:-1], past, rows * flows[-1].whole), strict=True)]
-
-
-def _since_jump(flow: _Flow, outputs: Any, k: int) -> list[Any]:
-    """∫|ce^{Aσ}b|dσ from the jump to the end of every piece, from 0 on; |ce^{Aσ}b| of what enters with the jump."""
-    values = [abs((outputs * now)[k, 0]) for now in flow.response]
-    if flow.sudden:
-        return values
-    bent = [(absolute(outputs) * now)[k, 0] for now in flow.curvature]
-    pieces = [
-        (a + b) * flow.piece / 2 + c * flow.piece**3 / 12 for (a, b), c in zip(pairwise(values), bent, strict=True)
-    ]
-    return list(accumulate(pieces, initial=arb(0)))
 
 
 def _as_column(values: list[Any]) -> Any:

@@ -26,19 +26,22 @@ class Around(TypedDict, total=False):
 
     delay: Fraction
     lag: Fraction
+    diffusion: Fraction
     slip_noise: Fraction
     rate_noise: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Held:
-    """A law as it runs: once every T_s, its pressure held, after a delay, through a lag; what it measures may be off.
+    """A law as it runs: once every T_s, its pressure held, late, through a lag and rock, from what it measures.
 
     Attributes
     ----------
     law : LinearLaw
     step, delay, lag : Fraction
         [s].
+    diffusion : Fraction
+        L²/D of the layer between well and fault [s]; 0 for none.
     slip_noise, rate_noise : Fraction
         Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
 
@@ -52,6 +55,7 @@ class Held:
     step: Fraction
     delay: Fraction = Fraction(0)
     lag: Fraction = Fraction(0)
+    diffusion: Fraction = Fraction(0)
     slip_noise: Fraction = Fraction(0)
     rate_noise: Fraction = Fraction(0)
 
@@ -70,7 +74,13 @@ class Held:
     @property
     def around(self) -> Around:
         """All but law and T_s."""
-        return Around(delay=self.delay, lag=self.lag, slip_noise=self.slip_noise, rate_noise=self.rate_noise)
+        return Around(
+            delay=self.delay,
+            lag=self.lag,
+            diffusion=self.diffusion,
+            slip_noise=self.slip_noise,
+            rate_noise=self.rate_noise,
+        )
 
     @property
     def noise(self) -> dict[str, Fraction]:
@@ -92,9 +102,8 @@ class Held:
 
     def loop(self, task: Task) -> PeriodicLoop:
         """Nominal error loop on a task."""
-        return held_loop(
-            self.law, task.model, task.authority, self.step, delay=self.delay, lag=self.lag, noisy=self.noise
-        )
+        times = {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
+        return held_loop(self.law, task.model, task.authority, self.step, **times, noisy=self.noise)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,6 +212,7 @@ class Guarantee:
         when = f"held over {_seconds(held.step)}"
         when += f", {_seconds(held.delay)} late" if held.delay else ""
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
+        when += f", through rock of L^2/D = {_seconds(held.diffusion)} from well to fault" if held.diffusion else ""
         when += ", with the slip alone measured" if held.law.of_slip_alone else ""
         for name, bound in held.noise.items():
             when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"

@@ -31,6 +31,12 @@ steps of q are off by at most q/2.
 them at the samples before kT_s, then the inputs up to kT_s, which these samples alone decide, obey the bounds, so e is
 within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do. With
 noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places of E and R, and ε gains δγN1/T_s. ∎
+
+
+**Layer between well and fault.** Its pressure is that of its modes, v, and what they leave out, R, |R| ≤ sup|y| with
+the output y = ``left_out`` (`quakedesign.loop.layer`), so β(v + R) brings βR into e2′ beside a. Where the well's
+pressure moves, a takes it, with c = max β for y. Where it steps, R fades after every step, and βR is an input of its
+own, at most max β·sup|y| times its weight. ∎
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -55,6 +61,8 @@ _WORDS = {
     ("acceleration", "push"): "input gain's range",
     ("drift", "slip_rate_error"): "drift that the input gain makes of the disturbance",
     ("root", "slip_error"): "range of the implicit step's slope",
+    ("acceleration", "left_out"): "what the modes of the layer leave out",
+    ("left_out", "left_out"): "what the modes of the layer leave out",
 }
 _HALVINGS = 96
 
@@ -153,6 +161,7 @@ def bounds_from(
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
     channels = (*channels_of(task, root, step, noise), *_fed_forward(task, {name for _, name in gains}))
+    channels = tuple(_through_layer(task, channels, gains))
     loops = [
         [
             max(sum((c * gains[y, k.name][j] for y, c in i.shares.items()), _ZERO) for j in _parts(gains))
@@ -168,12 +177,12 @@ def bounds_from(
         y: max(
             sum((gains[y, k.name][j] * v for k, v in zip(channels, inputs, strict=True)), _ZERO) for j in _parts(gains)
         )
-        for y in OUTPUTS
+        for y in dict.fromkeys(y for y, _ in gains)
     }
     return Bounds(
         slip_error=Fraction(found["slip_error"]),
         slip_rate_error=Fraction(found["slip_rate_error"]),
-        push=Fraction(found["push"] + _unshifted(task)),
+        push=Fraction(found["push"] + found.get("left_out", _ZERO) + _unshifted(task)),
         small_gain=Fraction(small_gain),
     )
 
@@ -202,6 +211,18 @@ def _fed_forward(task: Task, names: Collection[str]) -> Iterator[Channel]:
         yield Channel(name="reference_acceleration", own=task.reference_rates[1], shares={})
     if "reference_jerk" in names:
         yield Channel(name="reference_jerk", own=task.reference_jerk, shares={})
+
+
+def _through_layer(
+    task: Task, channels: Sequence[Channel], gains: Mapping[tuple[str, str], tuple[Any, ...]]
+) -> Iterator[Channel]:
+    """Inputs of a loop through a layer: what its modes leave out, by itself or within the acceleration."""
+    fades, share = ("left_out", "left_out") in gains, {"left_out": task.beta[1]}
+    for channel in channels:
+        within = channel.name == "acceleration" and not fades and ("left_out", channel.name) in gains
+        yield replace(channel, shares={**channel.shares, **share}) if within else channel
+    if fades:
+        yield Channel(name="left_out", own=_ZERO, shares=share)
 
 
 def spectral_radius(matrix: Sequence[Sequence[Any]]) -> Any:

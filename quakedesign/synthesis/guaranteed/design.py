@@ -7,17 +7,18 @@ from math import hypot, inf, log10, sqrt
 from typing import Unpack
 
 import numpy as np
+from scipy.linalg import LinAlgError
 from scipy.optimize import OptimizeResult, minimize
 
 from quakedesign.certificates.guarantee import Around, Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated
-from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of
+from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of, why_no_law
 
 OBJECTIVES = ("tracking", "peak")
 _EVALUATIONS = 150
 _FEW = 50  # evaluations near a law that has a guarantee at another time
-_CREEPING = 0.1  # what the slip error over T_s counts beside the slip-rate error, so that the loop does not creep
+_CREEPING = 0.1  # what the slip error over a period counts beside the slip-rate error, so that the loop does not creep
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
 _MOST_GROWTH = 50.0  # logarithm; no law of samples answers that, and predictions far beyond it overflow
 _FAILED = 1e6
@@ -40,10 +41,13 @@ def first_held(
         return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None), near
     if (none := _unpredictable(task, step)) is not None:
         return none, near
+    reason = why_no_law(step, measured, around)
+    if reason:
+        return NoGuarantee(reason=reason, small_gain=None), near
     family, template = _family(task, step, measured, around)
 
     def cost(x: np.ndarray) -> float:
-        return _peak_cost(_seen(task, family, template, x), step)
+        return _peak_cost(_seen(task, family, template, x), family.period)
 
     for start in family.starts if near is None else (near,):
         reached, x = _search(cost, start, enough=_FAILED / 2, evaluations=_EVALUATIONS if near is None else _FEW)
@@ -67,7 +71,8 @@ def design_held(
     and the sizes of its process noise chosen in the same way.
 
     ``peak``: the smallest certified slip-rate error. ``tracking``: the smallest slip error under a disturbance that
-    drifts, among laws whose certified slip-rate error is at most `room` times the smallest.
+    drifts, among laws whose certified slip-rate error is at most `room` times the smallest. With a layer between well
+    and fault the law carries a model of the path.
 
     Parameters
     ----------
@@ -81,7 +86,7 @@ def design_held(
     measured : str
         ``slip-and-rate`` or ``slip``.
     **around : Fraction
-        Delay and lag [s], bounds of the noise of slip [m] and slip rate [m/s], as in `Held`; 0 unless given.
+        Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s], as in `Held`; 0 unless given.
 
     Raises
     ------
@@ -98,13 +103,18 @@ def design_held(
         )
     if (none := _unpredictable(task, step)) is not None:
         return none
+    reason = why_no_law(step, measured, around)
+    if reason:
+        return NoGuarantee(reason=reason, small_gain=None)
     family, template = _family(task, step, measured, around)
     worst = replace(task, change=None)  # gains are chosen for the larger class: they answer slow disturbances as well
 
     def seen(x: np.ndarray) -> Estimate | None:
         return _seen(worst, family, template, x)
 
-    best = min((_search(lambda x: _peak_cost(seen(x), step), start) for start in family.starts), key=lambda f: f[0])
+    best = min(
+        (_search(lambda x: _peak_cost(seen(x), family.period), start) for start in family.starts), key=lambda f: f[0]
+    )
     found = seen(best[1])
     if objective == "tracking" and found is not None and isinstance(found.bounds, Bounds):
         limit = (room or family.room) * float(found.bounds.slip_rate_error)
@@ -126,13 +136,15 @@ def _family(task: Task, step: Fraction, measured: str, around: Around) -> tuple[
     """Laws to choose among, and the loop of the first."""
     if measured not in MEASURED:
         raise ParameterError(f"measured must be one of {', '.join(MEASURED)}. Received {measured!r}.")
-    late, noise = around.get("delay", Fraction(0)), around.get("slip_noise", Fraction(0))
-    family = family_of(task, step, late, measured, noise)
+    family = family_of(task, step, measured, around)
     return family, Held(law=family.law(np.array(family.starts[0])), step=step, **around)
 
 
 def _seen(task: Task, family: Family, template: Held, x: np.ndarray) -> Estimate | None:
-    return estimated(task, replace(template, law=family.law(x))) if family.admits(x) else None
+    try:
+        return estimated(task, replace(template, law=family.law(x))) if family.admits(x) else None
+    except LinAlgError:  # of a Riccati equation
+        return None
 
 
 def _search(
@@ -153,13 +165,13 @@ def _search(
     return float(found.fun), found.x
 
 
-def _peak_cost(found: Estimate | None, step: Fraction) -> float:
+def _peak_cost(found: Estimate | None, period: Fraction) -> float:
     """Decibels of the slip-rate error; where there is no bound, how far from one."""
     if found is None:
         return 10 * _FAILED
     if isinstance(found.bounds, NoGuarantee):
         return _FAILED * min(float(found.bounds.small_gain or 9), 9.0)
-    return 10 * log10(float(found.bounds.slip_rate_error) + _CREEPING * float(found.bounds.slip_error / step))
+    return 10 * log10(float(found.bounds.slip_rate_error) + _CREEPING * float(found.bounds.slip_error / period))
 
 
 def _drift_cost(found: Estimate | None, limit: float) -> float:

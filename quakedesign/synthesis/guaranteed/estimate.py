@@ -1,5 +1,6 @@
 """The bounds of a guarantee in floats, for searches: proposes, decides nothing."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,16 +57,27 @@ def _gains(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | Non
     rows = np.array(list(loop.outputs.values()), dtype=float)
     return {
         (output, name): tuple(map(float, found))
-        for name, entry in (loop.inputs | loop.sampled).items()
-        for output, found in zip(
-            loop.outputs, _of_input(np.array(entry, float), flows, doublings, rows, name in loop.sampled), strict=True
-        )
+        for name, entry, enters in _entries(loop)
+        for output, found in zip(loop.outputs, _of_input(entry, flows, doublings, rows, enters), strict=True)
     }
 
 
-def _of_input(entry: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray, sudden: bool) -> np.ndarray:
-    responses = [_response(entry * (not sudden or not i), flow) for i, flow in enumerate(flows)]
-    sums = [_Sums(response, flow.piece, sudden) for response, flow in zip(responses, flows, strict=True)]
+def _entries(loop: PeriodicLoop) -> Iterator[tuple[str, np.ndarray, int | None]]:
+    """Every input, and the segment with whose jump it enters if that is so; what fades counts as sudden."""
+    for name, row in loop.inputs.items():
+        yield name, np.array(row, float), None
+    for name, row in loop.sampled.items():
+        yield name, np.array(row, float), 0
+    for name, fading in loop.fading.items():
+        area = fading.height / fading.rate + fading.floor * loop.period
+        yield name, np.array(fading.entry, float) * float(area), fading.first
+
+
+def _of_input(
+    entry: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray, enters: int | None
+) -> np.ndarray:
+    responses = [_response(entry * (enters in (None, i)), flow) for i, flow in enumerate(flows)]
+    sums = [_Sums(response, flow.piece, enters is not None) for response, flow in zip(responses, flows, strict=True)]
     own, later = [], np.eye(len(entry))
     for flow, part in zip(flows[::-1], sums[::-1], strict=True):
         own.append(later @ part.columns)

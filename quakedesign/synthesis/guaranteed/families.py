@@ -3,48 +3,70 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from math import floor, log10
+from math import log10
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from quakedesign.certificates.guarantee import Task
-from quakedesign.loop import ErrorPrediction, LinearLaw, Prediction, disturbance_estimate, slip_observer
+from quakedesign.certificates.guarantee import Around, Task
+from quakedesign.loop import SHORTEST, ErrorPrediction, LinearLaw, Prediction, disturbance_estimate, slip_observer
+from quakedesign.synthesis.guaranteed.path_design import STARTS, path_laws, path_modes
+from quakedesign.synthesis.guaranteed.rounding import short
 
 MEASURED = ("slip-and-rate", "slip")
 _STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
 _OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains, and decades above what noise allows
 _DECADES = 4.0  # of process noise over that of the measurement, at most, at the start
-_WIDEST = 12.0  # decades, at which Riccati equations are still solved well
+_FEWEST_MODES = 2  # of a layer, of a law that knows its path
+_WIDEST = 12.0  # decades, or exponents of weights, at which Riccati equations are still solved well
 _FAINT = 1e-12  # process noise of everything, so that the filter forgets its start
-_DIGITS = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Laws of numbers x, where to begin, which x make one, and what ``tracking`` may spend of the smallest peak."""
+    """Laws of numbers x, where to begin, which x make one, and what ``tracking`` may spend of the smallest peak.
+
+    The slip error counts over `period` [s] beside the slip-rate error, so that a loop does not creep.
+    """
 
     law: Callable[[np.ndarray], LinearLaw]
     starts: tuple[tuple[float, ...], ...]
     admits: Callable[[np.ndarray], bool]
     room: float
+    period: Fraction
 
 
-def family_of(task: Task, step: Fraction, delay: Fraction, measured: str, noise: Fraction) -> Family:
+def why_no_law(step: Fraction, measured: str, around: Around) -> str:
+    """Why there are no laws for a loop; empty if there are."""
+    if not around.get("diffusion"):
+        return ""
+    if SHORTEST * around["diffusion"] < step:
+        return f"a layer of L^2/D = {float(around['diffusion']):.4g} s is faster than T_s/{SHORTEST}; leave it out"
+    if measured == "slip":
+        return "no law of the slip alone knows a layer between well and fault; measure the slip rate as well"
+    return "" if path_modes(step, around) >= _FEWEST_MODES else "a law that knows delay and layer has too many states"
+
+
+def family_of(task: Task, step: Fraction, measured: str, around: Around) -> Family:
     """Feedback with an estimate of the disturbance, from slip and slip rate or from the slip alone.
+
+    Through a layer it is a feedback of the pressures on their way as well, which the law simulates.
 
     Parameters
     ----------
     task : Task
-    step, delay : Fraction
-        [s].
+    step : Fraction
+        T_s [s].
     measured : str
         One of `MEASURED`.
-    noise : Fraction
-        Bound of that of the slip [m], near which an observer's search begins.
+    around : Around
+        Near the bound of whose noise of the slip an observer's search begins; `why_no_law` must have no reason.
     """
+    delay = around.get("delay", Fraction(0))
+    if around.get("diffusion"):
+        return _through_path(task, step, around)
     if measured == "slip":
-        return _observers(task, step, delay, noise)
+        return _observers(task, step, delay, around.get("slip_noise", Fraction(0)))
     scale, prediction = _Scale.of(task, step), _ahead(task, step, delay)
     known = Prediction(
         of_slip=prediction.of_errors[1][0],
@@ -55,9 +77,16 @@ def family_of(task: Task, step: Fraction, delay: Fraction, measured: str, noise:
     )
 
     def law(x: np.ndarray) -> LinearLaw:
-        return disturbance_estimate(scale.gains(x), _short(float(x[2])), known, scale.gain)
+        return disturbance_estimate(scale.gains(x), short(float(x[2])), known, scale.gain)
 
-    return Family(law, _STARTS, lambda x: bool(0 < x[2] < 1), room=1.6)
+    return Family(law, _STARTS, lambda x: bool(0 < x[2] < 1), room=1.6, period=step)
+
+
+def _through_path(task: Task, step: Fraction, around: Around) -> Family:
+    def admits(x: np.ndarray) -> bool:
+        return bool(0 < x[2] < 1 and np.abs(x[:2]).max() < _WIDEST)
+
+    return Family(path_laws(task.model, step, around), STARTS, admits, room=1.6, period=step + around["diffusion"])
 
 
 def _observers(task: Task, step: Fraction, delay: Fraction, noise: Fraction) -> Family:
@@ -68,13 +97,13 @@ def _observers(task: Task, step: Fraction, delay: Fraction, noise: Fraction) -> 
 
     def law(x: np.ndarray) -> LinearLaw:
         corrections = units @ _kalman(follows, float(x[2]), float(x[3]))
-        first, second, third = (_short(float(v)) for v in corrections)
+        first, second, third = (short(float(v)) for v in corrections)
         return slip_observer(scale.gains(x), (first, second, third), prediction, scale.gain)
 
     moved = float(task.amplitude) * period**2
     decades = _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
     starts = tuple((k1, k2, decades + a, decades + b) for k1, k2, a, b in _OBSERVERS)
-    return Family(law, starts, lambda x: bool(np.abs(x[2:]).max() < _WIDEST), room=1.4)
+    return Family(law, starts, lambda x: bool(np.abs(x[2:]).max() < _WIDEST), room=1.4, period=step)
 
 
 def _kalman(follows: np.ndarray, acceleration: float, level: float) -> np.ndarray:
@@ -96,11 +125,11 @@ class _Scale:
     @classmethod
     def of(cls, task: Task, step: Fraction) -> "_Scale":
         gain = float(task.model.gain)
-        return cls(_short(gain), gain, float(step))
+        return cls(short(gain), gain, float(step))
 
     def gains(self, x: np.ndarray) -> tuple[Fraction, Fraction]:
         """k1 [Pa/m] and k2 [Pa·s/m]."""
-        return _short(float(x[0]) / self.model_gain / self.step**2), _short(float(x[1]) / self.model_gain / self.step)
+        return short(float(x[0]) / self.model_gain / self.step**2), short(float(x[1]) / self.model_gain / self.step)
 
 
 def _flow(task: Task) -> np.ndarray:
@@ -132,12 +161,4 @@ def _ahead(task: Task, step: Fraction, delay: Fraction) -> ErrorPrediction:
 
 
 def _rounded(rows: "np.ndarray | list[np.ndarray]") -> tuple[tuple[Fraction, ...], ...]:
-    return tuple(tuple(_short(float(v)) for v in row) for row in rows)
-
-
-def _short(value: float, digits: int = _DIGITS) -> Fraction:
-    """Rational with few decimal digits near a float."""
-    if not value:
-        return Fraction(0)
-    unit = Fraction(10) ** (floor(log10(abs(value))) + 1 - digits)
-    return round(Fraction(value) / unit) * unit
+    return tuple(tuple(short(float(v)) for v in row) for row in rows)

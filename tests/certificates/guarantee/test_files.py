@@ -8,6 +8,7 @@ from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from quakedesign.bounds import UpperBound
@@ -29,6 +30,7 @@ from quakedesign.loop import (
     slip_observer,
     summed_integrals,
 )
+from quakedesign.synthesis.guaranteed.path_design import path_laws
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("guarantee_check", PATH)
@@ -77,9 +79,17 @@ LOOPS = {
     "noisy deadbeat": replace(implicit("1", "1"), **NOISY),
     "noisy sluggish": replace(implicit("4/5", "97/100", "1/1000000"), slip_noise=F(1, 10**6)),
 }
+PATHS_OF = {
+    "rock": {"diffusion": F(1)},
+    "lagging rock": {"diffusion": F(1), "lag": F("0.05")},
+    "late rock": {"diffusion": F("0.5"), "delay": F("0.02")},
+}
+for name, path in PATHS_OF.items():
+    through = path_laws(task_of(load_fault("real-fault")).model, STEP, path)
+    LOOPS[name] = Held(law=through(np.array([0.94, -8.28, 0.1237])), step=STEP, **path)
 CONTINUOUS_GAINS = tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5")))
 CONTINUOUS = exact_integrals(CONTINUOUS_GAINS)
-EVERY = (*LOOPS, "continuous")
+EVERY = (*(name for name in LOOPS if name != "late rock"), "continuous")
 
 
 def claim(name="estimate", rate_limited=False):
@@ -115,6 +125,35 @@ def test_both_checkers_accept_what_the_package_writes(name, rate_limited):
     began = time.process_time()
     assert package(text) == "proved"
     assert time.process_time() - began < 0.5
+
+
+def test_a_layer_behind_a_delay_is_accepted_by_both():
+    text = guarantee_text(claim("late rock"))
+    assert parse_guarantee(text).held == LOOPS["late rock"]
+    assert standalone(text) == package(text) == "proved"
+
+
+def test_the_statement_says_what_rock_there_is():
+    text = guarantee_text(claim("lagging rock"))
+    said = "law with 8 states, every 23/125 s, 0 s late, lag 1/20 s, rock of L^2/D = 1 s"
+    assert said in checker.check(text).statement
+    assert "held over 0.184 s, through a lag of 0.05 s, through rock of L^2/D = 1 s from well to fault, for every" in (
+        parse_guarantee(text).sentence()
+    )
+
+
+@pytest.mark.parametrize("new", ["x", "1/0", "2/4", 0.5, True, [], {}, -1, "-1", "0", "22/4000", "11/2000"], ids=repr)
+def test_another_layer_is_refused_by_both(new):
+    """0 is said by leaving it out; 23/4000 is a 32nd part of the step."""
+    text = json.dumps(changed(json.loads(guarantee_text(claim("rock"))), ("loop", "diffusion"), new))
+    assert standalone(text).startswith("invalid")
+    assert package(text).startswith("invalid")
+
+
+def test_a_layer_of_a_32nd_part_of_a_step_is_read_by_both():
+    raw = changed(json.loads(guarantee_text(claim("rock"))), ("loop", "diffusion"), "23/4000")
+    assert "32nd" not in standalone(json.dumps(raw))
+    assert package(json.dumps(raw)) == "undecided"
 
 
 def test_the_statement_says_what_is_measured_and_how_well():
@@ -209,6 +248,7 @@ CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "
 @pytest.mark.parametrize(
     ("loop", "name"),
     [(loop, name) for loop in ("estimate", "sluggish", "continuous") for name in CLAIMS]
+    + [("rock", "slip_rate_error"), ("rock", "largest_pressure"), ("lagging rock", "slip_error")]
     + [("observer", "slip_rate_error"), ("noisy sluggish", "slip_error"), ("noisy", "least_pressure")],
 )
 def test_one_percent_less_is_refused_by_both(name, loop):
@@ -240,6 +280,8 @@ WORSE += [
     ("noisy sluggish", ("loop", "noise", "slip"), F(21, 20)),
     ("observer", ("loop", "noise", "slip"), F(21, 20)),
     ("observer", ("loop", "measured", 1, 0), F(3, 2)),
+    ("rock", ("loop", "diffusion"), F(11, 10)),
+    ("lagging rock", ("loop", "lag"), F(6, 5)),
     ("continuous", ("loop", "feedback", 0), F(3, 4)),
     ("continuous", ("loop", "feedback", 1), F(3, 4)),
     ("continuous", ("loop", "measured", 0, 0), F(4, 3)),

@@ -1,0 +1,86 @@
+"""Laws for a fault behind a layer of rock: gains of a discrete Riccati equation on fault and path."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from math import exp
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+
+from quakedesign.certificates.guarantee import Around
+from quakedesign.loop import Layer, LinearLaw, Model, PathModel, estimate_through_path
+from quakedesign.loop.layer import MODES
+from quakedesign.synthesis.guaranteed.rounding import short
+
+STARTS = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # where good laws were seen
+_MOST_STATES = 20  # of a loop
+_WITHOUT_PATH = 6 + MODES  # e1, e2, π, d, the valve, its last step and the modes of the layer
+
+
+def path_modes(step: Fraction, around: Around) -> int:
+    """How many modes of a layer a law may know so that the loop keeps within the states of a file."""
+    ages = -int(-around.get("delay", Fraction(0)) // step)
+    return _MOST_STATES - _WITHOUT_PATH - bool(around.get("lag")) - 2 * ages
+
+
+def path_laws(model: Model, step: Fraction, around: Around) -> Callable[[np.ndarray], LinearLaw]:
+    """Law of three numbers without units: weights of slip error and pressure, as logarithms, and a of the estimate.
+
+    The weights are those of a linear quadratic regulator on the sampled fault with its path, the slip-rate error's
+    being 1, with time in L²/D. The law raises LinAlgError where their equation has no solution.
+    """
+    gain = float(model.gain)
+    flow, first = _sampled(model, step, around, path_modes(step, around))
+    kept = tuple(tuple(short(v) for v in row) for row in flow[2:, 2:])
+    path = PathModel(
+        of_slip=short(flow[1, 0]),
+        of_rate=short(flow[1, 1]),
+        of_pressures=tuple(short(v / gain) for v in flow[1, 2:]),
+        of_asked=short(first[1] / gain),
+        kept=kept,
+    )
+    unit = float(around["diffusion"])
+
+    def law(x: np.ndarray) -> LinearLaw:
+        weights = np.zeros(flow.shape)
+        weights[0, 0], weights[1, 1] = exp(float(x[0])) / unit**2, 1
+        cost = exp(float(x[1])) * unit**2 * gain**2
+        riccati = solve_discrete_are(flow, first[:, None], weights, np.array([[cost]]))
+        gains = first @ riccati @ flow / (cost + first @ riccati @ first)
+        return estimate_through_path(tuple(short(float(v)) for v in gains), short(float(x[2])), path, short(gain))
+
+    return law
+
+
+def _sampled(model: Model, step: Fraction, around: Around, modes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Over one period: what becomes of e1, e2, the path's pressures and those asked for before, and of p [Pa]."""
+    delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
+    whole, late = int(delay // step), float(delay % step)
+    ages = whole + (late > 0)
+    lagging, layer = int(lag > 0), Layer(time=around["diffusion"])
+    size = 2 + lagging + modes
+    shares = np.array([float(layer.share(i)) for i in range(modes)])
+    rates = np.array([float(layer.rate(i)) for i in range(modes)])
+    flow = np.zeros((size + 1, size + 1))  # the last one is the valve's pressure
+    well = 2 if lagging else size
+    flow[0, 1] = 1
+    flow[1, :2] = float(model.slip), -float(model.rate)
+    flow[1, size - modes : size] = float(model.gain) * shares
+    flow[1, well] += float(model.gain) * (1 - shares.sum())
+    if lagging:
+        flow[2, [2, size]] = -1 / float(lag), 1 / float(lag)
+    for i, rate in enumerate(rates):
+        mode = size - modes + i
+        flow[mode, mode], flow[mode, well] = -rate, rate
+    whole_size = size + ages + 1  # with p last
+    period = np.eye(whole_size)
+    for valve, duration in ((size + ages - 1, late), (size + whole - 1 if whole else size + ages, float(step) - late)):
+        part = expm(flow * duration)
+        turn = np.eye(whole_size)
+        turn[:size, :size], turn[:size, valve] = part[:size, :size], part[:size, size]
+        period = turn @ period if duration else period
+    if ages:
+        period[size:-1] = 0
+        period[size, -1] = 1
+        period[range(size + 1, size + ages), range(size, size + ages - 1)] = 1
+    return period[:-1, :-1], period[:-1, -1]

@@ -1,0 +1,101 @@
+"""What fades after a jump, in both checkers, against closed forms: bounds above, and close where pieces are fine."""
+
+import importlib.util
+from fractions import Fraction as F
+from math import exp
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quakedesign.certificates.guarantee.norms import norms
+from quakedesign.loop import Fading, PeriodicLoop, Segment
+
+PATH = Path(__file__).parents[3] / "proofs" / "guarantee.py"
+SPECIFICATION = importlib.util.spec_from_file_location("guarantee_fading", PATH)
+checker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(checker)
+
+FINE = tuple(F(i, 64) for i in range(65))
+
+
+def gains_of_both(flow, jumps, durations, entry, row, *, first=0, height=1, rate=1, floor=0):
+    """For weights height·e^{−rate·θ} + floor since the jump of the segment `first`."""
+    rows = lambda table: tuple(tuple(map(F, line)) for line in table)  # noqa: E731
+    parts = [
+        Segment(jump=rows(jump), duration=F(time), ends=FINE, past_ends=FINE)
+        for jump, time in zip(jumps, durations, strict=True)
+    ]
+    fading = Fading(entry=tuple(map(F, entry)), first=first, height=F(height), rate=F(rate), floor=F(floor))
+    loop = PeriodicLoop(
+        states=tuple(f"x{i}" for i in range(len(flow))),
+        flow=rows(flow),
+        segments=tuple(parts),
+        inputs={},
+        outputs={"y": tuple(map(F, row))},
+        fading={"w": fading},
+    )
+    lists = [([list(line) for line in part.jump], part.duration) for part in parts]
+    fade = checker.Fade(first, fading.height, fading.rate, fading.floor)
+    theirs = checker.Loop(
+        [list(line) for line in loop.flow], lists, [list(map(F, row))], [], None, loop.period,
+        cuts=FINE, past_cuts=FINE, fade=fade,
+    )  # fmt: skip
+    (found,) = checker.gains(theirs, list(fading.entry), False, fade)
+    return np.array(norms(loop)["y", "w"], float), np.array(found, float)
+
+
+def just_above(found, exact, share=0.05):
+    """Both alike, nowhere below the exact gains, and above by less than a share of the largest."""
+    ours, theirs = found
+    return (
+        np.allclose(ours, theirs, rtol=1e-9)
+        and all(exact * (1 - 1e-9) <= ours)
+        and all(ours <= exact + share * max(exact))
+    )
+
+
+ENDS = np.arange(1, 65) / 64
+
+
+@pytest.mark.parametrize(("rate", "floor"), [(1, 0), (4, 0), (1, "1/3"), (40, 0)])
+def test_an_integrator_that_is_reset_adds_up_the_weight(rate, floor):
+    found = gains_of_both([[0]], [[[0]]], [2], [1], [1], rate=rate, floor=floor)
+    exact = (1 - np.exp(-rate * 2 * ENDS)) / rate + float(F(floor)) * 2 * ENDS
+    assert just_above(found, exact, 0.13 if rate < 40 else 0.8)
+
+
+def test_the_past_of_a_lag_that_is_halved_at_every_sample():
+    """x′ = −x + w with w = e^{−3θ}: one period leaves ∫₀¹ e^{−(1 − θ)}e^{−3θ}dθ = (e^{−1} − e^{−3})/2, times 1/2 …"""
+    found = gains_of_both([[-1]], [[["1/2"]]], [1], [1], [1], rate=3)
+    before = (exp(-1) - exp(-3)) / 2 / (1 - exp(-1) / 2)
+    own = lambda t: (np.exp(-t) - np.exp(-3 * t)) / 2  # noqa: E731
+    starts = ENDS - 1 / 64
+    exact = np.maximum(before / 2 * np.exp(-ENDS) + own(ENDS), before / 2 * np.exp(-starts) + own(starts))
+    assert just_above(found, exact, 0.1)
+
+
+def test_a_response_that_grows_counts_what_entered_earlier_for_more():
+    """y = x1, x1′ = x2, x2′ = w: ∫(t − θ)e^{−2θ}dθ = t/2 − (1 − e^{−2t})/4, reset at every sample."""
+    found = gains_of_both([[0, 1], [0, 0]], [[[0, 0], [0, 0]]], [3], [0, 1], [1, 0], rate=2)
+    t = 3 * ENDS
+    assert just_above(found, t / 2 - (1 - np.exp(-2 * t)) / 4, 0.12)
+
+
+def test_a_weight_goes_on_through_the_jumps_after_its_own():
+    """1 s, then the jump with which it begins, then 2 s: the weight of the first flow is that of 2 s to 3 s later."""
+    found = gains_of_both([[0]], [[[1]], [["1/4"]]], [1, 2], [1], [1], first=1, rate="1/2")
+    area = lambda a, b: 2 * (np.exp(-a / 2) - np.exp(-b / 2))  # noqa: E731
+    before = (area(0, 2) + area(2, 3) / 4) / (1 - 1 / 4)
+    first = before + area(2, 2 + ENDS)
+    second = first[-1] / 4 + area(0, 2 * ENDS)
+    assert just_above(found, np.concatenate([first, second]), 0.06)
+
+
+def test_a_response_that_changes_sign_adds_up_its_size():
+    """|sin| of the time since, by quadrature; sums of bounds of pieces are never less."""
+    found = gains_of_both([[0, 1], [-1, 0]], [[[0, 0], [0, 0]]], [6], [0, 1], [1, 0], rate=1, floor="1/10")
+    t = 6 * ENDS
+    points = np.linspace(0, 1, 2001)
+    exact = [np.trapezoid(np.abs(np.sin(s - s * points)) * (np.exp(-s * points) + 0.1), s * points) for s in t]
+    assert just_above(found, np.array(exact), 0.35)
