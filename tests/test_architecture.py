@@ -172,6 +172,11 @@ def test_only_the_search_knows_the_solvers():
     assert users <= {"sos.solve", "synthesis"}
 
 
+def test_cones_are_assembled_by_hand_for_single_polynomials_only():
+    """All other programmes are stated in cvxpy."""
+    assert {module_name(p) for p in SOURCES if "clarabel" in third_party(p)} == {"quakedesign.sos.solve.moment"}
+
+
 @pytest.mark.parametrize("path", sorted((ROOT / "proofs").glob("*.py")), ids=lambda p: p.name)
 def test_proofs_never_import_a_solver(path):
     assert not third_party(path) & SOLVERS

@@ -14,7 +14,7 @@ from quakedesign.sos.exact.definiteness import positive_definite
 from quakedesign.sos.exact.polynomial import Exponents, combination, degree
 from quakedesign.sos.exact.reading import read
 from quakedesign.sos.exact.statement import Statement, statement
-from quakedesign.sos.solve.conic import solve
+from quakedesign.sos.solve.conic import Compiled, solve
 from quakedesign.sos.solve.decide import initial_blocks
 from quakedesign.sos.solve.engine import decide
 from quakedesign.sos.solve.faces import Block
@@ -144,27 +144,24 @@ class Program:
         Solution or None
             None says nothing about feasibility.
         """
+        import cvxpy as cp
+
         problem = self.problem()
         if not solve(problem):
             return None
         best = float(problem.value)
-        for room in _ROOM:
-            found = self._inside(best, room * max(1.0, abs(best)))
+        margin, least = cp.Variable(), cp.Parameter()
+        wanted = [self._value(self._objective) >= least] if self._objective else []
+        within = Compiled(cp.Problem(cp.Maximize(margin), [*self._constraints(margin), margin <= 1, *wanted]))
+        for room in (share * max(1.0, abs(best)) for share in _ROOM):
+            least.value = best - room
+            found = self._rounded(best, room) if within.solve() and within.problem.value >= 1e-11 else None
             if found is not None:
                 return found
         return None
 
-    def _inside(self, best: float, room: float) -> Solution | None:
-        """Proved decision after giving up some of the optimum for the largest margin."""
-        import cvxpy as cp
-
-        margin = cp.Variable()
-        constraints = [*self._constraints(margin), margin <= 1]
-        if self._objective:
-            constraints.append(self._value(self._objective) >= best - room)
-        solved = solve(cp.Problem(cp.Maximize(margin), constraints))
-        if not solved or margin.value is None or margin.value < 1e-11:
-            return None
+    def _rounded(self, best: float, room: float) -> Solution | None:
+        """Proved decision near the last one of the solver, which gave up some room of the optimum for its margin."""
         for bits in _BITS:
             values = [nearest(float(v), 2**bits) for v in np.asarray(self._vector.value).tolist()]
             close = not self._objective or _at(self._objective, values) >= Fraction(best) - 2 * Fraction(room)
