@@ -5,7 +5,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Gains, Json, Whole, app, print_json, print_lines, progress
+from quakedesign.cli.options import PLAIN, Force, Output
+from quakedesign.cli.shared import Gains, Whole, app, progress
 from quakedesign.errors import ParameterError
 
 Numbers = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
@@ -28,7 +29,7 @@ def gain_map(
     workers: Whole = 2,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Map where two gains are certified, at one or more levels of |h'|; certificates, a figure and a table.
 
@@ -62,10 +63,6 @@ def gain_map(
         Number of processes.
     out
         Folder; ./quakedesign-map-LAW unless given.
-    force
-        Replace a folder of earlier results.
-    json
-        Print results.json on stdout.
     """
     from quakedesign.controllers import family
     from quakedesign.report.folder import prepare
@@ -93,10 +90,6 @@ def gain_map(
             tell=tell,
         )
     facts = write_gain_map(drawn, folder)
-    if json:
-        print_json(facts)
-    else:
-        written = f"written: {folder}/ (map.png, map.csv, results.json, certificates)"
-        print_lines([*gain_map_lines(drawn), written])
+    output.show(facts, [*gain_map_lines(drawn), f"written: {folder}/ (map.png, map.csv, results.json, certificates)"])
     proved = all(level["edge_proved"] == level["edge"] for level in facts["levels"])
     return 0 if proved and any(level["screened"] for level in facts["levels"]) else 1

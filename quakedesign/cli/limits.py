@@ -2,20 +2,21 @@
 
 from pathlib import Path
 
-from quakedesign.cli.shared import Force, Json, Pascals, SquareMetresPerSecond, app, print_json, print_lines
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Output
+from quakedesign.cli.shared import Pascals, SquareMetresPerSecond, app
 
 
 @app.command
 def limits(
-    fault: str,
+    fault: FaultName,
     /,
     *,
     pressure: Pascals | None = None,
     diffusivity: SquareMetresPerSecond = 1.0,
-    box: str | None = None,
+    box: Box = None,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Say what no controller whatever can do with a fault, beside what a designed one is proved to do.
 
@@ -24,20 +25,12 @@ def limits(
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     pressure
         Largest withdrawal, such as '20 MPa'; the effective normal stress unless given.
     diffusivity
         Of the rock between well and fault, such as '1 m^2/s'.
-    box
-        Uncertainty box: paper or ten-percent.
     out
         Folder for a figure and results.json; nothing is written unless given.
-    force
-        Replace a folder of earlier results.
-    json
-        Print JSON.
     """
     from quakedesign.fault import load_fault
 
@@ -52,9 +45,6 @@ def limits(
     answer = all_limits(found, pressure=pressure, diffusivity=diffusivity)
     if out is not None:
         write_limits(answer, out)
-    if json:
-        print_json(answer.to_dict())
-    else:
-        written = [] if out is None else [f"written: {out}/ (limits.png, results.json)"]
-        print_lines([*limits_lines(answer), *written])
+    written = [] if out is None else [f"written: {out}/ (limits.png, results.json)"]
+    output.show(answer.to_dict(), [*limits_lines(answer), *written])
     return 0

@@ -5,27 +5,18 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Gains, Json, app, console, print_json, print_lines, progress
+from quakedesign.cli.options import PLAIN, Box, FaultName, Output
+from quakedesign.cli.shared import Gains, app, console, print_json, progress
 
 
 @app.command
-def fault(fault: str, /, *, box: str | None = None, json: Json = False) -> int:
-    """Show derived quantities of a fault and why it is unstable.
-
-    Parameters
-    ----------
-    fault
-        Preset (real-fault, lab-fault) or path of a .toml file.
-    box
-        Uncertainty box: paper or ten-percent.
-    json
-        Print JSON with SI values.
-    """
+def fault(fault: FaultName, /, *, box: Box = None, output: Output = PLAIN) -> int:
+    """Show derived quantities of a fault and why it is unstable."""
     from quakedesign.fault import load_fault
     from quakedesign.studies.facts import fault_dict, fault_sentences
 
     found = load_fault(fault, box=box)
-    if json:
+    if output.json:
         print_json(fault_dict(found))
         return 0
     screen = console()
@@ -42,17 +33,15 @@ def _plain(expression: Any) -> str:
 
 
 @app.command
-def derive(fault: str, /, *, latex: Annotated[bool, Parameter(negative="")] = False, json: Json = False) -> int:
+def derive(
+    fault: FaultName, /, *, latex: Annotated[bool, Parameter(negative="")] = False, output: Output = PLAIN
+) -> int:
     """Derive the equations of a fault from its force balance.
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     latex
         Print LaTeX instead of plain text.
-    json
-        Print JSON.
     """
     import sympy as sp
 
@@ -67,15 +56,9 @@ def derive(fault: str, /, *, latex: Annotated[bool, Parameter(negative="")] = Fa
         "instability": write(model.instability),
         "unstable": model.unstable,
     }
-    if json:
-        print_json(found)
-        return 0
-    screen = console()
-    screen.print("e1' = e2, e2' = beta (nu + h)")
-    for name in ("beta", "h"):
-        screen.print(f"{name} = {found['error_dynamics'][name]}")
-    for name in ("jacobian", "instability", "unstable"):
-        screen.print(f"{name}: {found[name]}")
+    dynamics = [f"{name} = {found['error_dynamics'][name]}" for name in ("beta", "h")]
+    others = [f"{name}: {found[name]}" for name in ("jacobian", "instability", "unstable")]
+    output.show(found, ["e1' = e2, e2' = beta (nu + h)", *dynamics, *others])
     return 0
 
 
@@ -88,7 +71,7 @@ def scale(
     controller: str = "cta",
     gains: Gains = ("published",),
     clock: Literal["operation-time", "natural-period"] | None = None,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Carry gains from one fault to a similar one, and say which dimensionless groups differ.
 
@@ -104,31 +87,24 @@ def scale(
         published, or the gains of the law (λ = 1, divisor μ_res·N̂_min of the source).
     clock
         What fixes the scale of time: operation-time or natural-period; chosen by their agreement unless given.
-    json
-        Print JSON.
     """
     from quakedesign.report.scaling import scale_lines
     from quakedesign.studies.scaling import scale_answer
 
     clocks = {None: None, "operation-time": "reference.operation_time", "natural-period": "shear_modulus"}
     answer = scale_answer(source, target, controller, gains, clock=clocks[clock])
-    if json:
-        print_json(answer)
-    else:
-        print_lines(scale_lines(answer))
+    output.show(answer, scale_lines(answer))
     return 0
 
 
 @app.command
-def errata(*rows: int, json: Json = False) -> int:
+def errata(*rows: int, output: Output = PLAIN) -> int:
     """Show where the paper cannot be taken literally, each row checked again now.
 
     Parameters
     ----------
     rows
         Numbers of rows; all unless given.
-    json
-        Print JSON.
     """
     from quakedesign.studies.errata import errata_rows, run_rows
 
@@ -138,11 +114,11 @@ def errata(*rows: int, json: Json = False) -> int:
         for i, number in enumerate(numbers):
             tell(f"row {number}", i / len(numbers))
             found += run_rows([number])
-    if json:
-        print_json({"errata": found})
-    else:
-        for row in found:
-            held = "holds" if row["holds"] else "DOES NOT HOLD"
-            told = f"{row['row']}. {held} ({row['kind']}): {row['evidence']}"
-            print_lines([told, f"    printed: {row['printed']}", f"    correct: {row['correct']}"])
+    output.show({"errata": found}, (line for row in found for line in _row_lines(row)))
     return 0
+
+
+def _row_lines(row: dict[str, Any]) -> list[str]:
+    held = "holds" if row["holds"] else "DOES NOT HOLD"
+    told = f"{row['row']}. {held} ({row['kind']}): {row['evidence']}"
+    return [told, f"    printed: {row['printed']}", f"    correct: {row['correct']}"]

@@ -5,7 +5,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Json, app, new_file, print_json, print_lines
+from quakedesign.cli.options import PLAIN, Force, Output
+from quakedesign.cli.shared import app, new_file
 
 Text = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
@@ -23,7 +24,7 @@ def sos(
     verbose: Annotated[bool, Parameter(negative="")] = False,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Decide whether a polynomial is a sum of squares, with proof either way. Exit code 0 only if it is.
 
@@ -45,10 +46,6 @@ def sos(
         Show the sizes of the Gram matrices before and after the exact reduction.
     out
         File for the proof (proofs/FORMAT.md).
-    force
-        Replace an existing file.
-    json
-        Print JSON.
     """
     from quakedesign.sos import prove
     from quakedesign.sos.exact.files import plain_proof
@@ -68,8 +65,5 @@ def sos(
         "seconds": answer.seconds,
         "versions": dict(answer.versions),
     }
-    if json:
-        print_json(found)
-    else:
-        print_lines(sentences(answer, verbose=verbose))
+    output.show(found, sentences(answer, verbose=verbose))
     return 0 if found["verdict"] == "sos" else 1

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import ExactSeconds, Force, Gains, Json, app, new_file, print_json, print_lines
+from quakedesign.cli.options import PLAIN, Box, Force, Output
+from quakedesign.cli.shared import ExactSeconds, Gains, app, new_file
 from quakedesign.errors import ParameterError
 
 
@@ -21,13 +22,13 @@ def certify(
     lipschitz: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     maximize: str | None = None,
     gain_range: tuple[str, str] | None = None,
-    box: str | None = None,
+    box: Box = None,
     feedback: str | None = None,
     step: ExactSeconds | None = None,
     peaks: str | None = None,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Prove or refute given gains: of a sliding mode for a bound on |h'|, of the e-LQR on a fault.
 
@@ -60,10 +61,6 @@ def certify(
         if the pressure acts at once (see the command guarantee for the loop that runs).
     out
         File for the certificate. Other proofs of an e-LQR go beside it, with their names added.
-    force
-        Replace existing files.
-    json
-        Print JSON.
     """
     from quakedesign.controllers import law as law_of
 
@@ -74,9 +71,9 @@ def certify(
         _refuse_options(law, about_rate, "needs a FAULT instead")
         if fault is None:
             raise ParameterError(f"certify {law} needs a fault. Received none. Give a preset or a file after {law}.")
-        return _certify_on_fault(fault, gains, box, feedback or "error", step, peaks, out, force, json)
+        return _certify_on_fault(fault, gains, box, feedback or "error", step, peaks, out, force, output)
     _refuse_options(law, about_fault, "needs --lipschitz instead")
-    return _certify_for_rate(law, gains, lipschitz, maximize, gain_range or ("1", "1"), out, json)
+    return _certify_for_rate(law, gains, lipschitz, maximize, gain_range or ("1", "1"), out, output)
 
 
 def _refuse_options(law: str, options: Mapping[str, Any], remedy: str) -> None:
@@ -93,7 +90,7 @@ def _refuse_options(law: str, options: Mapping[str, Any], remedy: str) -> None:
 
 def _certify_for_rate(
     law: str, gains: tuple[str, ...], lipschitz: str | None, maximize: str | None, gain_range: tuple[str, str],
-    out: Path | None, json: bool,
+    out: Path | None, output: Output,
 ) -> int:  # fmt: skip
     """Verdict on a sliding mode, or how far its gains reach."""
     from quakedesign.studies.certified import certified
@@ -101,16 +98,15 @@ def _certify_for_rate(
     answer = certified(law, gains, lipschitz=lipschitz, maximize=maximize, gain_range=gain_range)
     if answer.certificate is not None and out is not None:
         answer.certificate.save(out)
-    if json:
-        print_json({**answer.facts, "certificate": str(out) if answer.certificate is not None and out else None})
-    else:
-        print_lines(answer.lines)
+    output.show(
+        {**answer.facts, "certificate": str(out) if answer.certificate is not None and out else None}, answer.lines
+    )
     return 0 if str(answer.verdict) == "proved" else 1
 
 
 def _certify_on_fault(
     fault: str, gains: tuple[str, ...], box: str | None, feedback: str, step: str | None, peaks: str | None,
-    out: Path | None, force: bool, json: bool,
+    out: Path | None, force: bool, output: Output,
 ) -> int:  # fmt: skip
     """Verdict on an e-LQR."""
     from quakedesign.controllers.elqr import ExtendedLQR
@@ -128,15 +124,12 @@ def _certify_on_fault(
         "certificates": files,
         "seconds": perf_counter() - began,
     }
-    if json:
-        print_json(found)
-    else:
-        print_lines(verdict_lines(judged))
+    output.show(found, verdict_lines(judged))
     return 0 if found["verdict"] == "proved" and (peaks is None or found["peaks"] is not None) else 1
 
 
 @app.command
-def check(*files: Path, fault: str | None = None, json: Json = False) -> int:
+def check(*files: Path, fault: str | None = None, output: Output = PLAIN) -> int:
     """Re-check certificate files in exact arithmetic. Exit code 0 only if all are proved.
 
     Parameters
@@ -145,17 +138,16 @@ def check(*files: Path, fault: str | None = None, json: Json = False) -> int:
         Certificate files (proofs/FORMAT.md).
     fault
         Preset or .toml file whose constants and ranges the certificates must cover as well.
-    json
-        Print JSON.
     """
     from quakedesign.certificates.command import check_files
 
     if not files:
         raise ParameterError("check needs at least one certificate file. Received none. Give a path.")
     verdicts = check_files(files, fault)
-    if json:
-        print_json({"files": {path: verdict for path, (verdict, _) in verdicts.items()}})
-    else:
-        for path, (verdict, statement) in verdicts.items():
-            print_lines([f"{path}: {verdict}", *(f"    {line}" for line in statement)])
+    said = (
+        line
+        for path, (verdict, statement) in verdicts.items()
+        for line in (f"{path}: {verdict}", *(f"    {line}" for line in statement))
+    )
+    output.show({"files": {path: verdict for path, (verdict, _) in verdicts.items()}}, said)
     return 0 if all(verdict == "proved" for verdict, _ in verdicts.values()) else 1

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Force, Json, Seconds, Whole, app, console, new_file, print_json
+from quakedesign.cli.options import PLAIN, Force, Output
+from quakedesign.cli.shared import Seconds, Whole, app, console, new_file
 from quakedesign.errors import ParameterError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def synthesise(
     metric: str | None = None,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Find gains with a proof that are best in one respect, and compare them with those from the literature.
 
@@ -72,10 +73,6 @@ def synthesise(
         For sampled: max_slip_rate_error (the default) or another metric that is better when smaller.
     out
         File for the certificate, which is written whole or not at all.
-    force
-        Replace an existing file.
-    json
-        Print JSON.
     """
     from quakedesign.synthesis.gains.objectives import OBJECTIVES
 
@@ -101,10 +98,7 @@ def synthesise(
         "certificate": str(out) if found is not None and out is not None else None,
         "seconds": perf_counter() - began,
     }  # fmt: skip
-    if json:
-        print_json(answer)
-    else:
-        _print(law, found, more)
+    output.show(answer, lambda: _print(law, found, more))
     return 0 if found is not None else 1
 
 
