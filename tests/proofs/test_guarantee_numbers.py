@@ -273,6 +273,42 @@ def test_exponentials_of_matrices_enclose_their_closed_forms(time, bits, monkeyp
                 assert all(abs(e * 2**bits - v) <= found.error for v, e in zip(line, expected, strict=True))
 
 
+def test_exponentials_of_several_times_enclose_their_closed_forms():
+    """e^{−t} and t·e^{−t}, of times with a common grain of 1/24."""
+    times = list(map(F, ("1/2", "1/8", "7/12", "1/24", "3", "1/2")))
+    with mp.workdps(100):
+        found = checker.exponentials([[F(-1), F(1)], [F(0), F(-1)]], times)
+        for time, one in zip(times, found, strict=True):
+            t = mp.mpf(time.numerator) / time.denominator
+            for line, expected in zip(one.rows, ([1, t], [0, 1]), strict=True):
+                assert all(
+                    abs(e * mp.exp(-t) * UNIT - v) <= one.error < 2**40 for v, e in zip(line, expected, strict=True)
+                )
+
+
+@pytest.mark.parametrize("floor", [F(0), F(1, 3)])
+@pytest.mark.parametrize("rate", [F(1, 10), F(7)])
+def test_what_fades_is_bounded_on_every_piece_and_closely_on_short_and_on_long_ones(rate, floor):
+    """5e^{−λt} + f from α on, over h, and its moment about α, with e^x − Σ x^k/k! ≤ x⁵/120·e^x for k up to 4."""
+    fade = checker.Fade(0, F(5), rate, floor)
+    with mp.workdps(50):
+        for x in map(F, ("0", "1/8", "1/2", "3", "20")):
+            height = 5 * mp.exp(-mp.mpf(x.numerator) / x.denominator)
+            for share in (F(1, 10**9), F(1), F(3, 2), F(60)):
+                length, h = share / rate, mp.mpf(share.numerator) / share.denominator
+                area = height * (1 - mp.exp(-h)) / rate.numerator * rate.denominator
+                moment = height * (1 - (1 + h) * mp.exp(-h)) / rate.numerator**2 * rate.denominator**2
+                constant, linear = floor * length, floor * length**2 / 2
+                pairs = zip(checker.mass(fade, x / rate, length), (constant, linear), (area, moment), strict=True)
+                for bound, flat, exact in pairs:
+                    found = mp.mpf((bound - flat).numerator) / (bound - flat).denominator
+                    assert found >= exact * (1 - mp.mpf(10) ** -40)
+                    if x <= 1 and share not in (1, F(3, 2)):
+                        assert found <= exact / (1 - mp.mpf(x.numerator) ** 5 / x.denominator**5 / 120) * (
+                            1 + mp.mpf(10) ** -8
+                        )
+
+
 def test_a_flow_that_changes_by_an_absurd_factor_is_refused():
     with pytest.raises(checker.Refused, match="factor of ordinary size"):
         checker.exponential([[F(-1)]], F(4097))
