@@ -1,5 +1,7 @@
 """Numbers become exact in one place, and only finite ones."""
 
+import math
+import sys
 from fractions import Fraction as F
 
 import numpy as np
@@ -9,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import fraction_of_float, nearest, rational
+from quakedesign.rationals import float_above, float_below, fraction_of_float, nearest, rational
 
 
 @pytest.mark.parametrize(
@@ -79,3 +81,33 @@ def test_a_float_beyond_python_s_is_itself(written):
     """To the last of its digits; the nearest of Python's is another number, or none."""
     value = sp.Float(written, 40)
     assert abs(fraction_of_float(value) - F(written)) <= abs(F(written)) / 10**39
+
+
+@pytest.mark.parametrize(
+    "value", [F(1, 3), F(2, 3), F(-1, 3), F(1, 10), F(3, 10), F(10) ** 300 / 7, F(1, 2), F(0), F(-7)]
+)
+def test_floats_on_either_side_are_the_nearest_there(value):
+    above, below = float_above(value), float_below(value)
+    assert F(math.nextafter(above, -math.inf)) < value <= F(above)
+    assert F(below) <= value < F(math.nextafter(below, math.inf))
+
+
+def test_beyond_all_floats_the_outer_side_is_infinite():
+    largest = sys.float_info.max
+    assert (float_below(F(10**400)), float_above(F(10**400))) == (largest, math.inf)
+    assert (float_below(F(-(10**400))), float_above(F(-(10**400)))) == (-math.inf, -largest)
+
+
+def test_fractions_are_themselves_and_numbers_have_at_most_308_digits_and_300_characters():
+    class Own(F):
+        """A fraction of a library's."""
+
+    assert rational(F(10**400)) == 10**400
+    assert rational(given := F(1, 3)) is given
+    assert type(rational(Own(1, 3))) is F
+    assert rational(10**308 - 1) == 10**308 - 1
+    with pytest.raises(ParameterError, match="at most 308 digits"):
+        rational(10**308)
+    assert rational("1." + "0" * 298) == 1
+    with pytest.raises(ParameterError, match="at most 300 characters"):
+        rational("1." + "0" * 299)
