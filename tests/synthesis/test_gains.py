@@ -159,9 +159,7 @@ def test_a_law_of_the_users_own():
 
 
 def test_without_a_proof_there_are_no_gains(monkeypatch):
-    from quakedesign.synthesis.gains import objectives
-
-    monkeypatch.setattr(objectives, "find_certificate", lambda *a, **k: None)
+    monkeypatch.setattr("quakedesign.synthesis.gains.setting.find_certificate", lambda *a, **k: None)
     assert synthesise("super-twisting", "norm", degrees=(4,), starts=1) is None
 
 
