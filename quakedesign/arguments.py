@@ -9,7 +9,7 @@ from importlib import import_module
 from inspect import Parameter, Signature, isclass, isfunction, signature
 from itertools import islice
 from numbers import Integral, Rational, Real
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, NoReturn, Union, Unpack, get_args, get_origin, get_type_hints
 
 from quakedesign.errors import ParameterError
 from quakedesign.text import shown
@@ -152,18 +152,32 @@ def _home(function: Callable[..., Any]) -> Mapping[str, Any]:
 
 def _require(function: Callable[..., Any], name: str, value: Any) -> None:
     parameter, test = _wanted(function, name)
-    values = [value]
+    hint, values = _hint(function, name), [value]
+    if get_origin(hint) is Unpack:
+        return _require_entries(function, get_type_hints(get_args(hint)[0]), value)
     if parameter.kind is Parameter.VAR_POSITIONAL:
         values = list(value)
     elif parameter.kind is Parameter.VAR_KEYWORD:
         values = list(value.values())
     for each in values:
         if each is not parameter.default and not test(each):
-            hint = _hint(function, name)
-            remedies = (_REMEDIES[part] for part in _parts(hint) if part in _REMEDIES)
-            raise ParameterError(
-                f"{name} of {_name(function)} must be {_said(hint)}. Received {shown(each)}. {next(remedies, '')}"
-            )
+            _refuse(function, name, hint, each)
+
+
+def _require_entries(function: Callable[..., Any], hints: Mapping[str, Any], given: Mapping[str, Any]) -> None:
+    """Refuse what a function takes by the names of a typed dictionary, if it has others or is of other types."""
+    for name, each in given.items():
+        if name not in hints:
+            raise ParameterError(f"{_name(function)} cannot be called like this: there is no argument {name!r}.")
+        if not matches(each, hints[name]):
+            _refuse(function, name, hints[name], each)
+
+
+def _refuse(function: Callable[..., Any], name: str, hint: Any, value: Any) -> NoReturn:
+    remedies = (_REMEDIES[part] for part in _parts(hint) if part in _REMEDIES)
+    raise ParameterError(
+        f"{name} of {_name(function)} must be {_said(hint)}. Received {shown(value)}. {next(remedies, '')}"
+    )
 
 
 @cache

@@ -91,6 +91,12 @@ WRONG = {
     "no entry": (lambda: headline(None), "entry of headline must be an Entry. Received None"),
     "no task": (lambda: guarantee(3, 3), "task of guarantee must be a Task. Received 3"),
     "no campaign": (lambda: run_campaign(None, 3, "x"), "problem of run_campaign must be a Problem. Received None"),
+    "no delay": (lambda: answer(LAB, delay="x"), "delay of answer must be a Fraction. Received 'x'"),
+    "no noise": (lambda: answer(LAB, lag=1, slip_noise=None), "slip_noise of answer must be a Fraction. Received None"),
+    "no such surrounding": (
+        lambda: answer(LAB, wind=Fraction(1)),
+        "answer cannot be called like this: there is no argument 'wind'",
+    ),
     "no law to guarantee": (lambda: answer(LAB, controller=3), "controller of answer must be a text. Received 3"),
     "a number as a box": (lambda: LAB.with_box(3), "name of Fault.with_box must be a text. Received 3"),
     "a text as slip": (lambda: LAB.moment_of("x"), "slip of Fault.moment_of must be a number. Received 'x'"),

@@ -6,7 +6,8 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
-from quakedesign.certificates.guarantee import Around, Guarantee, NoGuarantee, task_of
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, task_of
+from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.linear_premises import linear_premises, sectors
 from quakedesign.certificates.premises import (
     Errors,

@@ -6,7 +6,8 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Verdict
-from quakedesign.certificates.guarantee import Around, ContinuousPeaks, Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.premises import Domain, Premise, Variant, feedforward_variants
 from quakedesign.controllers import Controller, SlidingMode, control_law
 from quakedesign.controllers.elqr import ExtendedLQR

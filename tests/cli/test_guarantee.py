@@ -138,7 +138,7 @@ def unattacked(monkeypatch):
 @pytest.mark.usefixtures("unattacked")
 def test_the_slip_alone_with_noise_and_its_file(call, tmp_path):
     path = tmp_path / "slip.json"
-    line = ("--measured", "slip", "--slip-noise", "1 um", "--objective", "peak", "--json", "--out", str(path))
+    line = ("--measured", "slip", "--slip-noise", "1 um", "--json", "--out", str(path))
     code, out, _ = call("real-fault", *line)
     found = json.loads(out)
     assert (code, found["verdict"]) == (0, "proved")

@@ -2,12 +2,11 @@
 
 from quakedesign.arguments import check_arguments
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks, continuous_peaks
-from quakedesign.certificates.guarantee.statement import Around, Claims, Guarantee, Held, guarantee
+from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held, guarantee
 from quakedesign.certificates.guarantee.task import Task, task_of
 from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
 
 __all__ = [
-    "Around",
     "Bounds",
     "Claims",
     "ContinuousPeaks",

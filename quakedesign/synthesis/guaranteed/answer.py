@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Unpack
 
-from quakedesign.certificates.guarantee import Around, Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.controllers import SlidingMode, control_law
 from quakedesign.errors import ParameterError

@@ -8,8 +8,9 @@ from itertools import product
 from typing import Any, Unpack
 
 from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates.guarantee import Around, Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
+from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.sector import holds
+from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.controllers import Sampling, SlidingMode
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.loop import ImplicitRoot, Power

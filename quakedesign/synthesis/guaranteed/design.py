@@ -10,7 +10,8 @@ import numpy as np
 from scipy.linalg import LinAlgError
 from scipy.optimize import OptimizeResult, minimize
 
-from quakedesign.certificates.guarantee import Around, Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
+from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
+from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated
 from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of, why_no_law

@@ -8,7 +8,8 @@ from math import log10
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from quakedesign.certificates.guarantee import Around, Task
+from quakedesign.certificates.guarantee import Task
+from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.loop import SHORTEST, ErrorPrediction, LinearLaw, Prediction, disturbance_estimate, slip_observer
 from quakedesign.synthesis.guaranteed.path_design import STARTS, path_laws, path_modes
 from quakedesign.synthesis.guaranteed.rounding import short

@@ -7,7 +7,7 @@ from math import exp
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from quakedesign.certificates.guarantee import Around
+from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.loop import Layer, LinearLaw, Model, PathModel, estimate_through_path
 from quakedesign.loop.layer import MODES
 from quakedesign.synthesis.guaranteed.rounding import short

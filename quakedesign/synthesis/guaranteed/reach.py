@@ -7,7 +7,8 @@ from typing import Unpack
 
 import numpy as np
 
-from quakedesign.certificates.guarantee import Around, Guarantee, NoGuarantee, Task
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
+from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.synthesis.guaranteed.design import MOST_DELAY, design_held, first_held
 from quakedesign.synthesis.guaranteed.families import MEASURED
 

@@ -5,7 +5,8 @@ from fractions import Fraction
 from typing import Unpack
 
 from quakedesign.bounds import UpperBound
-from quakedesign.certificates.guarantee import Around, Guarantee, NoGuarantee, Task
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
+from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.controllers import SlidingMode, family
 from quakedesign.errors import ParameterError
 from quakedesign.loop.schemes import schemes
