@@ -1,6 +1,7 @@
 """What fades after a jump, in both checkers, against closed forms: bounds above, and close where pieces are fine."""
 
 import importlib.util
+import json
 from fractions import Fraction as F
 from math import exp
 from pathlib import Path
@@ -8,10 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.certificates.guarantee.norms import norms
+from quakedesign.certificates.guarantee.theorem import bounds_from
 from quakedesign.loop import Fading, PeriodicLoop, Segment
 
 PATH = Path(__file__).parents[3] / "proofs" / "guarantee.py"
+FILE = PATH.parent / "certificates" / "guarantee_real-fault.json"
 SPECIFICATION = importlib.util.spec_from_file_location("guarantee_fading", PATH)
 checker = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(checker)
@@ -99,3 +103,29 @@ def test_a_response_that_changes_sign_adds_up_its_size():
     points = np.linspace(0, 1, 2001)
     exact = [np.trapezoid(np.abs(np.sin(s - s * points)) * (np.exp(-s * points) + 0.1), s * points) for s in t]
     assert just_above(found, np.array(exact), 0.35)
+
+
+@pytest.mark.parametrize("fades", [True, False])
+def test_what_is_left_out_comes_back_through_the_fault_in_both(fades, monkeypatch):
+    """W = F + MW by hand in floats: max β times the output left_out enters by itself, or within the acceleration."""
+    raw = json.loads(FILE.read_text())
+    task, read = parse_guarantee(FILE.read_text()).task, checker.read_task(raw)
+    outputs = ("slip_error", "slip_rate_error", "push", "left_out")
+    table = {"acceleration": ("1/20", "2/5", 2, "1/4"), "drift": ("1/50", "1/12", "1/2", "1/9")}
+    table |= {"left_out": ("1/60", "1/7", "1/3", "1/30")} if fades else {}
+    gains = {(y, name): (F(v),) for name, row in table.items() for y, v in zip(outputs, row, strict=True)}
+    ours = bounds_from(task, gains, None, F(1))
+    answers = iter([[[F(v)] for v in row] for row in table.values()])
+    monkeypatch.setattr(checker, "gains", lambda *_: next(answers))
+    fade = checker.Fade(0, F(1), F(1), F(0)) if fades else None
+    loop = checker.Loop([], [([], F(1))], [[]] * 4, [[]] * len(table), None, F(1), fade=fade)
+    (slip, rate, push), _ = checker.bounds(read, loop)
+    assert (slip, rate, push) == (ours.slip_error, ours.slip_rate_error, ours.push)
+    half, beta = task.half_ranges, float(task.beta[1])
+    shares = [[float(half[y]) for y in outputs[:3]] + [0.0 if fades else beta], [0.0] * 4]
+    shares += [[0.0, 0.0, 0.0, beta]] if fades else []
+    numbers = np.array([[float(F(v)) for v in row] for row in table.values()])
+    own = [float(task.reference_force + task.amplitude), float(task.drift), 0.0][: len(table)]
+    sizes = np.linalg.solve(np.eye(len(table)) - np.array(shares) @ numbers.T, own)
+    peaks = numbers.T @ sizes
+    assert np.allclose([float(slip), float(rate), float(push)], [*peaks[:2], peaks[2] + peaks[3]], rtol=1e-9)

@@ -154,6 +154,9 @@ def test_a_layer_of_a_32nd_part_of_a_step_is_read_by_both():
     raw = changed(json.loads(guarantee_text(claim("rock"))), ("loop", "diffusion"), "23/4000")
     assert "32nd" not in standalone(json.dumps(raw))
     assert package(json.dumps(raw)) == "undecided"
+    less = json.dumps(changed(raw, ("loop", "diffusion"), "23/4001"))
+    assert "32nd" in standalone(less)
+    assert "T_s/32" in package(less)
 
 
 def test_the_statement_says_what_is_measured_and_how_well():
