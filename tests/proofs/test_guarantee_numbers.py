@@ -309,6 +309,21 @@ def test_what_fades_is_bounded_on_every_piece_and_closely_on_short_and_on_long_o
                         )
 
 
+def test_the_time_since_an_event_goes_on_through_the_end_of_a_period(monkeypatch):
+    """Events at 0, 2 and 5 s of 10 s, the time counted from the second on, two pieces each."""
+    monkeypatch.setattr(checker, "mass", lambda _, start, length: (start, length))
+    same = [[F(1)]]
+    loop = checker.Loop([[F(-1)]], [(same, F(2)), (same, F(3)), (same, F(5))], [[F(1)]], [], None, F(10))
+    fade = checker.Fade(1, F(1), F(1), F(0))
+    flows = checker.cut(loop, [F(0), F(1, 2), F(1)], [F(1)], False, fade)
+    assert [flow.masses for flow in flows] == [
+        [(8, 1), (9, 1)],
+        [(0, F(3, 2)), (F(3, 2), F(3, 2))],
+        [(3, F(5, 2)), (F(11, 2), F(5, 2))],
+    ]
+    assert [flow.masses for flow in checker.cut(loop, [F(0), F(1)], [F(1)], False)] == [[], [], []]
+
+
 def test_a_flow_that_changes_by_an_absurd_factor_is_refused():
     with pytest.raises(checker.Refused, match="factor of ordinary size"):
         checker.exponential([[F(-1)]], F(4097))
