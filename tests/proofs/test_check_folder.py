@@ -134,11 +134,13 @@ def test_a_link_to_the_checker_finds_its_folder(folder, tmp_path):
 
 
 def test_modules_of_the_same_names_in_this_process_are_left_alone(monkeypatch):
-    own = ModuleType("loop")
+    own, checker = ModuleType("loop"), LOOPS.checker
     monkeypatch.setitem(sys.modules, "loop", own)
-    checker = module("among_others", PROOFS / "check.py")
-    assert checker.check(json.dumps(LOOPS.relay())).verdict == "proved"
-    assert checker.beside("loop") is not own
+    monkeypatch.setattr(checker, "LOADED", {})
+    stability, loop = checker.beside("stability"), checker.beside("loop")
+    assert stability.describe(loop.read_loop(LOOPS.relay()))[-1] == "dx/dt = -2*sign(x)"
+    assert stability.read_loop is loop.read_loop
+    assert stability.need is loop.need is checker.beside("exact_numbers").need
     assert sys.modules["loop"] is own
     assert not {"exact_numbers", "cells", "stability"} & sys.modules.keys()
 
