@@ -156,3 +156,12 @@ def test_a_period_is_the_sum_of_its_parts():
     parts = tuple(Segment(jump=((F(1),),), duration=F(1, n)) for n in (2, 3, 6))
     loop = PeriodicLoop(states=("x",), flow=((F(0),),), segments=parts, inputs={}, outputs={})
     assert (loop.period, loop.sampled) == (1, {})
+
+
+def test_a_part_is_cut_where_it_says_or_into_eighths():
+    part = Segment(jump=((F(1),),), duration=F(2))
+    assert part.pieces() == part.pieces(past=True) == (F(1, 4),) * 8
+    ends = {"ends": (F(0), F(1, 4), F(1)), "past_ends": (F(0), F(1, 2), F(1))}
+    part = Segment(jump=((F(1),),), duration=F(2), **ends)
+    assert part.pieces() == (F(1, 2), F(3, 2))
+    assert part.pieces(past=True) == (1, 1)
