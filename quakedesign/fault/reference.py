@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import require_ordinary, require_positive
+from quakedesign.text import shown
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -30,7 +32,17 @@ class Reference:
         require_ordinary(operation_time=self.operation_time)
 
     def shape(self, stage: Any) -> Any:
-        """Share of the target slip [-] at the stage s = t/t_op in [0, 1] (eq. ref): number, array or expression."""
+        """Share of the target slip [-] at the stage s = t/t_op in [0, 1] (eq. ref): number, array or expression.
+
+        Raises
+        ------
+        ParameterError
+            For anything that has no powers.
+        """
+        if not hasattr(stage, "__pow__"):
+            raise ParameterError(
+                f"stage must be a number, an array or an expression. Received {shown(stage)}. Give t/t_op."
+            )
         return stage**3 * (10 - 15 * stage + 6 * stage**2)
 
     def slip(self, time: "sp.Expr") -> "sp.Expr":
