@@ -20,6 +20,7 @@ from functools import cache
 from importlib.resources import files
 from inspect import Parameter, isabstract, isclass, isfunction, signature
 from pathlib import Path
+from typing import is_typeddict
 
 import numpy as np
 import pytest
@@ -393,7 +394,11 @@ def public():
     found, rooms = {}, [i.name for i in pkgutil.walk_packages(qd.__path__, "quakedesign.") if i.ispkg]
     for room in map(importlib.import_module, (qd.__name__, *rooms)):
         for value in (getattr(room, name) for name in getattr(room, "__all__", ()) if ".cli" not in room.__name__):
-            plain = isclass(value) and not isabstract(value) and not issubclass(value, Enum | sp.Basic)
+            plain = (
+                isclass(value)
+                and not (isabstract(value) or is_typeddict(value))
+                and not issubclass(value, Enum | sp.Basic)
+            )
             if (isfunction(value) or plain) and value.__module__.startswith("quakedesign"):
                 found[f"{value.__module__}.{value.__name__}"] = value
     for owner in (*(value for value in found.values() if isclass(value)), *values()):

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from fractions import Fraction
 from numbers import Integral, Real
 from typing import Any
 
@@ -81,7 +82,7 @@ def require_finite(remedy: str = "", **values: float) -> None:
     _require(values, lambda v: True, "finite", remedy)
 
 
-def require_ordinary(least: float = 1 / _LARGEST, **values: float) -> None:
+def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) -> None:
     """Refuse values that are no sizes of anything, so that no product of them leaves the floats; zero is one.
 
     Raises

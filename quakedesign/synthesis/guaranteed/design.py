@@ -13,6 +13,7 @@ from scipy.optimize import OptimizeResult, minimize
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.errors import ParameterError
+from quakedesign.fault.checks import require_ordinary
 from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated
 from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of, why_no_law
 
@@ -126,6 +127,7 @@ def design_held(
 
 def _unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
     """No law of samples, where the errors of the model outgrow within a period what a prediction can hold."""
+    require_ordinary(step=step)
     rate, slip = float(task.model.rate), max(float(task.model.slip), 0.0)
     growth = float(step) * (hypot(rate, 2 * sqrt(slip)) - rate) / 2
     if growth <= _MOST_GROWTH:

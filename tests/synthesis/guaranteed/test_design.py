@@ -161,6 +161,12 @@ def test_a_step_far_too_long_has_no_guarantee_and_says_why():
     assert "is not stable" in found.reason
 
 
+def test_a_step_beyond_all_sizes_is_refused():
+    for search in (first_held, design_held):
+        with pytest.raises(ParameterError, match=r"step must be of a size between 1e-40 and 1e\+40 in SI units\."):
+            search(task_of(load_fault("real-fault")), F(10) ** 400)
+
+
 def test_a_step_in_which_errors_outgrow_all_numbers_has_none_either():
     """The pole (√(w² + 4s) − w)/2 with s = 0.4493 1/s² and w = 1.6 1/s is 0.2437 1/s, for an hour: e^877."""
     task = task_of(load_fault("real-fault"))
