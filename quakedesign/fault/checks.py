@@ -92,7 +92,7 @@ def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) ->
     problems = Problems()
     for name, value in values.items():
         with problems.collected():
-            if value and not least <= abs(value) <= _LARGEST:
+            if value and not (least <= value <= _LARGEST or least <= -value <= _LARGEST):
                 raise ParameterError(
                     f"{name} must be of a size between {least:g} and {_LARGEST:g} in SI units. "
                     f"Received {shown(value)}. Check its unit."
