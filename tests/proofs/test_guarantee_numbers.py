@@ -321,6 +321,8 @@ def test_the_time_since_an_event_goes_on_through_the_end_of_a_period(monkeypatch
         [(0, F(3, 2)), (F(3, 2), F(3, 2))],
         [(3, F(5, 2)), (F(11, 2), F(5, 2))],
     ]
+    flows = checker.cut(loop, [F(0), F(1)], [F(1)], False, checker.Fade(2, F(1), F(1), F(0)))
+    assert [flow.masses for flow in flows] == [[(5, 2)], [(7, 3)], [(0, 5)]]
     assert [flow.masses for flow in checker.cut(loop, [F(0), F(1)], [F(1)], False)] == [[], [], []]
 
 
