@@ -763,6 +763,7 @@ def gains(loop: Loop, entry: Row, sudden: bool, fade: Fade | None = None) -> lis
     """Bounds of every output for an input of size 1, on every piece of the period."""
     if not loop.events:
         return [[v] for v in flow_gains(loop, entry)]
+    loop, entry = in_even_units(loop, entry)
     size, many = len(loop.flow), len(loop.outputs)
     flows, early = (cut(loop, cuts, entry, sudden, fade) for cuts in (loop.cuts, loop.past_cuts))
     start = fixed(loop.outputs)
@@ -861,18 +862,38 @@ def add_areas(sums: list[list[int]], heights: Fixed, bends: Fixed, piece: Fracti
 
 
 def balanced(loop: Loop, entry: Row) -> tuple[list[Row], Fixed, Fixed]:
-    """A, outputs, and unit columns with the entry, in units of the states that make A's rows and columns alike."""
-    size = len(loop.flow)
+    """A, outputs, and unit columns with the entry, in even units."""
+    even, entry = in_even_units(loop, entry)
+    return even.flow, fixed(even.outputs), fixed(unit(len(even.flow))).beside(column(entry))
+
+
+def in_even_units(loop: Loop, entry: Row) -> tuple[Loop, Row]:
+    """A loop and an input in units of the states that make the rows and columns of its maps alike."""
+    maps = [loop.flow, *(line for line, _ in loop.events)]
+    units = even_units(
+        [[sum(map(abs, entries)) for entries in zip(*lines, strict=True)] for lines in zip(*maps, strict=True)]
+    )
+    flow, *jumps = [
+        [[v * u / own for v, u in zip(line, units, strict=True)] for line, own in zip(lines, units, strict=True)]
+        for lines in maps
+    ]
+    events = [(jump, time) for jump, (_, time) in zip(jumps, loop.events, strict=True)]
+    outputs = [[v * u for v, u in zip(line, units, strict=True)] for line in loop.outputs]
+    even = replace(loop, flow=flow, events=events, outputs=outputs)
+    return even, [v / u for v, u in zip(entry, units, strict=True)]
+
+
+def even_units(table: list[Row]) -> Row:
+    """Powers of 2 that make every row of a table u_i^-1 |t_ij| u_j about as large as its column."""
+    size = len(table)
     units = [Fraction(1)] * size
     for i in list(range(size)) * 16:
-        line = sum(abs(v) * units[j] / units[i] for j, v in enumerate(loop.flow[i]) if j != i)
-        under = sum(abs(loop.flow[j][i]) * units[i] / units[j] for j in range(size) if j != i)
+        line = sum(abs(v) * units[j] / units[i] for j, v in enumerate(table[i]) if j != i)
+        under = sum(abs(table[j][i]) * units[i] / units[j] for j in range(size) if j != i)
         if line and under:
             ratio = Fraction(line / under)
             units[i] *= Fraction(2) ** ((ratio.numerator.bit_length() - ratio.denominator.bit_length()) // 2)
-    flow = [[v * u / own for v, u in zip(line, units, strict=True)] for line, own in zip(loop.flow, units, strict=True)]
-    outputs = fixed([[v * u for v, u in zip(line, units, strict=True)] for line in loop.outputs])
-    return flow, outputs, fixed(unit(size)).beside(column([v / u for v, u in zip(entry, units, strict=True)]))
+    return units
 
 
 def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:

@@ -50,7 +50,8 @@ SPECIFICATION.loader.exec_module(checker)
 
 def test_the_catalogue_is_complete():
     assert {p.stem for p in LOOPS} == {*STATEMENTS, "elqr_real-fault", "elqr_lab-fault"}
-    assert {p.stem for p in GUARANTEES} == {"guarantee_real-fault", "guarantee_lab-fault", "guarantee_cta_real-fault"}
+    loops = {"real-fault", "lab-fault", "cta_real-fault", "late_real-fault"}
+    assert {p.stem for p in GUARANTEES} == {f"guarantee_{loop}" for loop in loops}
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
 
 

@@ -444,6 +444,24 @@ def test_what_is_left_of_the_past_counts_with_its_errors():
     assert past.of(one) == [2 + 1 + 2]
 
 
+def test_gains_of_samples_do_not_depend_on_the_units_of_the_states():
+    """x' = u + w; u = −x/2 − z/4 is held over a second, and z is the x that was measured before."""
+    flow = [[F(0), F(1), F(0)], [F(0)] * 3, [F(0)] * 3]
+    sample = [[F(1), F(0), F(0)], [F(-1, 2), F(0), F(-1, 4)], [F(1), F(0), F(0)]]
+    found = []
+    for units in ([1, 1, 1], [1, F(2) ** 70, F(2) ** -70], [1, F(2) ** -70, F(2) ** 70]):
+        scaled = [
+            [[v * units[j] / units[i] for j, v in enumerate(line)] for i, line in enumerate(m)] for m in (flow, sample)
+        ]
+        loop = checker.Loop(scaled[0], [(scaled[1], F(1))], [[F(1), F(0), F(0)]], [], None, F(1))
+        found.append(checker.gains(loop, [F(1), F(0), F(0)], False)[0])
+    period = np.array([[0.5, -0.25], [1, 0]])  # of x and z
+    largest = sum(abs(np.linalg.matrix_power(period, k)[0, 0]) for k in range(200))
+    assert largest <= max(found[0]) <= 1.1 * largest + 1
+    assert found[1] == pytest.approx(found[0], rel=1e-15)
+    assert found[2] == pytest.approx(found[0], rel=1e-15)
+
+
 def test_loops_that_forget_nothing_are_refused(monkeypatch):
     monkeypatch.setattr(checker, "STRETCHES", 3)
     monkeypatch.setattr(checker, "DOUBLINGS", 3)
