@@ -188,9 +188,10 @@ def test_where_no_step_has_a_guarantee_it_is_the_design_in_continuous_time(monke
     assert (design.verdict, design.controller.sampling) == (Verdict.PROVED, None)
     assert design.guarantee.sentence() == "none: run in the scheme compensated, small gain 1.2"
     assert design.compensation is None
-    entry = Entry(label="x", origin="designed", design=design, run=None)
-    assert not positive(SimpleNamespace(of=lambda _: (entry,)))
-    assert positive(SimpleNamespace(of=lambda _: (replace(entry, design=replace(design, runs=None)),)))
+    for runs, is_positive in ((fails, False), (None, True)):
+        judged = replace(design, runs=runs, premises=())
+        entry = Entry(label="x", origin="designed", design=judged, run=None)
+        assert positive(SimpleNamespace(of=lambda _, one=entry: (one,))) == is_positive
 
 
 def test_gains_of_the_command_line_are_designed_either_way(unproved, monkeypatch):
