@@ -25,8 +25,8 @@ def test_the_names_are_all_there_and_sorted():
     assert all(hasattr(room, name) for name in room.__all__)
 
 
-def test_the_import_loads_no_numerical_library():
-    heavy = "numpy scipy casadi matplotlib pandas xarray control dask".split()
+def test_the_import_loads_no_library_but_numpy():
+    heavy = "scipy casadi matplotlib pandas xarray control dask".split()
     code = f"import sys, quakedesign.simulation; print(*[name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""

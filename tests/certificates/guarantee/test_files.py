@@ -284,7 +284,7 @@ WORSE += [
     ("observer", ("loop", "noise", "slip"), F(21, 20)),
     ("observer", ("loop", "measured", 1, 0), F(3, 2)),
     ("rock", ("loop", "diffusion"), F(11, 10)),
-    ("lagging rock", ("loop", "lag"), F(6, 5)),
+    ("lagging rock", ("loop", "lag"), F(4, 5)),
     ("continuous", ("loop", "feedback", 0), F(3, 4)),
     ("continuous", ("loop", "feedback", 1), F(3, 4)),
     ("continuous", ("loop", "measured", 0, 0), F(4, 3)),
