@@ -173,10 +173,10 @@ def _deadbeat(
     """Weight and authority for a deadbeat step, of any law, and the errors that it leaves, if it has a guarantee."""
     if objective not in OBJECTIVES:
         raise ParameterError(f"objective must be one of {', '.join(OBJECTIVES)}. Received {objective!r}.")
-    worst, seen = replace(task, change=None), dict[tuple[Fraction, Fraction], Estimate]()
+    seen = dict[tuple[Fraction, Fraction], Estimate]()
     for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
-        found = estimated(worst, _held(_DEADBEAT, *choice, step, around))
+        found = estimated(task, _held(_DEADBEAT, *choice, step, around))
         if found is not None and isinstance(found.bounds, Bounds):
             seen[choice] = found
     if not seen:

@@ -109,10 +109,9 @@ def design_held(
     if reason:
         return NoGuarantee(reason=reason, small_gain=None)
     family, template = _family(task, step, measured, around)
-    worst = replace(task, change=None)  # gains are chosen for the larger class: they answer slow disturbances as well
 
     def seen(x: np.ndarray) -> Estimate | None:
-        return _seen(worst, family, template, x)
+        return _seen(task, family, template, x)
 
     best = min(
         (_search(lambda x: _peak_cost(seen(x), family.period), start) for start in family.starts), key=lambda f: f[0]

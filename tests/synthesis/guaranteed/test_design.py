@@ -75,6 +75,13 @@ def test_the_class_rate_is_guaranteed_far_lower():
     assert claim.claims.slip_error <= F(5, 10**5)
 
 
+@pytest.mark.parametrize("objective", ["tracking", "peak"])
+def test_a_law_for_the_class_rate_is_chosen_for_that_class(objective):
+    claim = design_held(task_of(load_fault("real-fault"), rate_limited=True), F("0.184"), objective=objective)
+    assert claim.claims.slip_rate_error <= F(7, 10**5)
+    assert claim.claims.slip_error <= F(1, 10**5)
+
+
 @pytest.mark.parametrize("row", ROWS)
 def test_no_course_of_ten_thousand_violates_a_guarantee(row):
     claim = designed(row)
