@@ -19,6 +19,7 @@ from quakedesign.cli.shared import (
     print_lines,
     progress,
 )
+from quakedesign.cli.state import NO_STATE, StateOptions, require_no_state_options, show_state_run
 
 _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
 
@@ -44,6 +45,7 @@ def simulate(
     perturbation: Push | None = None,
     actuator: ActuatorOptions = _DIRECT,
     sensors: SensorOptions = _EXACT,
+    state: StateOptions = NO_STATE,
     seed: Whole = 0,
     out: Path | None = None,
     force: Force = False,
@@ -79,9 +81,10 @@ def simulate(
     substeps
         Steps of the integrator per sample.
     method
-        dormand-prince or rk4; cvodes or idas for smooth loops.
+        dormand-prince or rk4; cvodes or idas for smooth loops; for friction with a state radau, dop853, cvodes or idas.
     plant
-        smooth (the paper's, for forward slip) or coulomb (set-valued friction: stick, slip, reversal).
+        smooth (the paper's, for forward slip) or coulomb (set-valued friction: stick, slip, reversal); for friction
+        with a state smooth or quasi-dynamic (without inertia).
     drift
         Velocity of the far end, such as '3 cm/year'.
     perturbation
@@ -95,6 +98,7 @@ def simulate(
     json
         Print JSON.
     """
+    options = dict(locals())
     from quakedesign.fault import load_fault
     from quakedesign.loop.schemes import own_way
     from quakedesign.simulation import Load
@@ -103,6 +107,9 @@ def simulate(
 
     new_file(out, "output file", force=force)
     found = load_fault(fault)
+    if found.friction.state_names:
+        return show_state_run(found, simulate, options)
+    require_no_state_options(state, found)
     law = optional_choice(found, controller, gains, scale=scale, feedforward=feedforward)
     pushed = None if perturbation is None else read_perturbation(perturbation)
     way, step, _ = own_way(law.controller if law else None, scheme, step, "continuous")

@@ -35,6 +35,7 @@ from quakedesign.simulation.loading import Load
 from quakedesign.simulation.metrics import ActuatorMetrics, Metrics, StickMetrics
 from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
 from quakedesign.simulation.perturbation import perturbation
+from quakedesign.simulation.pressure_course import PressureCourse, pressure_course
 from quakedesign.simulation.sampled_trajectory import SampledTrajectory
 from quakedesign.simulation.sampling_study import Study, accuracy, gain_sensitivity, noise_sensitivity
 from quakedesign.simulation.simulate import simulate
@@ -62,6 +63,7 @@ __all__ = [
     "Outcome",
     "OutcomeCriterion",
     "OutputFeedback",
+    "PressureCourse",
     "Quantisation",
     "RateLimit",
     "SampledTrajectory",
@@ -85,6 +87,7 @@ __all__ = [
     "natural_earthquake",
     "noise_sensitivity",
     "perturbation",
+    "pressure_course",
     "schemes",
     "simulate",
     "simulate_state",

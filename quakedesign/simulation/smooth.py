@@ -14,6 +14,19 @@ METHODS = {"dop853": "DOP853", "radau": "Radau"}
 
 
 @dataclass(frozen=True)
+class Ramp:
+    """Load with a value at the time `start` [s] and a constant slope [1/s]."""
+
+    start: float
+    value: tuple[float, ...]
+    slope: tuple[float, ...]
+
+    def at(self, time: float) -> list[float]:
+        """Load at a time [s]."""
+        return [value + slope * (time - self.start) for value, slope in zip(self.value, self.slope, strict=True)]
+
+
+@dataclass(frozen=True)
 class Solution:
     """Instants [s], shape (n,); values there, shape (variables, n); instants at which the level was crossed [s]."""
 
@@ -25,7 +38,7 @@ class Solution:
 
 @dataclass(frozen=True)
 class Problem:
-    """y' = f(y, load) in the variables of a CasADi Function (y, load) → f, ∂f/∂y.
+    """y' = f(y, load(t)) in the variables of a CasADi Function (y, load) → f, ∂f/∂y.
 
     Attributes
     ----------
@@ -43,14 +56,14 @@ class Problem:
     level: float
 
     def integrate(
-        self, start: "np.ndarray", load: float, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
+        self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
     ) -> Solution:
-        """Follow the equations from times[0] to times[-1] under a constant load.
+        """Follow the equations from times[0] to times[-1].
 
         Parameters
         ----------
         start : ndarray
-        load : float
+        load : Ramp
         times : ndarray
             Ascending instants [s].
         every_step : bool
@@ -98,13 +111,16 @@ class Problem:
         return Solution(np.concatenate([t for t, _ in found]), values, np.concatenate(crossed), evaluations)
 
     def _resolved(
-        self, start: "np.ndarray", load: float, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
+        self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
     ) -> Solution:
         import casadi as ca
 
-        time, y, pushed = ca.SX.sym("t"), ca.SX.sym("y", self.rates.size1_in(0)), ca.SX.sym("load")
-        rates = ca.Function("rates", [time, y, pushed], [ca.densify(self.rates(y, pushed)[0])])
-        resolution = Resolution.of(adaptive_integrators()[method], rates, self.scales, (load,), rtol)
+        time, y, size = ca.SX.sym("t"), ca.SX.sym("y", self.rates.size1_in(0)), len(load.value)
+        pushed = ca.SX.sym("load", 2 * size + 1)
+        now = pushed[:size] + pushed[size : 2 * size] * (time - pushed[2 * size])
+        rates = ca.Function("rates", [time, y, pushed], [ca.densify(self.rates(y, now)[0])])
+        told = (*load.value, *load.slope, load.start)
+        resolution = Resolution.of(adaptive_integrators()[method], rates, self.scales, told, rtol)
         points, wanted = [(float(times[0]), np.array(start))], [0]
         for end in times[1:]:
             points += resolution.points(points[-1], float(end))
@@ -114,12 +130,12 @@ class Problem:
         values = np.array([value for _, value in kept]).T
         return Solution(np.array([t for t, _ in kept]), values, crossed, len(points))
 
-    def _bound(self, load: float) -> tuple[Any, Any]:
+    def _bound(self, load: Ramp) -> tuple[Any, Any]:
         """Field and Jacobian as functions of (t, y)."""
         size = self.rates.size1_in(0)
         field = _Bound.of(self.rates, 0, load, np.empty(size))
         jacobian = _Bound.of(self.rates, 1, load, np.empty((size, size)))
-        return (lambda _, y: field.at(y)), (lambda _, y: jacobian.at(y).T)
+        return field.at, (lambda time, y: jacobian.at(time, y).T)
 
     def _crossing(self) -> Any:
         def crossing(_: float, y: "np.ndarray") -> float:
@@ -133,28 +149,30 @@ class Problem:
 class _Bound:
     """One output of a CasADi Function, evaluated through its buffers, which must live as long."""
 
+    load: Ramp
     state: "np.ndarray"
-    load: "np.ndarray"
+    given: "np.ndarray"
     result: "np.ndarray"
     evaluate: Any
     owners: tuple[Any, ...]
 
     @classmethod
-    def of(cls, function: Any, index: int, load: float, result: "np.ndarray") -> "_Bound":
+    def of(cls, function: Any, index: int, load: Ramp, result: "np.ndarray") -> "_Bound":
         import casadi as ca
 
-        inputs = [ca.SX.sym("y", function.size1_in(0)), ca.SX.sym("load")]
+        inputs = [ca.SX.sym("y", function.size1_in(0)), ca.SX.sym("load", len(load.value))]
         dense: Any = ca.Function("dense", inputs, [ca.densify(function(*inputs)[index])])
-        state, given = np.empty(function.size1_in(0)), np.array([load])
+        state, given = np.empty(function.size1_in(0)), np.empty(len(load.value))
         buffer, evaluate = dense.buffer()
         buffer.set_arg(0, state.data)
         buffer.set_arg(1, given.data)
         buffer.set_res(0, result.data)
-        return cls(state, given, result, evaluate, (dense, buffer))
+        return cls(load, state, given, result, evaluate, (dense, buffer))
 
-    def at(self, y: "np.ndarray") -> "np.ndarray":
-        """Result at a state; a matrix comes out transposed, as CasADi stores columns first."""
+    def at(self, time: float, y: "np.ndarray") -> "np.ndarray":
+        """Result at a time [s] and a state; a matrix comes out transposed, as CasADi stores columns first."""
         self.state[:] = y
+        self.given[:] = self.load.at(time)
         self.evaluate()
         return self.result.copy()
 

@@ -1,8 +1,9 @@
-"""Faults with rate-and-state friction under loading from afar: velocity steps and stick-slip cycles."""
+"""Faults with rate-and-state friction under loading from afar and pressure: velocity steps and stick-slip cycles."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ import numpy as np
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault, FrictionLaw
 from quakedesign.simulation.energy import EnergyBudget
+from quakedesign.simulation.pressure_course import PressureCourse
 from quakedesign.simulation.run import library_versions
-from quakedesign.simulation.smooth import Problem, Solution
+from quakedesign.simulation.smooth import Problem, Ramp, Solution
 from quakedesign.simulation.state_plants import SpringSlider
 from quakedesign.simulation.state_trajectory import StateTrajectory
 
@@ -25,7 +27,7 @@ def simulate_state(
     *,
     duration: float | None = None,
     inertia: bool = True,
-    pressure: float = 0.0,
+    pressure: "float | PressureCourse" = 0.0,
     start_rate: float | None = None,
     start_state: Sequence[float] | None = None,
     times: "Sequence[float] | np.ndarray | None" = None,
@@ -33,10 +35,10 @@ def simulate_state(
     method: str = "radau",
     rtol: float = 1e-9,
 ) -> StateTrajectory:
-    """Simulate a fault whose friction has a state, uncontrolled, loaded from afar.
+    """Simulate a fault whose friction has a state, uncontrolled, loaded from afar, under a prescribed pressure.
 
     Rate and state are integrated in their logarithms, so that a hold of years and a slip of milliseconds keep the same
-    number of digits. At the start the forces are in balance.
+    number of digits. At the start the forces are in balance, under the pressure before a step at t = 0.
 
     Parameters
     ----------
@@ -48,8 +50,9 @@ def simulate_state(
         [s]; only for a single loading rate.
     inertia : bool
         Of a fault: third order with inertia, or quasi-dynamic without. A `SpringSlider` has its own mass.
-    pressure : float
-        Constant fluid pressure [Pa]; of a fault only.
+    pressure : float or PressureCourse
+        Fluid pressure [Pa], below the effective normal stress. Where it steps, the values before and after are returned
+        both, at the same time; of the instants in `times` those after.
     start_rate : float, optional
         Slip rate at the start [m/s]; the first loading rate unless given.
     start_state : sequence of float, optional
@@ -75,17 +78,17 @@ def simulate_state(
     SimulationError
         When the method cannot go on, as when the slip rate grows without bound (no inertia and no damping).
     """
-    slider = (
-        subject if isinstance(subject, SpringSlider) else SpringSlider.of(subject, inertia=inertia, pressure=pressure)
-    )
+    slider = subject if isinstance(subject, SpringSlider) else SpringSlider.of(subject, inertia=inertia)
     if not slider.law.state_names:
         raise ParameterError(f"the friction law must have a state. Received {slider.law.name}. Use simulate.")
+    course = pressure if isinstance(pressure, PressureCourse) else PressureCourse.constant(pressure)
+    _require_closed(slider, course)
     pieces = _pieces(loading, duration)
     first = pieces[0][1] if start_rate is None else start_rate
-    start = slider.start(first, None if start_state is None else tuple(start_state))
+    start = slider.start(first, None if start_state is None else tuple(start_state), course.before(0.0))
     level = _ONSET * max(v for _, v in pieces) if onset_rate is None else onset_rate
     problem = Problem(slider.rates, _scales(slider, start), 2, math.log(level) if level > 0 else math.inf)
-    history = _History(problem, pieces, _wanted(times, pieces), method, rtol)
+    history = _History(slider, problem, pieces, course, _wanted(times, pieces), method, rtol)
     name = f"{subject.name if isinstance(subject, Fault) else slider.law.name}, loaded from afar"
     area = subject.area if isinstance(subject, Fault) else 1.0
     return _trajectory(name, slider, history, history.run(start), level, area)
@@ -147,6 +150,14 @@ def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
     return [(float(length), float(speed)) for length, speed in pieces]
 
 
+def _require_closed(slider: SpringSlider, course: PressureCourse) -> None:
+    if course.largest >= slider.normal_stress:
+        raise ParameterError(
+            f"pressure must stay below the effective normal stress, {slider.normal_stress:.6g} Pa, at which the fault "
+            f"opens. Received {course.largest:.6g} Pa. Inject less."
+        )
+
+
 def _wanted(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None":
     if times is None:
         return None
@@ -170,8 +181,10 @@ def _scales(slider: SpringSlider, start: list[float]) -> "np.ndarray":
 
 @dataclass(frozen=True)
 class _History:
+    slider: SpringSlider
     problem: Problem
     pieces: list[tuple[float, float]]
+    course: PressureCourse
     wanted: "np.ndarray | None"
     method: str
     rtol: float
@@ -179,30 +192,56 @@ class _History:
     def run(self, start: list[float]) -> Solution:
         """Solution over all pieces; at a jump of the loading rate the variables are continuous."""
         parts: list[Solution] = []
-        y, now = np.array(start), 0.0
-        for length, load in self.pieces:
-            end = now + length
+        y = np.array(start)
+        for now, end, load in self._spans():
+            y, onset = self._stepped(y, now)
+            pressure = self.course.after(now)
+            slope = (self.course.before(end) - pressure) / (end - now)
             inner = np.empty(0) if self.wanted is None else self.wanted[(self.wanted > now) & (self.wanted < end)]
             part = self.problem.integrate(
                 y,
-                load,
+                Ramp(now, (load, pressure, slope), (0.0, slope, 0.0)),
                 np.array([now, *inner, end]),
                 every_step=self.wanted is None,
                 method=self.method,
                 rtol=self.rtol,
             )
-            parts.append(part)
-            y, now = part.values[:, -1], end
-        return self._joined(parts)
+            parts.append(replace(part, crossings=np.concatenate([onset, part.crossings])))
+            y = part.values[:, -1]
+        return self._joined(np.array(start), parts)
 
-    def _joined(self, parts: list[Solution]) -> Solution:
-        time = np.concatenate([parts[0].time[:1], *(part.time[1:] for part in parts)])
-        values = np.concatenate([parts[0].values[:, :1], *(part.values[:, 1:] for part in parts)], axis=1)
+    def _spans(self) -> "list[tuple[float, float, float]]":
+        """Starts, ends [s] and loading rates [m/s] of spans without a break of loading or pressure."""
+        found, now = [], 0.0
+        for length, load in self.pieces:
+            end = now + length
+            inside = sorted({time for time in self.course.times if now < time < end})
+            found += [(a, b, load) for a, b in pairwise((now, *inside, end))]
+            now = end
+        return found
+
+    def _stepped(self, y: "np.ndarray", now: float) -> "tuple[np.ndarray, np.ndarray]":
+        """Variables after a step of the pressure, if there is one now, and the time if the rate jumps to an event."""
+        before, after = self.course.before(now), self.course.after(now)
+        if before == after:
+            return y, np.empty(0)
+        found, watched = self.slider.stepped(y, before, after), self.problem.watched
+        risen = y[watched] < self.problem.level <= found[watched]
+        return found, np.array([now] if risen else [])
+
+    def _joined(self, start: "np.ndarray", parts: list[Solution]) -> Solution:
+        """All parts; where a variable jumps, both values are kept, or the later one at an instant that is asked for."""
+        times, values = [parts[0].time[:1]], [start[:, None]]
+        for part in parts:
+            same = int(np.array_equal(part.values[:, 0], values[-1][:, -1]))
+            times.append(part.time[same:])
+            values.append(part.values[:, same:])
+        time, value = np.concatenate(times), np.concatenate(values, axis=1)
         if self.wanted is not None:
-            kept = np.isin(time, self.wanted)
-            time, values = time[kept], values[:, kept]
+            kept = np.isin(time, self.wanted) & np.append(np.diff(time) > 0, True)
+            time, value = time[kept], value[:, kept]
         crossings = np.concatenate([part.crossings for part in parts])
-        return Solution(time, values, crossings, sum(part.evaluations for part in parts))
+        return Solution(time, value, crossings, sum(part.evaluations for part in parts))
 
     def load_point(self, time: "np.ndarray") -> "np.ndarray":
         """Displacement of the far end [m]."""
@@ -215,7 +254,9 @@ def _trajectory(
     name: str, slider: SpringSlider, history: _History, solution: Solution, level: float, area: float
 ) -> StateTrajectory:
     loaded = history.load_point(solution.time)
-    friction, excess = (row.full().ravel() for row in slider.readings.map(len(solution.time))(solution.values))
+    pressure = history.course.sampled(solution.time)
+    readings = slider.readings.map(len(solution.time))(solution.values, pressure)
+    friction, excess = (row.full().ravel() for row in readings)
     return StateTrajectory(
         name=name,
         time=solution.time,
@@ -224,13 +265,14 @@ def _trajectory(
         slip_rate=np.exp(solution.values[2]),
         stretch=solution.values[1],
         friction=friction,
+        pressure=pressure,
         states=np.exp(solution.values[3:]),
         state_names=slider.law.state_names,
         state_units=slider.law.state_units,
         imbalance=excess / slider.normal_stress,
         onsets=solution.crossings,
         onset_rate=level,
-        energy=_energy(slider, area, loaded, solution.values, friction),
+        energy=_energy(slider, area, loaded, solution.values, friction, pressure),
         provenance={
             "friction": slider.law.name,
             "inertia": str(slider.mass > 0),
@@ -243,7 +285,12 @@ def _trajectory(
 
 
 def _energy(
-    slider: SpringSlider, area: float, loaded: "np.ndarray", values: "np.ndarray", friction: "np.ndarray"
+    slider: SpringSlider,
+    area: float,
+    loaded: "np.ndarray",
+    values: "np.ndarray",
+    friction: "np.ndarray",
+    pressure: "np.ndarray",
 ) -> EnergyBudget:
     """Budget of an area [m²] from forces along the paths of block and load point, both resolved by the instants."""
     slip, stretch, rate = values[0], values[1], np.exp(values[2])
@@ -257,8 +304,8 @@ def _energy(
     return EnergyBudget.of(
         kinetic=gained(0.5 * slider.mass * rate**2),
         elastic=gained(0.5 * slider.stiffness * stretch**2),
-        frictional=work(slider.normal_stress * friction, slip),
-        injection=0.0,
+        frictional=work((slider.normal_stress - pressure) * friction, slip),
+        injection=work(pressure * friction, slip),
         viscous=work(slider.damping * rate, slip),
         far_field=work(slider.stiffness * stretch, loaded),
         disturbance=0.0,

@@ -15,6 +15,7 @@ SIGNALS = {
     "slip_rate": ("slip rate", "m/s"),
     "stretch": ("stretch of the spring", "m"),
     "friction": ("friction coefficient", ""),
+    "pressure": ("fluid pressure", "Pa"),
 }
 
 
@@ -26,13 +27,15 @@ class StateTrajectory(Recording):
     ----------
     name : str
     time : ndarray
-        [s], shape (n,).
+        [s], shape (n,); the same one twice where the pressure steps, before and after.
     load_point, slip, stretch : ndarray
         Displacement of the load point, slip, and stretch of the spring [m], shape (n,).
     slip_rate : ndarray
         [m/s], shape (n,).
     friction : ndarray
         Friction coefficient [-], shape (n,).
+    pressure : ndarray
+        Fluid pressure [Pa], shape (n,).
     states : ndarray
         State of friction, shape (number of variables, n), named `state_names`, in `state_units`.
     state_names, state_units : tuple of str
@@ -57,6 +60,7 @@ class StateTrajectory(Recording):
     slip_rate: "np.ndarray" = field(repr=False)
     stretch: "np.ndarray" = field(repr=False)
     friction: "np.ndarray" = field(repr=False)
+    pressure: "np.ndarray" = field(repr=False)
     states: "np.ndarray" = field(repr=False)
     state_names: tuple[str, ...]
     state_units: tuple[str, ...]
@@ -77,16 +81,22 @@ class StateTrajectory(Recording):
 
         Between the instants of `time` by straight lines. `Fault.moment_of` makes it a seismic moment.
         """
+        at = self._at_arrest(self.slip)
+        return at - np.interp(self.onsets[: len(at)], self.time, self.slip)
+
+    @property
+    def arrests(self) -> "np.ndarray":
+        """Times [s] at which the slip rate is back at `onset_rate`, of every event that has ended."""
+        return self._at_arrest(self.time)
+
+    def _at_arrest(self, values: "np.ndarray") -> "np.ndarray":
+        """Values where the slip rate falls through `onset_rate` after every onset, by straight lines."""
         below = self.slip_rate <= self.onset_rate
         falls = np.flatnonzero(~below[:-1] & below[1:])
         ends = [next((i for i in falls if self.time[i + 1] > onset), None) for onset in self.onsets]
-        at = [self._slip_at_rate(int(i)) for i in ends if i is not None]
-        return np.array(at) - np.interp(self.onsets[: len(at)], self.time, self.slip)
-
-    def _slip_at_rate(self, i: int) -> float:
-        """Slip [m] at which the slip rate falls through `onset_rate`, between the instants i and i + 1."""
-        (fast, slow), (before, after) = self.slip_rate[i : i + 2], self.slip[i : i + 2]
-        return before + (after - before) * (fast - self.onset_rate) / (fast - slow)
+        at = np.array([i for i in ends if i is not None], dtype=int)
+        fast, slow = self.slip_rate[at], self.slip_rate[at + 1]
+        return values[at] + (values[at + 1] - values[at]) * (fast - self.onset_rate) / (fast - slow)
 
     def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
         """Values, long name and SI unit of every signal, by name."""

@@ -105,8 +105,8 @@ def _event(fault: Fault) -> list[str]:
     """What an earthquake of the fault is, as far as it is known without simulating one, and the task."""
     task = f"target slip {fault.reference.target_slip:.4g} m in {fault.reference.operation_time:.6g} s"
     if fault.friction.state_names:
-        said = "stress drop, magnitude and slip of an event depend on its history: simulate a cycle (simulate_state)"
-        return [said, task]
+        depends = "stress drop, magnitude and slip of an event depend on its history"
+        return [f"{depends}: simulate a cycle (simulate --start late)", task]
     magnitude = f"{fault.magnitude:.2f}" if fault.stress_drop > 0 else "none (no stress drop)"
     return [
         f"seismic moment {fault.seismic_moment:.4g} N·m, magnitude {magnitude}",

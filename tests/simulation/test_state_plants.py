@@ -34,7 +34,7 @@ def test_without_mass_the_balance_of_forces_stays_in_place(name):
     with mpmath.workdps(50):
         for u, w in rng.uniform([-20, -3], [-4, 8], (10, 2)):
             y = [0.0, 1e-3, u, w]
-            dy = [mpmath.mpf(float(x)) for x in slider.rates(y, 1e-6)[0].full().ravel()]
+            dy = [mpmath.mpf(float(x)) for x in slider.rates(y, [1e-6, 0, 0])[0].full().ravel()]
 
             def balance(h, u=u, w=w, dy=dy):
                 v, theta = mpmath.exp(u + h * dy[2]), mpmath.exp(w + h * dy[3])
@@ -54,7 +54,7 @@ def test_without_mass_the_balance_of_forces_stays_in_place(name):
 def test_a_fault_gives_the_rates_of_the_symbolic_room(name, inertia):
     """`state_plant` measures slip from steady sliding and works per unit of mass; the motion is the same."""
     fault = dataclasses.replace(load_fault("real-fault"), friction=LAWS[name])
-    slider = SpringSlider.of(fault, inertia=inertia, pressure=1e6)
+    slider = SpringSlider.of(fault, inertia=inertia)
     law = fault.friction.exact()
     derived = state_plant.third_order_rates(law)[1:] if inertia else state_plant.quasi_dynamic_rates(law)
     v_inf, ahead, v, theta = 1e-6, 1e-3, 3e-6, 7.0
@@ -70,7 +70,7 @@ def test_a_fault_gives_the_rates_of_the_symbolic_room(name, inertia):
     ]
     friction = PARAMETERS["reference_coefficient"]  # of steady sliding at the reference rate
     steady = (friction * fault.effective_normal_stress + slider.damping * v_inf) / slider.stiffness
-    found = slider.rates([0.0, steady - ahead, np.log(v), np.log(theta)], v_inf)[0].full().ravel()
+    found = slider.rates([0.0, steady - ahead, np.log(v), np.log(theta)], [v_inf, 1e6, 0])[0].full().ravel()
     assert found[2] * v == pytest.approx(expected[0], rel=1e-9)
     assert found[3] * theta == pytest.approx(expected[1], rel=1e-11)
     assert found[0] == pytest.approx(v, rel=1e-14)
@@ -79,20 +79,21 @@ def test_a_fault_gives_the_rates_of_the_symbolic_room(name, inertia):
 def test_the_jacobian_is_that_of_the_rates():
     slider = SpringSlider(law=LAWS["slip"], stiffness=2e9, normal_stress=5e6, damping=3e5, mass=100.0)
     y = np.array([0.0, 1.6e-3, -10.0, 1.0])
-    _, jacobian = slider.rates(y, 1e-6)
+    load = [1e-6, 2e5, 3e3]
+    _, jacobian = slider.rates(y, load)
     for i, size in enumerate((1e-6, 1e-9, 1e-6, 1e-6)):
         step = np.eye(4)[i] * size
-        difference = (slider.rates(y + step, 1e-6)[0] - slider.rates(y - step, 1e-6)[0]).full().ravel() / (2 * size)
+        difference = (slider.rates(y + step, load)[0] - slider.rates(y - step, load)[0]).full().ravel() / (2 * size)
         assert np.allclose(jacobian.full()[:, i], difference, rtol=1e-5, atol=1e-7)
 
 
 def test_the_start_is_in_balance_and_steady():
     slider = SpringSlider(law=LAWS["aging"], stiffness=2e9, normal_stress=5e6, damping=3e5)
     start = slider.start(1e-4)
-    friction, excess = slider.readings(start)
+    friction, excess = slider.readings(start, 0.0)
     assert float(friction) == pytest.approx(0.6 + (0.01 - 0.015) * np.log(100), rel=1e-14)
     assert abs(float(excess)) < 1e-8
-    assert np.allclose(slider.rates(start, 1e-4)[0].full().ravel()[1:], 0, atol=1e-12)
+    assert np.allclose(slider.rates(start, [1e-4, 0, 0])[0].full().ravel()[1:], 0, atol=1e-12)
     assert slider.names == ("slip", "stretch", "log_slip_rate", "log_theta")
 
 

@@ -42,6 +42,11 @@ class FrictionLaw(ABC):
         """Time derivative of every state variable, each in its unit per second; none for a law without state."""
         return ()
 
+    @property
+    def stress_exponents(self) -> tuple[float, ...]:
+        """∂ln(state)/∂ln(effective normal stress) [-] of every state variable while the stress changes suddenly."""
+        return (0,) * len(self.state_names)
+
     def steady_state(self, rate: "sp.Expr") -> "tuple[sp.Expr, ...]":
         """State at which sliding at a constant rate [m/s] leaves it; none for a law without state."""
         return ()

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault.checks import require_positive
+from quakedesign.fault.checks import require_nonnegative, require_positive
 from quakedesign.fault.friction.base import FrictionLaw
 from quakedesign.rationals import float_above, float_below, fraction_of, rational
 
@@ -37,6 +37,9 @@ class RateAndState(FrictionLaw):
         v_0 [m/s], positive.
     slowest_rate, fastest_rate : float
         v_s and v_f [m/s], ends of the working range, 0 < v_s ≤ v_0 ≤ v_f.
+    stress_sensitivity : float
+        α [-], not negative: a change of the effective normal stress σ adds −(αθ/(bσ))σ' to θ' (Linker and Dieterich
+        1992, J. Geophys. Res. 97(B4), 4923); 0 unless told. The bounds below are for a constant σ.
 
     Raises
     ------
@@ -55,9 +58,11 @@ class RateAndState(FrictionLaw):
     reference_rate: float = field(metadata={"unit": "m/s", "symbol": "v_0"})
     slowest_rate: float = field(metadata={"unit": "m/s", "symbol": "v_s"})
     fastest_rate: float = field(metadata={"unit": "m/s", "symbol": "v_f"})
+    stress_sensitivity: float = field(default=0.0, metadata={"unit": "", "symbol": r"\alpha"})
 
     def __post_init__(self) -> None:
-        require_positive(**{name: getattr(self, name) for name in self.quantities()})
+        require_positive(**{name: getattr(self, name) for name in self.quantities() if name != "stress_sensitivity"})
+        require_nonnegative(stress_sensitivity=self.stress_sensitivity)
         if not self.slowest_rate <= self.reference_rate <= self.fastest_rate:
             raise ParameterError(
                 "reference_rate must lie between slowest_rate and fastest_rate. Received "
@@ -94,6 +99,11 @@ class RateAndState(FrictionLaw):
     def state_rates(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "tuple[sp.Expr, ...]":
         """θ' [-]."""
         return (self.ageing(rate, self._theta(state)),)
+
+    @property
+    def stress_exponents(self) -> tuple[float, ...]:
+        """−α/b [-]."""
+        return (-self.stress_sensitivity / self.evolution_effect,)
 
     def steady_state(self, rate: "sp.Expr") -> "tuple[sp.Expr, ...]":
         """θ = d_c/rate [s]."""

@@ -22,6 +22,7 @@ VALUES = {
     "reference_rate": 1e-6,
     "slowest_rate": 1e-9,
     "fastest_rate": 1e-3,
+    "stress_sensitivity": 0.2,
 }
 UNITS = pint.UnitRegistry()
 NAMES = sorted(friction_laws())

@@ -1,0 +1,41 @@
+"""What is said of a run without control of a fault whose friction has a state."""
+
+from typing import Any
+
+_YEAR = 31_557_600.0
+_MOST_EVENTS = 8
+
+
+def state_run_lines(answer: dict[str, Any]) -> list[str]:
+    """Lines for people, from `StateRun.to_dict`: outcome, cycle, events."""
+    outcome, cycle, events = answer["outcome"], answer["cycle"], answer["slip_events"]
+    least, largest = (p / 1e6 for p in answer["pressure"])
+    state = ", ".join(f"{name} = {value:.4g} s" for name, value in answer["start"]["state"].items())
+    lines = [
+        f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.3g} m/s (an earthquake from "
+        f"{outcome['earthquake_from']:.3g} m/s on), {len(events)} events in {_time(answer['duration'])}, "
+        f"slip {answer['slip']:.4g} m",
+        f"loaded at {answer['loading_rate']:.4g} m/s; starts at {answer['start']['slip_rate']:.4g} m/s with {state}",
+        f"pressure from {least:.3g} MPa to {largest:.3g} MPa",
+    ]
+    if answer["resting"]:
+        lines.append("steady sliding is unstable here, but nothing disturbs it: start late, or give a pressure")
+    if cycle["recurrence_interval"] is not None:
+        lines.append(f"recurrence interval {_time(cycle['recurrence_interval'])}")
+    if cycle["slip"] is not None:
+        lines.append(f"slip of an event {cycle['slip']:.4g} m, magnitude {cycle['magnitude']:.2f}")
+    lines += [_event_line(number, event) for number, event in enumerate(events[:_MOST_EVENTS], start=1)]
+    if len(events) > _MOST_EVENTS:
+        lines.append(f"and {len(events) - _MOST_EVENTS} events more (--json has them all)")
+    lines.append(f"energy that the integration loses: {answer['energy']['relative_residual']:.2g} of the largest share")
+    return lines
+
+
+def _event_line(number: int, event: dict[str, Any]) -> str:
+    nucleation = "" if event["nucleation"] is None else f"nucleation from {event['nucleation']:.6g} s, "
+    arrest = "not over at the end of the run" if event["arrest"] is None else f"arrest {event['arrest']:.6g} s"
+    return f"event {number}: {nucleation}onset {event['onset']:.6g} s, {arrest}, peak {event['peak_slip_rate']:.3g} m/s"
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.4g} s" + (f" ({seconds / _YEAR:.3g} years)" if seconds > _YEAR else "")

@@ -1,0 +1,149 @@
+"""A fluid pressure that is prescribed over time: straight lines between instants, and steps."""
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from quakedesign.errors import ParameterError, UnitError
+from quakedesign.fault.units import si_value
+from quakedesign.input import read_text
+from quakedesign.text import shown
+
+MOST_POINTS = 4096
+_LARGEST_FILE = 1 << 20
+_COLUMNS = ("time", "pressure")
+_UNITS = {"time": "s", "pressure": "Pa"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressureCourse:
+    """Pressure p(t): held before the first instant and after the last, linear between, a step where one stands twice.
+
+    Attributes
+    ----------
+    times : tuple of float
+        [s], never descending, the same one at most twice.
+    pressures : tuple of float
+        [Pa], one for each.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    times: tuple[float, ...]
+    pressures: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not 0 < len(self.times) == len(self.pressures) <= MOST_POINTS:
+            raise ParameterError(
+                f"a course of pressure must have 1 to {MOST_POINTS} instants, each with a pressure. "
+                f"Received {len(self.times)} and {len(self.pressures)}. Leave out those on a straight line."
+            )
+        if not np.all(np.isfinite((*self.times, *self.pressures))):
+            raise ParameterError("times [s] and pressures [Pa] must be finite. Received others. Check the numbers.")
+        thrice = any(late <= early for early, late in zip(self.times, self.times[2:], strict=False))
+        if thrice or any(late < early for early, late in pairwise(self.times)):
+            raise ParameterError(
+                "times of a course of pressure must not descend, and stand twice only where it steps. "
+                f"Received {shown(list(self.times))} s. Sort them."
+            )
+
+    @classmethod
+    def constant(cls, pressure: float) -> "PressureCourse":
+        """The same pressure [Pa] at all times."""
+        return cls(times=(0.0,), pressures=(pressure,))
+
+    @property
+    def largest(self) -> float:
+        """[Pa]."""
+        return max(self.pressures)
+
+    def before(self, time: float) -> float:
+        """Pressure [Pa] that a time [s] is reached with."""
+        return self._at(time, int(np.searchsorted(self.times, time, side="left")))
+
+    def after(self, time: float) -> float:
+        """Pressure [Pa] that a time [s] is left with."""
+        return self._at(time, int(np.searchsorted(self.times, time, side="right")))
+
+    def sampled(self, time: "np.ndarray") -> "np.ndarray":
+        """Pressures [Pa] at ascending times [s]; of a time that stands twice the one before and the one after."""
+        twice = np.append(np.diff(time) == 0, False)
+        return np.array([self.before(t) if early else self.after(t) for t, early in zip(time, twice, strict=True)])
+
+    def _at(self, time: float, following: int) -> float:
+        if following in (0, len(self.times)):
+            return self.pressures[min(following, len(self.times) - 1)]
+        (start, end), (low, high) = (row[following - 1 : following + 1] for row in (self.times, self.pressures))
+        return low + (high - low) * (time - start) / (end - start)
+
+
+def pressure_course(text: str) -> PressureCourse:
+    """Course from a quantity such as ``"5 MPa"``, instants, or the path of a CSV file.
+
+    Parameters
+    ----------
+    text : str
+        A constant; or instants as ``"0 s: 0 MPa, 1 day: 0 MPa, 1 day: 5 MPa, 9 day: 2 MPa"``, linear between, a step
+        where one stands twice; or a path that ends in ``.csv``, its first row ``time [s],pressure [MPa]`` or with
+        other units.
+
+    Raises
+    ------
+    ParameterError, UnitError
+    """
+    if Path(text).suffix.lower() == ".csv":
+        rows = list(_rows(text))
+    elif ":" in text:
+        rows = [_instant(part) for part in text.split(",")]
+    else:
+        return PressureCourse.constant(_number(text, "pressure"))
+    times, pressures = zip(*rows, strict=True) if rows else ((), ())
+    return PressureCourse(times=tuple(times), pressures=tuple(pressures))
+
+
+def _number(text: str, name: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return si_value(text.strip(), _UNITS[name], name)
+
+
+def _instant(part: str) -> tuple[float, float]:
+    time, colon, pressure = part.partition(":")
+    if not colon:
+        raise ParameterError(
+            f"an instant of a course of pressure must be written 'time: pressure'. Received {shown(part)}. "
+            "Write for example '1 day: 5 MPa'."
+        )
+    return _number(time, "time"), _number(pressure, "pressure")
+
+
+def _rows(path: str) -> Iterator[tuple[float, float]]:
+    text = read_text(path, "course of pressure", largest=_LARGEST_FILE, refusal=ParameterError)
+    head, *rows = [row for row in csv.reader(text.splitlines()) if row] or [[]]
+    units = [_unit_of(name, column) for name, column in zip(_COLUMNS, (*head, "", ""), strict=False)]
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(_COLUMNS):
+            raise ParameterError(f"{path}, row {number} must have a time and a pressure. Received {shown(row)}.")
+        time, pressure = (
+            si_value(f"{value.strip()} {unit}", _UNITS[name], f"{path}, row {number}: {name}")
+            for value, unit, name in zip(row, units, _COLUMNS, strict=True)
+        )
+        yield time, pressure
+
+
+def _unit_of(name: str, column: str) -> str:
+    """Unit in a column's head such as ``pressure [MPa]``."""
+    word, bracket, unit = column.strip().partition("[")
+    if word.strip().lower() != name or not bracket or not unit.endswith("]"):
+        raise UnitError(
+            f"a course of pressure must have the columns 'time [s]' and 'pressure [Pa]', in this order, with any units "
+            f"of these dimensions. Received {shown(column)}. Name the columns in the first row."
+        )
+    return unit[:-1]

@@ -1,0 +1,162 @@
+"""One run without control of a fault whose friction has a state, as the command line asks for it."""
+
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.fault import Disturbance, Fault
+from quakedesign.fault.checks import require_positive
+from quakedesign.simulation import PressureCourse, StateTrajectory, simulate_state
+from quakedesign.simulation.outcome import Outcome
+from quakedesign.simulation.slip_events import SlipEvent, cycle_outcome, dynamic_rate, slip_events
+from quakedesign.simulation.starting_state import StartingState, late_in_cycle, locked, sliding
+from quakedesign.symbolic import derive
+
+PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
+_RTOL = 1e-8
+_UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateRun:
+    """A run, and what it comes to.
+
+    Attributes
+    ----------
+    fault : Fault
+    loading_rate : float
+        v_∞ [m/s].
+    start : StartingState
+    trajectory : StateTrajectory
+    """
+
+    fault: Fault
+    loading_rate: float
+    start: StartingState
+    trajectory: StateTrajectory
+
+    @property
+    def outcome(self) -> Outcome:
+        """Earthquake, slow slip or creep."""
+        return cycle_outcome(self.fault, self.trajectory)
+
+    @property
+    def events(self) -> tuple[SlipEvent, ...]:
+        """Every event."""
+        return slip_events(self.fault, self.trajectory, self.loading_rate)
+
+    @property
+    def resting(self) -> bool:
+        """Whether the run slides steadily at the law's reference rate, where that is unstable: nothing disturbs it."""
+        still = np.all(np.abs(np.log(self.trajectory.slip_rate / self.fault.friction.operating_rate)) < _UNDISTURBED)
+        return bool(still) and derive(self.fault).unstable
+
+    def to_dict(self) -> dict[str, Any]:
+        """Answer of ``simulate`` for such a fault, SI units; the cycle is the last one that is complete."""
+        run, events = self.trajectory, self.events
+        intervals = [later.onset - event.onset for event, later in pairwise(events)]
+        whole = [event for event in events if event.arrest is not None]
+        return {
+            "outcome": self.outcome.to_dict() | {"earthquake_from": 0.1 * dynamic_rate(self.fault)},
+            "resting": self.resting,
+            "loading_rate": self.loading_rate,
+            "start": {
+                "slip_rate": self.start.slip_rate,
+                "state": dict(zip(run.state_names, self.start.state, strict=True)),
+            },
+            "cycle": {
+                "recurrence_interval": intervals[-1] if intervals else None,
+                "slip": whole[-1].slip if whole else None,
+                "magnitude": whole[-1].magnitude if whole else None,
+            },
+            "slip_events": [asdict(event) for event in events],
+            "pressure": [float(run.pressure.min()), float(run.pressure.max())],
+            "slip": float(run.slip[-1]),
+            "duration": float(run.time[-1]),
+            "energy": run.energy.to_dict() | {"relative_residual": run.energy.relative_residual},
+            "steps": len(run.time),
+            "run": dict(run.provenance),
+        }
+
+
+def run_state(
+    fault: Fault,
+    *,
+    start: str = "steady",
+    hold: float | None = None,
+    share: float | None = None,
+    pressure: PressureCourse | None = None,
+    loading_rate: float | None = None,
+    duration: float | None = None,
+    plant: str = "smooth",
+    method: str = "radau",
+) -> StateRun:
+    """Run a fault whose friction has a state under loading from afar and a prescribed pressure.
+
+    Parameters
+    ----------
+    fault : Fault
+    start : str
+        ``steady`` (sliding at the loading rate), ``locked`` (held since then for the time `hold`) or ``late`` (when a
+        `share` of the time between two events has passed).
+    hold : float, optional
+        [s].
+    share : float, optional
+        [-], of 0 to 1; 0.9 unless given.
+    pressure : PressureCourse, optional
+        None: no pressure.
+    loading_rate : float, optional
+        v_∞ [m/s]; the reference rate of the law unless given.
+    duration : float, optional
+        [s]; the operation time of the task unless given.
+    plant : str
+        ``smooth`` (with inertia) or ``quasi-dynamic`` (without).
+    method : str
+        As of `simulate_state`.
+
+    Raises
+    ------
+    ParameterError, UnknownNameError, SimulationError
+    """
+    if plant not in PLANTS:
+        raise UnknownNameError(f"plant of a fault with a state must be {' or '.join(PLANTS)}. Received {plant!r}.")
+    if fault.disturbance != Disturbance():
+        raise ParameterError(
+            "a run of friction with a state has no disturbance but a pressure. Received a fault with a table "
+            "disturbance. Remove it, and give --pressure: p changes the strength by as much as a shear stress of mu*p."
+        )
+    rate = fault.friction.operating_rate if loading_rate is None else loading_rate
+    require_positive("Steady sliding at this rate is where the run begins.", loading_rate=rate)
+    settings: dict[str, Any] = {"inertia": PLANTS[plant], "method": method, "rtol": _RTOL}
+    begun = _start(fault, start, rate, hold, share, settings)
+    run = simulate_state(
+        fault,
+        rate,
+        duration=fault.reference.operation_time if duration is None else duration,
+        start_rate=begun.slip_rate,
+        start_state=begun.state,
+        pressure=pressure or 0.0,
+        **settings,
+    )
+    return StateRun(fault=fault, loading_rate=rate, start=begun, trajectory=run)
+
+
+def _start(
+    fault: Fault, kind: str, rate: float, hold: float | None, share: float | None, settings: dict[str, Any]
+) -> StartingState:
+    given = {"hold": hold, "share": share}
+    wanted: dict[str, tuple[str, ...]] = {"steady": (), "locked": ("hold",), "late": ("share",)}
+    if kind not in wanted:
+        raise UnknownNameError(f"start must be steady, locked or late. Received {kind!r}.")
+    if others := [name for name, value in given.items() if value is not None and name not in wanted[kind]]:
+        raise ParameterError(f"{others[0]} belongs to another start than {kind}. Received both. Leave one out.")
+    if kind == "steady":
+        return sliding(fault, rate)
+    if kind == "late":
+        return late_in_cycle(fault, rate, 0.9 if share is None else share, **settings)
+    if hold is None:
+        raise ParameterError("a locked start needs the time that the fault was held. Received none. Give --hold.")
+    return locked(fault, rate, hold, **settings)
