@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import pickle
 import signal
 import sys
 from abc import ABC, abstractmethod
@@ -99,12 +100,12 @@ class Processes(Crew):
         self, count: int | None = None, begin: Callable[..., object] | None = None, arguments: tuple = ()
     ) -> None:
         self._count = cores() if count is None else require_workers(count)
-        self._begin = begin, arguments
+        self._begin = pickle.dumps((begin, arguments))  # whose modules take seconds to import
         self._context = _Roll()
         self._pool: Executor = self._filled()
 
     def _filled(self) -> Executor:
-        return ProcessPoolExecutor(self._count, self._context, _enlist, self._begin)
+        return ProcessPoolExecutor(self._count, self._context, _enlist, (self._begin,))
 
     @property
     def width(self) -> int:
@@ -174,8 +175,8 @@ def require_workers(count: int) -> int:
     return count
 
 
-def _enlist(begin: Callable[..., object] | None, arguments: tuple) -> None:
-    """Prepare a process of a pool: the parent handles Ctrl-C, and nobody survives the parent."""
+def _enlist(packed: bytes) -> None:
+    """Prepare a process of a pool: the parent handles Ctrl-C, and nobody survives it, even while modules load."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
     if sys.platform == "linux":
@@ -183,6 +184,7 @@ def _enlist(begin: Callable[..., object] | None, arguments: tuple) -> None:
     Thread(target=_follow_parent, daemon=True).start()
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    begin, arguments = pickle.loads(packed)
     if begin is not None:
         begin(*arguments)
 

@@ -49,6 +49,30 @@ def test_nobody_outlives_the_process_that_asks(start, tmp_path, number, code, sa
     assert err == said or not said
 
 
+HEAVY = """
+import os
+from multiprocessing import current_process
+
+def begin():
+    pass
+
+if current_process().name != "MainProcess":
+    os.write(1, b"there\\n")
+    sum(range(10**12))
+"""
+
+
+def test_nobody_outlives_it_while_modules_are_imported(start, tmp_path):
+    """What is called before the first task lies in a module that takes its time in foreign code."""
+    (tmp_path / "heavy.py").write_text(HEAVY)
+    program = PROGRAM.replace("    with", "    from heavy import begin\n    with").replace("(2)", "(2, begin)")
+    (tmp_path / "program.py").write_text(program)
+    process = start("program.py", "idle")
+    assert [process.stdout.readline() for _ in range(2)] == ["there\n"] * 2
+    process.kill()
+    process.communicate(timeout=5)
+
+
 def test_interruptions_of_the_whole_group_are_one_line_from_the_start(start, tmp_path):
     """Ctrl-C reaches the workers too, which may have just begun to start."""
     (tmp_path / "program.py").write_text("print('begun', flush=True)\n" + PROGRAM)
