@@ -43,6 +43,8 @@ class Certificate(Evidence):
         ------
         CertificateError
             When the proof does not hold, or the field is not that of the law.
+        WorkError
+            When that takes more work than a check may (proofs/FORMAT.md): it is undecided.
         """
         return check(self, law)
 

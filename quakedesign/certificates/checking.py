@@ -8,11 +8,17 @@ from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Verdict,
 from quakedesign.certificates.obligations import Obligation, claimed, different
 from quakedesign.certificates.witnesses import proves
 from quakedesign.controllers import LoopField, Subject, laws, model_of
+from quakedesign.sos.exact.work import limited
 from quakedesign.symbolic.terms import Term, value
 
 
 def check(certificate: Evidence, law: Subject | None = None) -> Verdict:
     """Decide a certificate in exact arithmetic; see `Certificate.check`."""
+    with limited():
+        return _decided(certificate, law)
+
+
+def _decided(certificate: Evidence, law: Subject | None) -> Verdict:
     _check_roots(certificate.loop)
     _same_field(certificate.loop, law)
     if certificate.refutation is not None:

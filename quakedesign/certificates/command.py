@@ -26,7 +26,6 @@ from quakedesign.sos import Answer, Positivity
 from quakedesign.sos.exact.files import is_about_polynomial
 from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.words import sentences
-from quakedesign.sos.exact.work import limited
 from quakedesign.symbolic.terms import from_terms
 
 
@@ -59,8 +58,7 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
             verdict_of, said = _polynomial(raw)
             return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
         certificate = Certificate.of(evidence_of(raw))
-        with limited():
-            verdict = certificate.check()
+        verdict = certificate.check()
         more = _covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []
     except WorkError as error:
         return f"undecided: {error}", []
@@ -86,9 +84,8 @@ def _polynomial(raw: Any) -> tuple[str, list[str]]:
     """Verdict on a file about a plain polynomial."""
     statement, proof = read_polynomial_file(raw)
     answer = Answer(statement=statement, proof=proof)
-    with limited():
-        if not answer.check():
-            raise CertificateError("the proof does not decide the statement")
+    if not answer.check():
+        raise CertificateError("the proof does not decide the statement")
     kind = "proved" if answer.verdict is Positivity.SOS else "refuted"
     return kind, [line for line in sentences(answer) if not line.endswith("exact arithmetic")]
 

@@ -11,10 +11,12 @@ from quakedesign.certificates.checking import _check_equilibrium, _check_proof, 
 from quakedesign.certificates.claim import Equilibrium
 from quakedesign.certificates.obligations import claimed, different
 from quakedesign.controllers import LoopField
-from quakedesign.errors import CertificateError
+from quakedesign.errors import CertificateError, WorkError
+from quakedesign.sos.exact import work
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.symbolic import SignedPower
 from quakedesign.symbolic.terms import Term
+from quakedesign.synthesis.lyapunov.certify_exactly import finish
 
 x, k, root = sp.symbols("x k root", real=True)
 MODEL = LoopField(
@@ -205,3 +207,12 @@ def test_weights_are_convex():
     _check_equilibrium(still, Equilibrium(parameters={}, point=point, weights={"++": F(1), "-+": F(0)}))
     with pytest.raises(CertificateError, match="convex weights"):
         _check_equilibrium(still, Equilibrium(parameters={}, point=point, weights={"++": F(2), "-+": F(-1)}))
+
+
+def test_a_proof_that_would_take_too_long_to_check_is_not_found(monkeypatch):
+    good = proof("4", "2", "2")
+    assert finish(good.loop, good.lyapunov, good.claims, MODEL) is not None
+    monkeypatch.setattr(work, "STEPS", 1)
+    assert finish(good.loop, good.lyapunov, good.claims, MODEL) is None
+    with pytest.raises(WorkError, match="steps of exact arithmetic"):
+        good.check(MODEL)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares, holds
 from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.work import limited
 
 
 class Positivity(Enum):
@@ -56,8 +57,14 @@ class Answer:
         """Whether the proof decides the statement, in exact arithmetic and without a solver.
 
         An undecided answer claims nothing and is True.
+
+        Raises
+        ------
+        WorkError
+            When that takes more work than a check may (proofs/FORMAT.md): it is undecided.
         """
-        return self.proof is None or holds(self.statement, self.proof)
+        with limited():
+            return self.proof is None or holds(self.statement, self.proof)
 
     def save(self, path: str | Path) -> None:
         """Write the file of FORMAT.md, whole or not at all.

@@ -7,7 +7,7 @@ from math import comb
 from time import perf_counter
 from typing import Any
 
-from quakedesign.errors import PolynomialError
+from quakedesign.errors import PolynomialError, WorkError
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.polynomial import (
     Polynomial,
@@ -120,7 +120,11 @@ def decide(asked: Statement) -> Answer:
         seconds=perf_counter() - start,
         versions=_versions(),
     )
-    return answer if answer.check() else replace(answer, proof=None)
+    try:
+        decided = answer.check()
+    except WorkError:
+        decided = False
+    return answer if decided else replace(answer, proof=None)
 
 
 def _by_square_factor(asked: Statement) -> SumOfSquares | None:

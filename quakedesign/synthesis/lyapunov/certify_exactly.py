@@ -7,7 +7,7 @@ from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certif
 from quakedesign.certificates.obligations import Obligation, Obligations, claimed, degree, different, with_decay
 from quakedesign.certificates.witnesses import statement_of, width
 from quakedesign.controllers import Subject
-from quakedesign.errors import CertificateError
+from quakedesign.errors import CertificateError, WorkError
 from quakedesign.sos.exact.polynomial import constant, product
 from quakedesign.sos.exact.proofs import Square, SumOfSquares
 from quakedesign.sos.solve.decide import strict_proof
@@ -39,7 +39,7 @@ def finish(
         certificate = Certificate(loop=loop, lyapunov=lyapunov, claims=dict(claims), witnesses=witnesses)
         readable = parse_certificate(certificate_text(certificate)) == certificate
         return certificate if readable and certificate.check(subject) is Verdict.PROVED else None
-    except CertificateError:
+    except (CertificateError, WorkError):
         return None
 
 

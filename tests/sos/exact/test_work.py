@@ -5,11 +5,14 @@ import random
 import time
 from contextlib import nullcontext
 from fractions import Fraction as F
+from pathlib import Path
 
 import pytest
 
+from quakedesign.certificates import load_certificate
 from quakedesign.certificates.command import check_files
 from quakedesign.errors import WorkError
+from quakedesign.sos import Answer, Positivity
 from quakedesign.sos.exact import work
 from quakedesign.sos.exact.definiteness import (
     _eliminates,
@@ -17,6 +20,7 @@ from quakedesign.sos.exact.definiteness import (
     positive_definite,
     positive_definite_integers,
 )
+from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.polynomial import evaluate, product
 from quakedesign.sos.exact.proofs import Functional, _functional_holds, _sum, localizing_matrix
 from quakedesign.sos.exact.reduction import _contributions, reach
@@ -24,6 +28,7 @@ from quakedesign.sos.exact.squares import IntegerGram, Square, form, integer_gra
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.exact.statement import statement as usual
 from quakedesign.sos.exact.work import STEPS, TERMS, expanded, length, limited, longest, spend
+from quakedesign.sos.solve.engine import prove
 
 RANDOM = random.Random(5)
 
@@ -209,3 +214,47 @@ def test_the_terms_of_a_sum_are_counted_beyond_those_of_its_squares(monkeypatch)
         monkeypatch.setattr(work, "TERMS", terms)
         with limited(), nullcontext() if fits else pytest.raises(WorkError, match="more than 5 terms"):
             assert len(_sum(usual(("x",), {}), [(square, integer_gram(square)) for square in squares])) == 6
+
+
+CERTIFICATES = Path(__file__).parents[3] / "proofs" / "certificates"
+SQUARE = file({"2": "1", "1": "-2", "0": "2"}, sos({"product": [], "basis": [[0], [1]], "gram": ["2", "-1", "1"]}))
+
+
+def decides(check):
+    try:
+        check()
+    except WorkError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("name", ["super-twisting_1.5_1.1", "polynomial"])
+def test_the_command_and_python_refuse_the_same_work_to_the_last_step(name, tmp_path, monkeypatch):
+    path = CERTIFICATES / f"{name}.json"
+    if name == "polynomial":
+        path = tmp_path / "polynomial.json"
+        path.write_text(json.dumps(SQUARE | {"degree": 2}))
+        statement, proof = read_polynomial_file(json.loads(path.read_text()))
+        evidence = Answer(statement=statement, proof=proof)
+    else:
+        evidence = load_certificate(path)
+
+    def fits(steps):
+        monkeypatch.setattr(work, "STEPS", steps)
+        return decides(evidence.check)
+
+    low, high = 0, 10**6
+    assert (fits(low), fits(high)) == (False, True)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if fits(middle) else (middle, high)
+    for steps, expected in ((high, "proved"), (low, "undecided: the check takes more than")):
+        assert fits(steps) == (expected == "proved")
+        ((found, _),) = check_files([path]).values()
+        assert found.startswith(expected)
+
+
+def test_what_would_take_too_long_to_check_is_not_found(monkeypatch):
+    """A search does not count; the check of what it finds does."""
+    monkeypatch.setattr(work, "STEPS", 1)
+    assert prove("x^2 - 2*x + 2").verdict is Positivity.UNDECIDED

@@ -12,7 +12,7 @@ from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certif
 from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.certificates.obligations import Obligation, claimed, different
 from quakedesign.controllers.elqr import ExtendedLQR
-from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.errors import CertificateError, ParameterError, WorkError
 from quakedesign.rationals import rational
 from quakedesign.sos.exact.polynomial import constant
 from quakedesign.sos.exact.proofs import Square
@@ -155,7 +155,7 @@ def finished_exactly(loop: Loop, theta: Sequence[Sequence[Fraction]]) -> Certifi
             found = Certificate(loop=loop, lyapunov=lyapunov, claims=claims, witnesses=witnesses)
             if found.check() is Verdict.PROVED and parse_certificate(certificate_text(found)) == found:
                 return found
-        except CertificateError:
+        except (CertificateError, WorkError):
             continue
     return None
 
