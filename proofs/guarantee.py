@@ -7,14 +7,13 @@ impulse responses in integers, multiples of 2^-BITS, each with a bound of its er
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import chain, pairwise, product
 from math import ceil, comb, lcm
 from typing import Any
 
 BITS = 192
-PIECES = 8  # into which every flow between two events is cut
 DOUBLINGS = 12  # at most 4096 periods are summed
 SHARE = 256  # what is left of the past after those is below a 256th
 MAX_STATES, MAX_LAW_STATES, MAX_PERIODS, MAX_DEGREE = 20, 12, 8, 12
@@ -28,7 +27,7 @@ CELLS = 10  # how often the range of e1 is halved
 MODES, PI = 8, Fraction(314159265358979323846, 10**20)  # of a layer of rock; PI is below pi by less than SHORT of it
 SHORT = Fraction(1, 10**20)
 SHORTEST = 32  # a layer takes at least the 32nd part of a step
-EVEN = [Fraction(i, PIECES) for i in range(PIECES + 1)]
+EVEN = [Fraction(i, 8) for i in range(9)]  # where a flow between two events is cut
 HALVES = [Fraction(i, 2) for i in range(3)]
 BENT = [Fraction(i, 128) for i in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)]  # after a step into a layer
 
@@ -352,8 +351,8 @@ class Loop:
     root: Root | None
     step: Fraction
     noise: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
-    cuts: Sequence[Fraction] = tuple(EVEN)
-    past_cuts: Sequence[Fraction] = tuple(EVEN)
+    cuts: Sequence[Fraction] = field(default_factory=lambda: EVEN)
+    past_cuts: Sequence[Fraction] = field(default_factory=lambda: EVEN)
     fade: Fade | None = None
 
 
@@ -377,7 +376,7 @@ def read_loop(value: Any, task: Task) -> Loop:
     output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2 + implicit)
     noise = read_noise(given["noise"]) if "noise" in more else (Fraction(0), Fraction(0))
     need(implicit or not noise[1] or uses_rate(seen, feedback), "noise of the slip rate needs a law that measures it")
-    time = number(given["diffusion"], "diffusion") if layered else Fraction(0)
+    time = number(given.get("diffusion", "0"), "diffusion")
     need(not layered or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
     whole, part = delay // step, delay % step
     waiting = int(whole) + (part > 0)
@@ -386,9 +385,9 @@ def read_loop(value: Any, task: Task) -> Loop:
     need(size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
     valve = 2 + n + waiting
     path = range(valve + 1, valve + 1 + behind)
-    modes = path[lag > 0 :] if layered else range(0)
+    modes = path[lag > 0 :]
 
-    push = [Fraction(i == valve or (lag > 0 and i == valve + 1)) for i in range(size)]
+    push = [Fraction(i in (valve, valve + 1)) for i in range(size)]  # modes follow
     flow = zeros(size)
     flow[0][1] = Fraction(1)
     if lag > 0:
@@ -675,9 +674,8 @@ def cut(loop: Loop, cuts: Sequence[Fraction], entry: Row, sudden: bool, fade: Fa
             whole = step * whole
         masses = []
         if fade:
-            between = loop.events[fade.event : place] if place >= fade.event else loop.events[fade.event :]
-            since = sum((length for _, length in between), Fraction(0))
-            since += sum((length for _, length in loop.events[:place]), Fraction(0)) if place < fade.event else 0
+            turned = loop.events[fade.event :] + loop.events[: fade.event]
+            since = sum(length for _, length in turned[: (place - fade.event) % len(turned)])
             masses = [mass(fade, since + c * duration, h) for c, h in zip(cuts, lengths, strict=False)]
         flows.append(Flow(fixed(event), lengths, steps, nears, whole, column(entry), generator, moved, sudden, masses))
     return flows
@@ -738,14 +736,11 @@ class Past:
 
 def past(flows: list[Flow], rows: int) -> Past:
     """Sum 2^j periods until what is left is below a 256th of every unit row's sum."""
-    period, parts = None, []
-    for flow in reversed(flows):
-        parts.append(pieces(flow, period))
-        period = period * flow.whole if period else flow.whole
-    assert period is not None
+    *earlier, flow = flows
+    period, columns = flow.whole, pieces(flow, None)
+    for flow in reversed(earlier):
+        columns, period = columns.beside(pieces(flow, period)), period * flow.whole
     size = len(period.rows)
-    first, *others = parts
-    columns = first.beside(*others)
     sums = columns.sums()
     for _ in range(DOUBLINGS):
         width = len(columns.rows[0])

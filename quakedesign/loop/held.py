@@ -149,7 +149,7 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
 
 def _push(n: int, valve: int, lag: Fraction, diffusion: Fraction) -> Row:
     """What the states say of the fault's pressure."""
-    push = [Fraction(i == valve or (i == valve + 1 and lag > 0)) for i in range(n)]
+    push = [Fraction(i in (valve, valve + 1)) for i in range(n)]  # modes follow
     if diffusion:
         first, layer = valve + (2 if lag else 1), Layer(time=diffusion)
         push[first : first + MODES] = [layer.share(i) for i in range(MODES)]

@@ -288,6 +288,8 @@ def test_matrices_say_what_moves_where(delay, lag, jumps):
         assert {name: named(loop, row) for name, row in zip(loop.states, segment.jump, strict=True)} == expected
     parts = [F(delay) % STEP, STEP - F(delay) % STEP] if len(jumps) == 2 else [STEP]
     assert [segment.duration for segment in loop.segments] == parts
+    for segment in loop.segments:
+        assert segment.pieces() == segment.pieces(past=True) == (segment.duration / 8,) * 8
     assert {name: named(loop, row) for name, row in loop.inputs.items()} == {
         "acceleration": {"e2": 1},
         "drift": {"xi2": 5, **dict.fromkeys([*waiting, "valve"], -1)},

@@ -2,14 +2,14 @@
 
 from fractions import Fraction as F
 from itertools import pairwise
-from math import erfc, sqrt
 
 import numpy as np
 import pytest
 from mpmath import mp
+from scipy.special import erfc
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop import Layer, LinearLaw, Model, held_loop, summed_integrals
+from quakedesign.loop import Fading, Layer, LinearLaw, Model, held_loop, summed_integrals
 from quakedesign.loop.actuators import Diffusion
 from quakedesign.loop.layer import MODES
 
@@ -20,12 +20,12 @@ MODEL = Model(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
 
 def step_response(t):
     """2 Σ (−1)ⁿ erfc((2n + 1)/(2√(t/τ))), which converges where the sum of modes does not."""
-    return 2 * sum((-1) ** n * erfc((2 * n + 1) / 2 / sqrt(t / float(TIME))) for n in range(40))
+    return 2 * sum((-1) ** n * erfc((2 * n + 1) / 2 / np.sqrt(t / float(TIME))) for n in range(40))
 
 
 def of_modes(t):
     shares, rates = (np.array([float(f(n)) for n in range(MODES)]) for f in (LAYER.share, LAYER.rate))
-    return 1 - float(shares @ np.exp(-rates * t))
+    return 1 - np.exp(-np.multiply.outer(t, rates)) @ shares
 
 
 def test_what_the_modes_leave_out_of_a_step_is_below_its_bound_and_near_it():
@@ -42,13 +42,14 @@ def test_steps_at_every_sample_that_all_add_up_are_below_the_bound():
     step, late = F(1, 500), np.linspace(0, 1 / 500, 20)
     high, rate, floor = LAYER.left_out(step)
     for theta in late[1:]:
-        whole = sum(abs(step_response(theta + k / 500) - of_modes(theta + k / 500)) for k in range(2000))
+        since = theta + np.arange(2000) / 500
+        whole = np.abs(step_response(since) - of_modes(since)).sum()
         assert 0.4 < whole / (float(high) * np.exp(-float(rate) * theta) + float(floor)) <= 1
 
 
 def test_a_well_that_rises_evenly_leaves_out_less_than_the_bound_of_its_integral():
     points = np.linspace(1e-7, 0.2, 20000)
-    area = np.trapezoid([abs(step_response(t) - of_modes(t)) for t in points], points)
+    area = np.trapezoid(np.abs(step_response(points) - of_modes(points)), points)
     assert 0.4 * float(LAYER.left_out_in_all) < area <= float(LAYER.left_out_in_all)
 
 
@@ -141,7 +142,8 @@ def test_the_valve_s_step_is_kept_and_everything_behind_it_stays_while_it_jumps(
 
 def test_a_layer_that_is_faster_than_bounds_can_follow_is_refused():
     law = summed_integrals((F(1), F(1), F(1), F(1)), F(1, 5))
-    held_loop(law, MODEL, F(2), F(1, 5), diffusion=F(1, 160))
+    fastest = held_loop(law, MODEL, F(2), F(1, 5), diffusion=F(1, 160))
+    assert fastest.states == ("e1", "e2", "xi1", "xi2", "valve", *LAYERS, "stepped")
     for time in (F(1, 161), F(-1)):
         with pytest.raises(ParameterError, match="diffusion must take at least T_s/32"):
             held_loop(law, MODEL, F(2), F(1, 5), diffusion=time)
@@ -150,3 +152,73 @@ def test_a_layer_that_is_faster_than_bounds_can_follow_is_refused():
 def test_a_reference_that_moves_moves_no_mode_against_the_valve():
     loop = loop_of(summed_integrals((F(1), F(1), F(1), F(1)), F(1, 5)))
     assert loop.inputs["drift"][loop.states.index("valve") :] == (-1, *[0] * (MODES + 1))
+
+
+PI = F(314159265358979323846, 10**20)
+SHARES = [F(4 * (-1) ** n, 2 * n + 1) / PI for n in range(9)]
+RATES = [(F(2 * n + 1, 2) * PI) ** 2 * F(2, 3) for n in range(9)]
+SHORT = F(48, 10**20)
+ASKED = {"e1": -8, "e2": -4, "xi1": -2, "xi2": F(-1, 5)}
+LAYERS = [f"layer{n}" for n in range(8)]
+LATER = {name: {name: 1, "valve": 1} | {k: -v for k, v in ASKED.items()} for name in ["behind", *LAYERS]}
+ARRIVES = {"valve": {"waiting1": 1}, "stepped": {"waiting1": 1, "valve": -1}}
+ARRIVES |= {name: {name: 1, "valve": 1, "waiting1": -1} for name in ["behind", *LAYERS]}
+QUEUED = {"waiting0": ASKED, "waiting1": {"waiting0": 1}}
+CASES = {
+    "neither": ("0", "0", [LATER | {"valve": ASKED, "stepped": ASKED | {"valve": -1}}]),
+    "lag": ("0", "1/4", [LATER | {"valve": ASKED} | {name: {name: 1} for name in LAYERS}]),
+    "delay": ("27/100", "0", [QUEUED, ARRIVES]),
+    "delay and lag": ("27/100", "1/10", [QUEUED, ARRIVES | {name: {name: 1} for name in LAYERS}]),
+}
+
+
+def named(loop, row):
+    """The entries of a row that are not zero, by the names of states."""
+    return {name: v for name, v in zip(loop.states, row, strict=True) if v}
+
+
+@pytest.mark.parametrize(("delay", "lag", "jumps"), CASES.values(), ids=CASES)
+def test_matrices_say_what_moves_where(delay, lag, jumps):
+    """Row by row; states and inputs without a layer are those of `test_held`."""
+    lag, delay, step = F(lag), F(delay), F(1, 5)
+    loop = loop_of(summed_integrals((F(4), F(2), F(1), F(1, 10)), step), delay=delay, lag=lag)
+    waiting, stepped, behind = (
+        ["waiting0", "waiting1"] if delay else [],
+        [] if lag else ["stepped"],
+        ["behind"] * (lag > 0),
+    )
+    assert loop.states == ("e1", "e2", "xi1", "xi2", *waiting, "valve", *behind, *LAYERS, *stepped)
+    push = {"valve": 1, **dict.fromkeys(behind, 1), **dict(zip(LAYERS, SHARES[:8], strict=True))}
+    flow = {name: named(loop, row) for name, row in zip(loop.states, loop.flow, strict=True)}
+    assert flow.pop("e1") == {"e2": 1}
+    assert flow.pop("e2") == {"e1": F(1, 2), "e2": F(-3, 2)} | {name: v * F(6, 5) for name, v in push.items()}
+    assert flow.pop("behind", None) == ({"behind": -1 / lag} if lag else None)
+    for name, rate in zip(LAYERS, RATES[:8], strict=True):
+        assert flow.pop(name) == {name: -rate, **({"behind": 1 / lag} if lag else {})}
+    assert not any(flow.values())
+    sums = {"xi1": {"xi1": 1, "e1": step}, "xi2": {"xi2": 1, "xi1": step}}
+    for number, (segment, moved) in enumerate(zip(loop.segments, jumps, strict=True)):
+        moved = {name: {name: 1} for name in loop.states} | ({} if number else sums) | moved
+        found = {name: named(loop, row) for name, row in zip(loop.states, segment.jump, strict=True)}
+        if number == 0 and delay and stepped:
+            assert found.pop("stepped") == {"stepped": 1}  # until the next one arrives
+        assert found == {name: moved[name] for name in found}
+    assert [segment.duration for segment in loop.segments] == ([F(7, 100), F(13, 100)] if delay else [step])
+    lengths = [F(v, 128) for v in (1, 2, 3, 4, 5, 7, 10, 14, 18, 20, 22, 22)]
+    for segment in loop.segments:
+        assert segment.pieces() == tuple(segment.duration * v for v in lengths)
+        assert segment.pieces(past=True) == (segment.duration / 2,) * 2
+    assert {name: named(loop, row) for name, row in loop.inputs.items()} == {
+        "acceleration": {"e2": 1},
+        "drift": {"xi2": 5, **dict.fromkeys([*waiting, "valve"], -1)},
+    }
+    outputs = {"slip_error": {"e1": 1}, "slip_rate_error": {"e2": 1}, "push": push}
+    if lag:
+        left, fading = {"behind": (SHARES[8] / RATES[8] + SHORT * TIME) / lag}, {}
+    else:
+        height, floor = SHARES[8] * (1 + 1 / (RATES[8] * step)), SHORT * (1 + TIME / step)
+        left, first = {"stepped": height + floor}, 1 if delay else 0
+        shares = {"height": height / (height + floor), "floor": floor / (height + floor)}
+        fading = {"left_out": Fading(entry=loop.inputs["acceleration"], first=first, rate=RATES[8], **shares)}
+    assert {name: named(loop, row) for name, row in loop.outputs.items()} == outputs | {"left_out": left}
+    assert loop.fading == fading

@@ -292,7 +292,7 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, monkeypatch):
         monkeypatch.setattr(theorem, "norms" if held else "flow_norms", lambda _, known=table: known)
         given = checker.Root([], list(root.slopes), root.remainder) if root else None
         off = tuple(noise.get(name, F(0)) for name in NOISES)
-        loop = checker.Loop([], events, [], [[] for _ in names], given, step, off)
+        loop = checker.Loop([], events, [[]] * 3, [[] for _ in names], given, step, off)
         segments = tuple(Segment(jump=(), duration=step) for _ in events)
         ours = PeriodicLoop(states=(), flow=(), segments=segments, inputs={}, outputs={})
         found = certified_bounds(task, ours, root, noise)

@@ -66,14 +66,16 @@ CONTINUOUS = changed(
 )
 
 
+LAYERED = changed(HELD, (("loop", "diffusion"), "2"))
 NOISY = changed(HELD, (("loop", "noise"), {"slip": "1/9", "rate": "1/7"}), (("loop", "feedback"), ["1", "0"]))
 ALONE = changed(NOISY, (("loop", "measured"), [["1", "0"]]), (("loop", "noise", "rate"), "0"))
 
 
-def many(states, delay, lag):
+def many(states, delay, lag, diffusion=None):
     """A law of so many states, all integrals."""
     rows = [[str(int(i == j)) for j in range(states)] for i in range(states)]
     loop = HELD["loop"] | {"delay": delay, "lag": lag, "states": [f"z{i}" for i in range(states)], "update": rows}
+    loop |= {"diffusion": diffusion} if diffusion else {}
     return changed(HELD, (("loop",), loop | {"measured": [["1", "0"]] * states, "output": ["1"] * states}))
 
 
@@ -118,6 +120,10 @@ LIMITS = [
     (ROOTED, ("loop", "root"), [ROOT], [ROOT | {"more": "1"}, {"pull": [TERM]}, {}, 5, None]),
     (CONTINUOUS, ("loop",), [CONTINUOUS["loop"]], [CONTINUOUS["loop"] | {"more": "1"}, {"rates": [["0"]]}]),
     (CONTINUOUS, ("loop", "noise"), [], [{"slip": "0", "rate": "0"}]),
+    (CONTINUOUS, ("loop", "diffusion"), [], ["1"]),
+    (LAYERED, ("loop", "diffusion"), ["1/32", "1/31", "5"], ["1/33", "0", "-1", 1, None]),
+    (LAYERED, ("loop",), [many(7, "1", "0", "1")["loop"], many(8, "0", "1", "1")["loop"]],
+     [many(8, "1", "0", "1")["loop"], many(8, "1/2", "1", "1")["loop"]]),
     (NOISY, ("loop", "noise"), [{"slip": "0", "rate": "0"}, {"slip": "0", "rate": "1/9"}],
      [{"slip": "1"}, {"rate": "1"}, {"slip": "1", "rate": "1", "time": "1"}, {"slip": "-1/9", "rate": "0"},
       {"slip": "0", "rate": "-1/9"}, {"slip": "0", "rate": 0}, [], "1", None]),
@@ -257,6 +263,39 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
     at_once = "for a pressure that acts at once (continuous time), which no sampled controller has"
     assert lines[2] == f"law with 1 states, {at_once}"
     assert lines[3].startswith("disturbance: |phi| <= 0.3333 m/s^2; from rest")
+
+
+def test_a_layer_in_numbers():
+    """L²/D = 2 s, every second: e1, e2, z, the valve, eight modes and the last step."""
+    task, pi = checker.read_task(LAYERED), F("3.14159265358979323846")
+    shares, rates = zip(
+        *((F(4 * (-1) ** n, 2 * n + 1) / pi, F((2 * n + 1) ** 2, 8) * pi**2) for n in range(9)), strict=True
+    )
+    loop = checker.read_loop(LAYERED["loop"], task)
+    assert [loop.flow[4 + n][4 + n] for n in range(8)] == [-rate for rate in rates[:8]]
+    assert loop.outputs[2] == [0, 0, 0, 1, *shares[:8], 0]
+    height, floor = shares[8] * (1 + 1 / rates[8]), F(3 * 6 * 8, 10**20)
+    assert loop.outputs[3] == [F(0)] * 12 + [height + floor]
+    assert loop.fade == checker.Fade(0, height / (height + floor), rates[8], floor / (height + floor))
+    assert [128 * cut for cut in loop.cuts] == [0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128]
+    assert [2 * cut for cut in loop.past_cuts] == [0, 1, 2]
+    lagging = changed(LAYERED, (("loop", "lag"), "1/3"))
+    loop = checker.read_loop(lagging["loop"], task)
+    assert loop.outputs[3] == [F(i == 4) * 3 * (shares[8] / rates[8] + F(2 * 6 * 8, 10**20)) for i in range(13)]
+    assert loop.fade is None
+    plain = checker.read_loop(HELD["loop"], task)
+    assert list(plain.cuts) == list(plain.past_cuts) == [F(i, 8) for i in range(9)]
+
+
+@pytest.mark.parametrize("lag", ["0", "1/3"])
+def test_the_statement_says_what_rock_there_is(lag):
+    raw = changed(LAYERED, (("loop", "lag"), lag))
+    said = f"law with 1 states, every 1 s, 0 s late, lag {lag} s, rock of L^2/D = 2 s"
+    assert checker.statement(raw, checker.read_task(raw), dict.fromkeys(CLAIMS, F(1)), F(1, 3))[2] == said
+    claim, lagging = read_guarantee(raw), "" if lag == "0" else ", through a lag of 0.333334 s"
+    assert f"held over 1 s{lagging}, through rock of L^2/D = 2 s from well to fault, for every" in claim.sentence()
+    assert json.loads(guarantee_text(claim)) == raw
+    assert "rock" not in read_guarantee(HELD).sentence()
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ SPECIFICATION = importlib.util.spec_from_file_location("guarantee_fading", PATH)
 checker = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(checker)
 
-FINE = tuple(F(i, 64) for i in range(65))
+FINE = tuple(F(i, 32) for i in range(33))
 
 
 def gains_of_both(flow, jumps, durations, entry, row, *, first=0, height=1, rate=1, floor=0):
@@ -59,13 +59,13 @@ def just_above(found, exact, share=0.05):
     )
 
 
-ENDS = np.arange(1, 65) / 64
+ENDS = np.arange(1, 33) / 32
 
 
 @pytest.mark.parametrize(("rate", "floor"), [(1, 0), (4, 0), (1, "1/3"), (40, 0)])
 def test_an_integrator_that_is_reset_adds_up_the_weight(rate, floor):
-    found = gains_of_both([[0]], [[[0]]], [2], [1], [1], rate=rate, floor=floor)
-    exact = (1 - np.exp(-rate * 2 * ENDS)) / rate + float(F(floor)) * 2 * ENDS
+    found = gains_of_both([[0]], [[[0]]], [1], [1], [1], rate=rate, floor=floor)
+    exact = (1 - np.exp(-rate * ENDS)) / rate + float(F(floor)) * ENDS
     assert just_above(found, exact, 0.13 if rate < 40 else 0.8)
 
 
@@ -74,15 +74,15 @@ def test_the_past_of_a_lag_that_is_halved_at_every_sample():
     found = gains_of_both([[-1]], [[["1/2"]]], [1], [1], [1], rate=3)
     before = (exp(-1) - exp(-3)) / 2 / (1 - exp(-1) / 2)
     own = lambda t: (np.exp(-t) - np.exp(-3 * t)) / 2  # noqa: E731
-    starts = ENDS - 1 / 64
+    starts = ENDS - 1 / 32
     exact = np.maximum(before / 2 * np.exp(-ENDS) + own(ENDS), before / 2 * np.exp(-starts) + own(starts))
     assert just_above(found, exact, 0.1)
 
 
 def test_a_response_that_grows_counts_what_entered_earlier_for_more():
     """y = x1, x1′ = x2, x2′ = w: ∫(t − θ)e^{−2θ}dθ = t/2 − (1 − e^{−2t})/4, reset at every sample."""
-    found = gains_of_both([[0, 1], [0, 0]], [[[0, 0], [0, 0]]], [3], [0, 1], [1, 0], rate=2)
-    t = 3 * ENDS
+    found = gains_of_both([[0, 1], [0, 0]], [[[0, 0], [0, 0]]], ["3/2"], [0, 1], [1, 0], rate=2)
+    t = 1.5 * ENDS
     assert just_above(found, t / 2 - (1 - np.exp(-2 * t)) / 4, 0.12)
 
 
@@ -115,12 +115,13 @@ def test_what_is_left_out_comes_back_through_the_fault_in_both(fades, monkeypatc
     table |= {"left_out": ("1/60", "1/7", "1/3", "1/30")} if fades else {}
     gains = {(y, name): (F(v),) for name, row in table.items() for y, v in zip(outputs, row, strict=True)}
     ours = bounds_from(task, gains, None, F(1))
-    answers = iter([[[F(v)] for v in row] for row in table.values()])
-    monkeypatch.setattr(checker, "gains", lambda *_: next(answers))
+    answers, entered = iter([[[F(v)] for v in row] for row in table.values()]), []
+    monkeypatch.setattr(checker, "gains", lambda _loop, _entry, *how: entered.append(how) or next(answers))
     fade = checker.Fade(0, F(1), F(1), F(0)) if fades else None
     loop = checker.Loop([], [([], F(1))], [[]] * 4, [[]] * len(table), None, F(1), fade=fade)
     (slip, rate, push), _ = checker.bounds(read, loop)
     assert (slip, rate, push) == (ours.slip_error, ours.slip_rate_error, ours.push)
+    assert entered == [(False,), (False,), *[(False, fade)] * fades]
     half, beta = task.half_ranges, float(task.beta[1])
     shares = [[float(half[y]) for y in outputs[:3]] + [0.0 if fades else beta], [0.0] * 4]
     shares += [[0.0, 0.0, 0.0, beta]] if fades else []
