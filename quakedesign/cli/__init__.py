@@ -19,6 +19,7 @@ from quakedesign.cli import (
     plant,
     polynomial,
     proof,
+    start,
     synthesis,
 )
 from quakedesign.cli.shared import app
@@ -39,6 +40,7 @@ __all__ = [
     "plant",
     "polynomial",
     "proof",
+    "start",
     "synthesis",
 ]
 

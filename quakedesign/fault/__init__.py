@@ -8,6 +8,7 @@ from quakedesign.fault.reference import Reference
 from quakedesign.fault.scales import Scales
 from quakedesign.fault.scaling import scaled_fault
 from quakedesign.fault.scenario import load_fault, parse_fault, presets
+from quakedesign.fault.template import fault_toml
 from quakedesign.fault.uncertainty import BOXES, UncertaintyBox, uncertainty_box
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Reference",
     "Scales",
     "UncertaintyBox",
+    "fault_toml",
     "friction_law",
     "friction_laws",
     "load_fault",

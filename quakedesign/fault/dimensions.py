@@ -40,6 +40,7 @@ PLANT_UNITS: Mapping[str, str] = {
     "density": "kg/fault_m^3",
     "shear_modulus": "shear_Pa/(slip_m/fault_m)",
     "length": "fault_m",
+    "width": "fault_m",
     "damping": "shear_N/(slip_m/s)",
     "effective_normal_stress": "normal_Pa",
     "sampling_time": "s",
@@ -119,7 +120,7 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
     own; the constant friction coefficient 1 is then one more parameter, the same for every fault.
     """
     law = fault.friction
-    named = {name: (unit, _number(fault, name)) for name, unit in PLANT_UNITS.items()}
+    named = {name: (unit, number) for name, unit in PLANT_UNITS.items() if (number := _number(fault, name)) is not None}
     named |= {
         f"friction.{name}": (_friction_unit(field.metadata), getattr(law, name))
         for name, field in law.quantities().items()
@@ -130,7 +131,7 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
     return found
 
 
-def _number(fault: Fault, dotted: str) -> float:
+def _number(fault: Fault, dotted: str) -> float | None:
     value: Any = fault
     for part in dotted.split("."):
         value = getattr(value, part)

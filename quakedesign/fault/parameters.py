@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 
 from quakedesign.errors import ParameterError
@@ -11,6 +12,7 @@ from quakedesign.fault.friction import FrictionLaw
 from quakedesign.fault.reference import Reference
 from quakedesign.fault.statics import rest_slip
 from quakedesign.fault.uncertainty import UncertaintyBox, uncertainty_box
+from quakedesign.rationals import rational
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +41,16 @@ class Fault:
         T_s [s].
     disturbance : Disturbance
     box : UncertaintyBox
+    width : float, optional
+        The side of the patch beside its length [m]; None for a square one, the paper's.
+    assumed : tuple of str
+        What a file left to physics or to the paper's example, each in a sentence.
+
+    Notes
+    -----
+    A patch of two sides is a row of squares of its shorter side h that slip as one. Stress that slip changes reaches
+    about h into the rock, so each has the paper's mass ρh³ and stiffness Gh, and the damping is shared among them: the
+    natural frequency √(G/ρ)/h is that of one square, and moment, mass and stiffness are those of all.
 
     Raises
     ------
@@ -58,13 +70,15 @@ class Fault:
     sampling_time: float
     disturbance: Disturbance = field(default_factory=Disturbance)
     box: UncertaintyBox = field(default_factory=lambda: uncertainty_box("paper"))
+    width: float | None = None
+    assumed: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
         problems = Problems()
         with problems.collected():
             require_name(self.name)
         with problems.collected():
-            require_plant(**{name: getattr(self, name) for name in _PLANT})
+            require_plant(**{name: getattr(self, name) for name in _PLANT}, **self._other_side)
         with problems.collected():
             require_ordinary(**{name: getattr(self.friction, name) for name in self.friction.quantities()})
         problems.refuse()
@@ -96,19 +110,34 @@ class Fault:
         return replace(self, disturbance=disturbance)
 
     @property
+    def _other_side(self) -> dict[str, float]:
+        return {} if self.width is None else {"width": self.width}
+
+    @property
+    def side(self) -> float:
+        """h [m], the shorter side of the patch; L of a square one."""
+        return min((self.length, *self._other_side.values()))
+
+    @property
+    def squares(self) -> Fraction:
+        """n, exact: the longer over the shorter side [-]; 1 of a square one."""
+        sides = [rational(self.length), rational(self.length if self.width is None else self.width)]
+        return max(sides) / min(sides)
+
+    @property
     def mass(self) -> float:
-        """m = ρL³ [kg]."""
-        return self.density * self.length**3
+        """m = nρh³ [kg]."""
+        return float(self.squares) * self.density * self.side**3
 
     @property
     def area(self) -> float:
-        """A = L² [m²]."""
-        return self.length**2
+        """A = nh² [m²]."""
+        return float(self.squares) * self.side**2
 
     @property
     def stiffness(self) -> float:
-        """k = G·L [N/m] (the paper prints G/L: ERRATA 3)."""
-        return self.shear_modulus * self.length
+        """k = nGh [N/m] (the paper prints G/L: ERRATA 3)."""
+        return float(self.squares) * self.shear_modulus * self.side
 
     @property
     def authority(self) -> float:
@@ -152,8 +181,8 @@ class Fault:
 
     @property
     def seismic_moment(self) -> float:
-        """M0 = L³Δτ [N·m], eq. magnitude; nan for friction with a state: see `moment_of`."""
-        return self.length**3 * self.stress_drop
+        """M0 = nh³Δτ [N·m], eq. magnitude; nan for friction with a state: see `moment_of`."""
+        return float(self.squares) * self.side**3 * self.stress_drop
 
     @property
     def magnitude(self) -> float:

@@ -242,7 +242,7 @@ def scaled_fault(source: Fault, scales: Scales, name: str | None = None) -> Faul
             f"Received the factor {scales.of('slip_m/normal_m')} for slip_m/normal_m."
         )
     held = {dotted: float(value) for dotted, value in exact.items()}
-    changes: dict[str, Any] = {key: held[key] for key in PLANT_UNITS if "." not in key}
+    changes: dict[str, Any] = {key: held[key] for key in PLANT_UNITS if "." not in key and key in held}
     for part in ("friction", "reference", "disturbance"):
         changes[part] = replace(getattr(source, part), **_inside(held, f"{part}."))
     return replace(source, name=name or f"{source.name}-scaled", source=f"similar to: {source.source}", **changes)

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import ScenarioError, UnknownNameError
-from quakedesign.fault.checks import Problems, require_name
+from quakedesign.fault.checks import Problems, require_name, require_positive
+from quakedesign.fault.defaults import completed
 from quakedesign.fault.disturbance import Disturbance
 from quakedesign.fault.friction import friction_law
 from quakedesign.fault.parameters import Fault, require_plant
-from quakedesign.fault.reference import Reference
 from quakedesign.fault.tables import Table
 from quakedesign.fault.uncertainty import UncertaintyBox, uncertainty_box
 from quakedesign.input import read_text
@@ -19,22 +19,26 @@ from quakedesign.rationals import rational
 from quakedesign.text import nearest_name
 
 _LARGEST_FILE = 1 << 16  # reading a key of many dots takes the square of its length
-_PLANT = {
+PLANT = {
     "density": "kg/m^3",
     "shear_modulus": "Pa",
     "length": "m",
+    "width": "m",
     "damping": "kg/s",
     "effective_normal_stress": "Pa",
 }
-_TASK = {"target_slip": "m", "operation_time": "s", "sampling_time": "s"}
-_DISTURBANCE = {
+TASK = {"target_slip": "m", "operation_time": "s", "sampling_time": "s"}
+DISTURBANCE = {
     "constant": "m/s^2",
     "amplitude": "m/s^2",
     "frequency": "rad/s",
     "slip_growth": "1/s^2",
     "rate_growth": "1/s",
 }
-_WIDTHS = ("stiffness", "damping", "authority")
+WIDTHS = ("stiffness", "damping", "authority")
+OPTIONAL = ("damping", "width")  # of the plant
+_NO_SOURCE = "no source given"
+_UNDISTURBED = "no disturbance; what is guaranteed holds without one"
 
 
 def presets() -> list[str]:
@@ -98,20 +102,24 @@ def parse_fault(text: str, name: str) -> Fault:
 
 def _fault(table: Table, problems: Problems) -> Any:
     """Fault of a whole file; there are problems where it is None."""
-    parts: dict[str, Any] = {key: table.text(key) for key in ("name", "source")}
-    parts |= table.quantities(_PLANT)
+    parts: dict[str, Any] = {"name": table.text("name"), "source": _NO_SOURCE}
+    if "source" in table.entries:
+        parts["source"] = table.text("source")
+    for key, unit in PLANT.items():
+        parts |= table.quantities({key: unit}, optional=key in OPTIONAL)
     parts["friction"] = _friction(table.table("friction"), problems)
-    parts |= _task(table.table("task"), problems)
+    task = _task(table.table("task", optional=True), problems)
     parts["disturbance"] = _disturbance(table.table("disturbance", optional=True), problems)
     parts["box"] = _box(table, problems)
     table.close()
     given = {key: value for key, value in parts.items() if value is not None}
+    whole = task if given == parts else None
     with problems.collected():
-        if given == parts:
-            return Fault(**parts)
-        require_plant(**{key: given[key] for key in (*_PLANT, "sampling_time") if key in given})
+        if whole is not None:
+            return completed(parts, whole, () if "disturbance" in table.entries else (_UNDISTURBED,))
+        require_plant(**{key: given[key] for key in PLANT if key in given})
     with problems.collected():
-        if given != parts and "name" in given:
+        if whole is None and "name" in given:
             require_name(given["name"])
     return None
 
@@ -124,12 +132,14 @@ def _friction(table: Table | None, problems: Problems) -> Any:
         return None
     with problems.collected():
         law = friction_law(name)
-        units = {key: field.metadata["unit"] for key, field in law.quantities().items()}
+        quantities = law.quantities()
         optional = {f.name for f in fields(law) if f.default is not MISSING}  # type: ignore[arg-type]
         read: dict[str, Any] = {}
         for field in fields(law):  # type: ignore[arg-type]
-            if field.name in units:
-                read |= table.quantities({field.name: units[field.name]}, optional=field.name in optional)
+            if field.name in quantities:
+                key = table.spelling(field.name, field.metadata["symbol"])
+                value = table.quantities({key: field.metadata["unit"]}, optional=field.name in optional)
+                read |= dict.fromkeys([field.name] if value else [], value.get(key))
             elif field.name not in optional or field.name in table.entries:
                 read[field.name] = table.text(field.name)
         table.close()
@@ -137,21 +147,20 @@ def _friction(table: Table | None, problems: Problems) -> Any:
     return None
 
 
-def _task(table: Table | None, problems: Problems) -> dict[str, Any]:
-    """Reference and sampling time."""
+def _task(table: Table | None, problems: Problems) -> dict[str, float] | None:
+    """What a file says of the task; None where that is wrong."""
     if table is None:
-        return {"reference": None, "sampling_time": None}
-    read: dict[str, Any] = {**table.quantities(_TASK)}
+        return {}
+    read = table.quantities(TASK, optional=True)
     table.close()
-    sampling_time, reference = read.pop("sampling_time"), None
     with problems.collected():
-        if None not in read.values():
-            reference = Reference(**read)
-    return {"reference": reference, "sampling_time": sampling_time}
+        require_positive("", **{key: value for key, value in read.items() if value is not None})
+        return {key: value for key, value in read.items() if value is not None} if None not in read.values() else None
+    return None
 
 
 def _disturbance(table: Table | None, problems: Problems) -> Disturbance | None:
-    read: dict[str, Any] = {**table.quantities(_DISTURBANCE, optional=True)} if table else {}
+    read: dict[str, Any] = {**table.quantities(DISTURBANCE, optional=True)} if table else {}
     if table:
         table.close()
     with problems.collected():
@@ -166,7 +175,7 @@ def _box(parent: Table, problems: Problems) -> UncertaintyBox | None:
         with problems.collected():
             return None if given is None else uncertainty_box(given)
         return None
-    read = given.quantities(dict.fromkeys(_WIDTHS, ""), optional=True)
+    read = given.quantities(dict.fromkeys(WIDTHS, ""), optional=True)
     given.close()
     with problems.collected():
         widths = {key: rational(value, f"uncertainty.{key}") for key, value in read.items() if value is not None}

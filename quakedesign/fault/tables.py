@@ -1,5 +1,6 @@
 """Tables of a file with quantities, read entry by entry; whatever is wrong with them is collected."""
 
+import re
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -38,6 +39,18 @@ class Table:
             elif not optional:
                 found[key] = None
         return found
+
+    def spelling(self, name: str, symbol: str) -> str:
+        """How the file spells an entry: by its name, or by its symbol, as ``Dc`` or ``d_c`` for :math:`d_c`."""
+        spelt = [
+            key for key in self.entries if key == name or (key not in self._known and _letters(key) == _letters(symbol))
+        ]
+        with self.problems.collected():
+            if len(spelt) > 1:
+                raise ScenarioError(
+                    f"{self._name(name)} must be given once. Received {' and '.join(spelt)}. Leave one out."
+                )
+        return spelt[0] if len(spelt) == 1 else name
 
     def text(self, key: str) -> str | None:
         """Text of an entry; None for one that is wrong or not given."""
@@ -91,3 +104,8 @@ class Table:
 
     def _name(self, key: str) -> str:
         return f"{self.where}.{key}".strip(".")
+
+
+def _letters(symbol: str) -> str:
+    """Letters and digits of a symbol, in small letters."""
+    return re.sub(r"[^a-z0-9]", "", symbol.lower())

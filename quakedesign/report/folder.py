@@ -11,6 +11,7 @@ from quakedesign.certificates import certificate_text
 from quakedesign.certificates.guarantee import Guarantee
 from quakedesign.certificates.guarantee.files import guarantee_text, save_guarantee
 from quakedesign.errors import OutputError
+from quakedesign.fault import fault_toml
 from quakedesign.output import require_room, whole_folder
 from quakedesign.report.comparison import Comparison
 from quakedesign.report.numbers import csv_text, printed, table
@@ -152,4 +153,5 @@ def _fill(
         drawing.savefig(folder / "figures" / f"{name}.png", metadata={"Software": None})
     page = page_html(comparison, fault_sentences(comparison.fault), drawn)
     (folder / "report.html").write_text(page, encoding="utf-8")
+    (folder / "fault.toml").write_text(fault_toml(comparison.fault), encoding="utf-8")
     (folder / "results.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -149,7 +149,7 @@ def _annotate(axis: Any, fault: Fault, pressure: float, rate: float, critical: f
         size, unit = _size(critical)
         said = (
             f"critical stiffness per area {critical / size:.4g} {unit}/m\n"
-            f"nucleation length {_metres(length)}\nfault length {_metres(fault.length)}"
+            f"nucleation length {_metres(length)}\nfault length {_metres(fault.side)}"
         )
         wide = _size(fault.effective_normal_stress)[0]
         axis.plot(fault.effective_normal_stress / wide, critical / _size(top)[0], "kx", label="critical here")

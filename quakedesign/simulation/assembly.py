@@ -6,6 +6,7 @@ from typing import Any
 
 from quakedesign.controllers import Controller
 from quakedesign.errors import SimulationError
+from quakedesign.fault import fault_toml
 from quakedesign.simulation.metrics import events, metrics
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
@@ -72,7 +73,7 @@ def trajectory(
         energy=None if watched["diverged"] >= 0 else recorder.energy(end),
         events=events(watched),
         criterion=criterion,
-        provenance=provenance | took,
+        provenance=provenance | took | {"scenario": fault_toml(loop.fault)},
         integral_units=loop.controller.integral_units if loop.controller else (),
         name=f"{loop.fault.name}, {_law_title(loop.controller)}{loop.plant_title}",
     )

@@ -57,7 +57,7 @@ class Trajectory(Recording):
     criterion : OutcomeCriterion
         What `outcome` is decided by.
     provenance : mapping
-        Method, step, scheme, backend and versions.
+        Method, step, scheme, backend and versions; the fault as a TOML file (``scenario``).
     """
 
     name: str

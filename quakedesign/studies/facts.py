@@ -6,7 +6,7 @@ from typing import Any
 
 from quakedesign.bounds import LowerBound
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.fault import Fault
+from quakedesign.fault import Fault, fault_toml
 from quakedesign.rationals import rational
 from quakedesign.studies import limits
 from quakedesign.studies.needed_pressure import need_sentence, needed_pressure, ways
@@ -18,12 +18,13 @@ def fault_dict(fault: Fault) -> dict[str, Any]:
     """Keys of the command ``fault`` in DESIGN.md; SI, eigenvalues as [real, imaginary] in 1/s.
 
     ``equilibrium_pressure`` is the range [Pa] that the task needs, and ``needs`` says whether that is withdrawal,
-    injection or both.
+    injection or both. ``assumed`` says what the file left open, ``scenario`` is all of it as a TOML file.
     """
     model, needed = derive(fault), needed_pressure(fault)
     return {
         "name": fault.name,
         "source": fault.source,
+        "assumed": list(fault.assumed),
         "natural_frequency": fault.natural_frequency,
         "damping_ratio": fault.damping_ratio,
         "seismic_moment": _known(fault.seismic_moment),
@@ -42,6 +43,7 @@ def fault_dict(fault: Fault) -> dict[str, Any]:
         "sampling": sampling_adequacy(fault).to_dict(),
         "equilibrium_pressure": [float(needed.low), float(needed.high)] if needed else None,
         "needs": list(ways(needed)) if needed else None,
+        "scenario": fault_toml(fault),
     }
 
 
@@ -54,6 +56,7 @@ def fault_sentences(fault: Fault) -> list[str]:
         f"mass {fault.mass:.4g} kg, stiffness {fault.stiffness:.4g} N/m, natural frequency "
         f"{fault.natural_frequency:.4g} rad/s, damping ratio {fault.damping_ratio:.4g}",
         *_event(fault),
+        *(f"assumed: {said}" for said in fault.assumed),
         f"{state}; eigenvalues {poles} 1/s",
         sampling_sentence(sampling_adequacy(fault)),
         *beyond_control(fault),

@@ -130,13 +130,14 @@ def with_disturbance(expression: sp.Expr, fault: Fault) -> sp.Expr:
 
 @cache
 def plant_values(fault: Fault) -> dict[sp.Symbol, sp.Rational]:
-    """Exact nominal value of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] and σ'_n [Pa], from m = ρL³, A = L², k = GL."""
-    rho, G, L, damping, stress = (
+    """Exact nominal value of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] and σ'_n [Pa]; m = nρh³, A = nh², k = nGh (see `Fault`)."""
+    rho, G, h, damping, stress = (
         sp.Rational(str(rational(v)))
-        for v in (fault.density, fault.shear_modulus, fault.length, fault.damping, fault.effective_normal_stress)
+        for v in (fault.density, fault.shear_modulus, fault.side, fault.damping, fault.effective_normal_stress)
     )
-    mass = rho * L**3
-    return {k_hat: G * L / mass, eta_hat: damping / mass, N_hat: L**2 / mass, sigma: stress}
+    mass = rho * h**3
+    shared = damping / sp.Rational(str(fault.squares))
+    return {k_hat: G * h / mass, eta_hat: shared / mass, N_hat: h**2 / mass, sigma: stress}
 
 
 phi, phi_t, phi_1, phi_2 = sp.symbols(r"\varphi \varphi_t \varphi_1 \varphi_2", real=True)

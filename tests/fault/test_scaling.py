@@ -80,6 +80,7 @@ def printed(value, text):
         ("disturbance.frequency", "rad/s"),
         ("disturbance.slip_growth", "1/s^2"),
         ("disturbance.rate_growth", "1/s"),
+        ("width", "m"),
     ],
 )
 def test_directed_units_are_the_units_of_scenario_files_when_all_metres_are_one(name, unit):
@@ -87,10 +88,10 @@ def test_directed_units_are_the_units_of_scenario_files_when_all_metres_are_one(
 
 
 def test_every_number_of_a_fault_has_a_unit():
-    held = {f.name for f in fields(Fault) if f.type in ("float", float)}
+    held = {f.name for f in fields(Fault) if f.type in ("float", float)}  # the width is a side of its own
     for part in ("reference", "disturbance"):
         held |= {f"{part}.{f.name}" for f in fields(getattr(LAB, part))}
-    assert held == set(PLANT_UNITS)
+    assert held | {"width"} == set(PLANT_UNITS)
     assert set(quantities(LAB)) == held | {"friction.residual", "friction.drop", "friction.critical_slip"}
 
 

@@ -56,7 +56,7 @@ class Task:
     ----------
     name : str
     density, shear_modulus, length, damping, normal_stress : Fraction
-        ρ, G, L, η, σ′.
+        ρ, G, L, η, σ′; of one square of a patch of several.
     spreads : (Fraction, Fraction, Fraction)
         Relative half-widths of k̂, η̂ and N̂ [-].
     friction : Friction
@@ -269,8 +269,8 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
         name=fault.name,
         density=rational(fault.density),
         shear_modulus=rational(fault.shear_modulus),
-        length=rational(fault.length),
-        damping=rational(fault.damping),
+        length=rational(fault.side),
+        damping=rational(fault.damping) / fault.squares,
         normal_stress=rational(fault.effective_normal_stress),
         spreads=(box.stiffness, box.damping, box.authority),
         friction=Friction(

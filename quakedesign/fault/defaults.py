@@ -1,0 +1,113 @@
+"""What a file may leave out: damping from physics, a task like that of the paper's faults."""
+
+import math
+from collections.abc import Mapping
+from decimal import ROUND_FLOOR, Context, Decimal
+from typing import Any
+
+from quakedesign.errors import ScenarioError
+from quakedesign.fault.parameters import Fault
+from quakedesign.fault.reference import Reference
+
+PERIODS = 4.6e5
+"""ω_n times the operation time [-] of both faults of Table I."""
+SAMPLES = 10.0
+"""Samples while the fastest of an error and of a free oscillation grows or turns by one."""
+_SHARE = 1000  # of the operation time, which a sampling time must not exceed
+
+
+def radiation_damping(density: float, shear_modulus: float, area: float) -> float:
+    """GA/(2c_s) [kg/s]: what plane shear waves carry away from both sides of a sliding patch.
+
+    Parameters
+    ----------
+    density : float
+        ρ [kg/m³].
+    shear_modulus : float
+        G [Pa].
+    area : float
+        A [m²].
+
+    Notes
+    -----
+    Rice (1993), J. Geophys. Res. 98(B6), 9885; c_s = √(G/ρ) is the speed of shear waves.
+    """
+    return area * math.sqrt(density * shear_modulus) / 2
+
+
+def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[str, ...] = ()) -> Fault:
+    """Fault of what a file has, the rest filled in and told in `Fault.assumed`.
+
+    Parameters
+    ----------
+    parts : mapping
+        Arguments of `Fault`, those of the task and perhaps the damping excepted.
+    task : mapping
+        target_slip [m], operation_time [s], sampling_time [s], as far as given.
+    said : tuple of str
+        What was assumed before.
+
+    Raises
+    ------
+    ScenarioError
+        For a task that has to be given.
+    ParameterError
+        For an unphysical value.
+    """
+    assumed = list(said)
+    longest = task.get("operation_time", math.inf)
+    trial = {
+        "damping": 0.0,
+        **parts,
+        "reference": Reference(target_slip=1.0, operation_time=1.0),
+        "sampling_time": 1e-3,
+    }
+    fault = Fault(**trial)
+    if "damping" not in parts:
+        damping = _cut(radiation_damping(fault.density, fault.shear_modulus, fault.area))
+        assumed.append(f"damping {damping:g} kg/s, the radiation of shear waves, G A/(2 c_s)")
+        fault = Fault(**trial | {"damping": damping})
+    target = task.get("target_slip") or _target(fault, assumed)
+    if "operation_time" not in task:
+        longest = _cut(PERIODS / fault.natural_frequency)
+        assumed.append(f"operation time {longest:g} s, as many natural periods as those of the paper's faults")
+    step = task.get("sampling_time") or _step(fault, longest, assumed)
+    reference = Reference(target_slip=target, operation_time=longest)
+    return Fault(
+        **dict(parts) | {"damping": fault.damping, "reference": reference, "sampling_time": step},
+        assumed=tuple(assumed),
+    )
+
+
+def _target(fault: Fault, assumed: list[str]) -> float:
+    slip = fault.rest_slip
+    if not slip > 0:
+        why = "friction with a state has none" if math.isnan(slip) else "a stable fault has none"
+        raise ScenarioError(
+            f"task.target_slip must be given, because it is the slip of the next earthquake unless told, and {why}. "
+            "Received nothing. Add [task] with target_slip."
+        )
+    target = _cut(slip)
+    assumed.append(f"target slip {target:g} m, at which an earthquake would come to rest")
+    return target
+
+
+def _step(fault: Fault, operation_time: float, assumed: list[str]) -> float:
+    pace = max(fault.natural_frequency, _growth(fault))
+    step = _cut(min(1 / (SAMPLES * pace), operation_time / _SHARE), digits=2)
+    assumed.append(f"sampling time {step:g} s, {SAMPLES:g} samples while an error grows e-fold or the block turns")
+    return step
+
+
+def _growth(fault: Fault) -> float:
+    """Largest real part [1/s] of a pole without pressure, friction as steep as it can be."""
+    push, law = fault.authority * fault.effective_normal_stress, fault.friction
+    damping = fault.specific_damping - push * law.rate_slope
+    stiffness = fault.specific_stiffness - push * law.slip_slope
+    root = damping**2 - 4 * stiffness
+    return (math.sqrt(root) - damping) / 2 if root > 0 else -damping / 2
+
+
+def _cut(value: float, digits: int = 3) -> float:
+    """Rounded down to so many digits."""
+    return float(Context(prec=digits, rounding=ROUND_FLOOR).create_decimal(Decimal(value)))

@@ -1,0 +1,87 @@
+"""The file to start from can be read as it is, and the schema of editors accepts what the program accepts."""
+
+import tomllib
+from importlib.resources import files
+
+import jsonschema
+import pytest
+
+from quakedesign.fault import Fault, fault_toml, friction_laws, load_fault, parse_fault, presets
+from quakedesign.fault.template import fault_schema, template
+
+VALIDATOR = jsonschema.Draft202012Validator(fault_schema())
+
+
+def uncommented(text):
+    """The file with every key that it offers."""
+    lines = []
+    for line in text.splitlines():
+        bare = line.removeprefix("# ")
+        offered = bare.startswith("[") or (" = " in bare.split("  #")[0] and not bare.startswith("uncertainty ="))
+        lines.append(bare if offered else line)
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("law", sorted(friction_laws()))
+def test_every_law_has_a_file_to_start_from(law):
+    text = template(law, schema=True)
+    fault = parse_fault(text, "my-fault.toml")
+    assert isinstance(fault, Fault)
+    assert fault.friction.name == law
+    whole = parse_fault(uncommented(text), "my-fault.toml")
+    assert not any("no disturbance" in said or "damping" in said for said in whole.assumed)
+    assert float(whole.box.stiffness) == 0.1
+    assert whole.width == 1500
+    assert all(VALIDATOR.is_valid(tomllib.loads(each)) for each in (text, uncommented(text)))
+
+
+@pytest.mark.parametrize("name", presets())
+def test_a_fault_is_written_and_read_again(name):
+    fault = load_fault(name)
+    assert parse_fault(fault_toml(fault), name) == fault
+    assert parse_fault(fault_toml(load_fault(name, box="ten-percent")), name).box.name == "ten-percent"
+
+
+def test_texts_and_boxes_of_ones_own_are_written_as_toml_has_them():
+    text = (
+        fault_toml(load_fault("real-fault")).replace('uncertainty = "paper"\n', "")
+        + "\n[uncertainty]\nstiffness = 0.3\n"
+    )
+    awkward = 'a "b" \\ \u007f \u00e9 \n'
+    fault = parse_fault(text, "own.toml")
+    fault = type(fault)(**{**vars(fault), "source": awkward})
+    read = parse_fault(fault_toml(fault), "own.toml")
+    assert read == fault
+    assert read.source == awkward
+
+
+@pytest.mark.parametrize("name", presets())
+def test_the_schema_accepts_presets(name):
+    text = (files("quakedesign.fault") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    assert list(VALIDATOR.iter_errors(tomllib.loads(text))) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('length = "5 km"', 'lenght = "5 km"'),
+        ('length = "5 km"', "length = 5"),
+        ('length = "5 km"', ""),
+        ("drop = 0.1", ""),
+        ("drop = 0.1", "drop = 0.1\nfall = 2"),
+        ("exponential-slip-weakening", "magic"),
+        ('uncertainty = "paper"', 'uncertainty = "wide"'),
+        ("[task]", "[tusk]"),
+    ],
+)
+def test_the_schema_refuses_what_the_program_refuses(old, new):
+    text = (files("quakedesign.fault") / "presets" / "real-fault.toml").read_text(encoding="utf-8")
+    assert old in text
+    assert not VALIDATOR.is_valid(tomllib.loads(text.replace(old, new)))
+
+
+def test_the_schema_knows_symbols():
+    text = template("rate-and-state-aging").replace("direct_effect", "a").replace("critical_slip", "Dc")
+    assert "\na = 0.01" in text
+    assert VALIDATOR.is_valid(tomllib.loads(text))
+    assert parse_fault(text, "x").friction.direct_effect == 0.01
