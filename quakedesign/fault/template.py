@@ -144,7 +144,11 @@ def _asked(units: Mapping[str, str], said: Mapping[str, str], optional: Any) -> 
     for key in units:
         left = f"; {_LEFT_OUT[key]}" if key in _LEFT_OUT and key in optional else ""
         mark = "# " if key in optional else ""
-        yield f"{mark}{key} = {_written(_EXAMPLES[key])}  # {said[key].split('; ')[0].rstrip('.')}{left}"
+        yield f"{mark}{key} = {_written(_example(key, units[key]))}  # {said[key].split('; ')[0].rstrip('.')}{left}"
+
+
+def _example(key: str, unit: str) -> str | float:
+    return _EXAMPLES.get(key, f"1 {unit}" if unit else 0.1)
 
 
 def _task_described() -> dict[str, str]:
@@ -213,7 +217,7 @@ def _quantities(units: Mapping[str, str], said: Mapping[str, str]) -> dict[str, 
         key: {
             "type": "string" if unit else ["number", "string"],
             "description": said[key],
-            "examples": [_EXAMPLES[key]],
+            "examples": [_example(key, unit)],
         }
         for key, unit in units.items()
     }
