@@ -15,7 +15,7 @@ from quakedesign.fault.scenario import DISTURBANCE, OPTIONAL, PLANT, TASK, WIDTH
 from quakedesign.fault.uncertainty import BOXES, UncertaintyBox
 
 SCHEMA_NAME = "fault.schema.json"
-_EXAMPLES = {
+_EXAMPLES: dict[str, str | float] = {
     "density": "2600 kg/m^3",
     "shear_modulus": "25 GPa",
     "length": "1.5 km",

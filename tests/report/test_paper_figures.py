@@ -278,7 +278,14 @@ def test_the_folder_holds_figures_and_numbers_and_appears_whole(study, tmp_path,
     found = write_folder(study.comparison, out, force=False, study=study)
     assert found == study_results(study)
     assert {p.name for p in (out / "figures").iterdir()} == {f"{name}.png" for name in study.figures()}
-    assert {p.name for p in out.iterdir()} == {"certificates", "figures", "numbers.csv", "report.html", "results.json"}
+    assert {p.name for p in out.iterdir()} == {
+        "certificates",
+        "fault.toml",
+        "figures",
+        "numbers.csv",
+        "report.html",
+        "results.json",
+    }
     assert found["figures"]["earthquakes"] == {"file": "figures/earthquakes.png", "paper": "fig:sim"}
     with pytest.raises(OutputError, match="--force"):
         write_folder(study.comparison, out, force=False, study=study)
