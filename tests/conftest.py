@@ -17,6 +17,7 @@ settings.register_profile("reproducible", derandomize=True, print_blob=True, dea
 settings.load_profile("reproducible")
 
 ROOT = Path(__file__).parent.parent
+sys.path.append(str(ROOT / "tests" / "data"))  # parts of a user's own, `own_parts`
 LAUNCH = """
 import os, signal, sys
 for name in ("SIGINT", "SIGTERM", "SIGHUP"):

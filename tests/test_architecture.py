@@ -265,6 +265,17 @@ def test_the_public_names_are_all_there():
         quakedesign.nothing  # noqa: B018
 
 
+FAMILIES = {"SlidingMode", "ExtendedLQR", "SampledController", "ContinuousTwisting", "DiscontinuousIntegral"}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=module_name)
+def test_no_law_is_asked_which_family_it_is_of(path):
+    """What a law has is asked of itself, what is done with its family of `quakedesign.synthesis.methods`."""
+    calls = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
+    asked = [c for c in calls if getattr(c.func, "id", "") in ("isinstance", "issubclass")]
+    assert not [ast.unparse(c) for c in asked if FAMILIES & {n.id for n in ast.walk(c) if isinstance(n, ast.Name)}]
+
+
 def declared_friction(tree):
     """Bounds and slopes that are read from the friction law of a fault itself."""
     pairs = []

@@ -27,7 +27,7 @@ from quakedesign.loop import summed_integrals
 from quakedesign.report import headline
 from quakedesign.simulation import Diffusion
 from quakedesign.simulation.campaign import run_campaign
-from quakedesign.synthesis.guaranteed import answer
+from quakedesign.synthesis import answer
 
 LAB = qd.load_fault("lab-fault")
 CERTIFICATE = qd.load_certificate(Path(__file__).parents[1] / "proofs" / "certificates" / "super-twisting_1.5_1.1.json")
@@ -97,7 +97,7 @@ WRONG = {
         lambda: answer(LAB, wind=Fraction(1)),
         "answer cannot be called like this: there is no argument 'wind'",
     ),
-    "no law to guarantee": (lambda: answer(LAB, controller=3), "controller of answer must be a text. Received 3"),
+    "no law to guarantee": (lambda: answer(LAB, controller=3), "a class derived from a Controller. Received 3"),
     "a number as a box": (lambda: LAB.with_box(3), "name of Fault.with_box must be a text. Received 3"),
     "a text as slip": (lambda: LAB.moment_of("x"), "slip of Fault.moment_of must be a number. Received 'x'"),
     "no premise": (lambda: DESIGN.with_premise(3), "premise of Design.with_premise must be a Premise. Received 3"),

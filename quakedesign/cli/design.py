@@ -141,11 +141,15 @@ def controllers(name: str) -> list[str]:
     ------
     UnknownNameError
     """
-    from quakedesign.synthesis import DESIGNABLE
+    from quakedesign.controllers import control_law
+    from quakedesign.synthesis import designable
 
-    if name not in (*DESIGNABLE, "all"):
-        raise UnknownNameError(f"controller must be one of {', '.join(DESIGNABLE)}, all. Received {name!r}.")
-    return list(DESIGNABLE) if name == "all" else [name]
+    names = designable()
+    if name not in (*names, "all") and ":" not in name:
+        raise UnknownNameError(f"controller must be one of {', '.join(names)}, all. Received {name!r}.")
+    if name != "all":
+        control_law(name)
+    return list(names) if name == "all" else [name]
 
 
 def positive(comparison: Any) -> bool:

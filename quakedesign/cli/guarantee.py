@@ -90,7 +90,7 @@ def guarantee(
     from quakedesign.certificates.guarantee import Guarantee
     from quakedesign.certificates.guarantee.files import save_guarantee
     from quakedesign.fault import load_fault
-    from quakedesign.synthesis.guaranteed import answer
+    from quakedesign.synthesis import answer
 
     new_file(out, "certificate file", force=force)
     began = perf_counter()

@@ -19,7 +19,7 @@ from quakedesign.cli.shared import (
 )
 
 if TYPE_CHECKING:
-    from quakedesign.simulation import Actuator, Measurement, Sensor
+    from quakedesign.simulation import Actuator, Sensor
 
 _ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
 _SENSORS = Group("Sensors (schemes that sample)")
@@ -122,7 +122,7 @@ class SensorOptions(EstimateOptions):
     rate_noise: MetresPerSecond = 0.0
     bandwidth: Hertz | None = None
 
-    def build(self, step: float, seed: int = 0) -> "Measurement | Sensor":
+    def build(self, step: float, seed: int = 0) -> "Sensor":
         """Measurement or sensor for a sampling period [s] and a seed of the noise; raises `ParameterError`."""
         from quakedesign.simulation import Measurement
         from quakedesign.studies.estimation import sensor

@@ -1,16 +1,15 @@
 """Laws, one a file, found by looking into this folder; and the gains that the paper prints."""
 
 import tomllib
-from dataclasses import dataclass
-from fractions import Fraction
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 
 from quakedesign.arguments import check_arguments
-from quakedesign.controllers.base import Controller, Law, LoopField, Sampling, Signals
+from quakedesign.controllers.base import BaseGains, Controller, Law, LoopField, Sampling, Signals
 from quakedesign.controllers.sliding_mode import SlidingMode
-from quakedesign.discovery import discovered
-from quakedesign.errors import UnknownNameError
+from quakedesign.discovery import discovered, named
+from quakedesign.rationals import rational
 
 __all__ = [
     "BaseGains",
@@ -35,26 +34,6 @@ Subject = str | type[Law] | LoopField
 BARE = "custom"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BaseGains:
-    """Gains of a law with λ = 1, the bound on |h'| that they are meant for, and where they come from.
-
-    Attributes
-    ----------
-    law : Controller
-    lipschitz : Fraction
-        [m/s³]
-    source : str
-    literature : bool
-        False for gains that were found with this package.
-    """
-
-    law: Controller
-    lipschitz: Fraction
-    source: str
-    literature: bool
-
-
 @cache
 def laws() -> dict[str, type[Law]]:
     """Every law of the package by name, those included that act on other plants than a fault and are only proved."""
@@ -62,15 +41,13 @@ def laws() -> dict[str, type[Law]]:
 
 
 def law(name: str) -> type[Law]:
-    """Law of a given name.
+    """Law of a given name, or of the user's own as ``module:Class``.
 
     Raises
     ------
     UnknownNameError
     """
-    if name not in laws():
-        raise UnknownNameError(f"controller must be one of {', '.join(laws())}. Received {name!r}.")
-    return laws()[name]
+    return named(name, laws(), Law, "controller")
 
 
 @cache
@@ -79,17 +56,14 @@ def control_laws() -> dict[str, type[Controller]]:
     return {name: item for name, item in laws().items() if issubclass(item, Controller)}
 
 
-def control_law(name: str) -> type[Controller]:
-    """Control law of a given name.
+def control_law(name: str | type[Controller]) -> type[Controller]:
+    """Control law of a given name, or of the user's own, as a class or as ``module:Class``.
 
     Raises
     ------
     UnknownNameError
     """
-    known = control_laws()
-    if name not in known:
-        raise UnknownNameError(f"controller must be one of {', '.join(known)}. Received {name!r}.")
-    return known[name]
+    return named(name, control_laws(), Controller, "controller") if isinstance(name, str) else name
 
 
 def model_of(subject: Subject) -> tuple[str, LoopField]:
@@ -124,14 +98,12 @@ def published(fault_name: str) -> dict[str, Controller]:
     found: dict[str, Controller] = {}
     for name, entry in sets.get(fault_name, {}).items():
         more = {k: v for k, v in entry.items() if k != "gains"}
-        chosen = control_law(name)
-        if issubclass(chosen, SlidingMode):
-            more["divisor"] = data["divisor"]
-        found[name] = chosen.from_values(tuple(entry["gains"]), **more)
+        printed = control_law(name).for_authority(tuple(entry["gains"]), rational(data["divisor"]))
+        found[name] = replace(printed, gains=dict(printed.gains), **more)
     return found
 
 
-def family(name: str) -> tuple[BaseGains, ...]:
+def family(name: str) -> tuple[BaseGains[Law], ...]:
     """Base gains of a law that are known to be good, in the order in which a design tries them.
 
     Raises
@@ -139,21 +111,7 @@ def family(name: str) -> tuple[BaseGains, ...]:
     UnknownNameError
         When there are none for the law.
     """
-    data = tomllib.loads((files(__name__) / "families.toml").read_text(encoding="utf-8")).values()
-    if name not in (known := {group["law"] for group in data}):
-        raise UnknownNameError(f"base gains exist for {', '.join(sorted(known))}. Received {name!r}.")
-    chosen = control_law(name)
-    return tuple(
-        BaseGains(
-            law=chosen.from_values(tuple(gains)),
-            lipschitz=Fraction(group["lipschitz"]),
-            source=group["source"],
-            literature=group["literature"],
-        )
-        for group in data
-        if group["law"] == name
-        for gains in group["gains"]
-    )
+    return law(name).base_gains()
 
 
 check_arguments(__name__)

@@ -1,16 +1,19 @@
 """What every law offers to the proof, and what one that acts on a fault offers besides."""
 
 import dataclasses
+import tomllib
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import partial
+from importlib.resources import files
 from types import MappingProxyType
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, runtime_checkable
 
 import sympy as sp
 
+from quakedesign.controllers.feed_forward import NONE, FeedForward
 from quakedesign.controllers.soundness import (
     require_names,
     require_roots,
@@ -18,7 +21,8 @@ from quakedesign.controllers.soundness import (
     sound_field,
     sound_states,
 )
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.text import shown
 
@@ -126,6 +130,29 @@ def lowest_degree(weights: Iterable[int], domain: str) -> int:
     return first + second if domain == "cells" else 2
 
 
+L = TypeVar("L", bound="Law", covariant=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseGains(Generic[L]):
+    """Gains of a law with λ = 1, the bound on |h'| that they are meant for, and where they come from.
+
+    Attributes
+    ----------
+    law : Law
+    lipschitz : Fraction
+        [m/s³]
+    source : str
+    literature : bool
+        False for gains that were found with this package.
+    """
+
+    law: L
+    lipschitz: Fraction
+    source: str
+    literature: bool
+
+
 @dataclass(frozen=True, kw_only=True)
 class Law(ABC):
     """A law with exact gains whose closed loop can be proved.
@@ -188,6 +215,35 @@ class Law(ABC):
         return cls(gains=named, **more)
 
     @classmethod
+    def base_gains(cls) -> tuple[BaseGains[Self], ...]:
+        """Return gains that are known to be good, in the order in which a design tries them.
+
+        Raises
+        ------
+        UnknownNameError
+            When there are none for the law.
+        """
+        data = tomllib.loads((files("quakedesign.controllers") / "families.toml").read_text(encoding="utf-8"))
+        if cls.name not in (known := {group["law"] for group in data.values()}):
+            raise UnknownNameError(f"base gains exist for {', '.join(sorted(known))}. Received {cls.name!r}.")
+        return tuple(
+            BaseGains(
+                law=cls.from_values(tuple(gains)),
+                lipschitz=Fraction(group["lipschitz"]),
+                source=group["source"],
+                literature=group["literature"],
+            )
+            for group in data.values()
+            if group["law"] == cls.name
+            for gains in group["gains"]
+        )
+
+    @property
+    def lipschitz_limit(self) -> Fraction | None:
+        """Bound on |h'| [m/s³] from which on no certificate exists; None where the law knows of none."""
+        return None
+
+    @classmethod
     def counterexample(
         cls, gains: Mapping[str, Fraction], uncertain: Mapping[str, tuple[Fraction, Fraction]]
     ) -> Mapping[str, Mapping[str, Fraction]] | None:
@@ -199,6 +255,31 @@ class Law(ABC):
 
     def _exact_gains(self) -> list[sp.Rational]:
         return [sp.Rational(v.numerator, v.denominator) for v in self.gains.values()]
+
+
+Designed = TypeVar("Designed", covariant=True)
+
+
+@runtime_checkable
+class DesignProblem(Protocol[Designed]):
+    """What a law is asked for when it is to find gains for a fault, and what it may ask for in turn.
+
+    Searches for proofs stand behind it, so that a law need not know them; see `quakedesign.synthesis.design`, also for
+    its options ``objective``, ``continuous``, ``feedforward``, ``measured`` and ``noise``.
+    """
+
+    @property
+    def fault(self) -> Fault:
+        """The fault."""
+
+    def by_method(self, law: "type[Controller]") -> Designed:
+        """Gains by the method of the family that a law belongs to."""
+
+    def assessed(self, controller: "Controller") -> Designed:
+        """Verdict on gains that the law has found itself."""
+
+    def undecided(self, name: str, reason: str) -> Designed:
+        """Answer of a law that found no gains."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -222,6 +303,54 @@ class Controller(Law):
     def sampling_time(self) -> float | None:
         """T_s [s] of a law of samples; None in continuous time."""
         return float(self.sampling.step) if self.sampling else None
+
+    @property
+    def scale(self) -> Fraction | None:
+        """λ [-], which stretches the loop; None for a law without."""
+        return None
+
+    @property
+    def divisor(self) -> Fraction | None:
+        """μ0N̂0 [m²/kg], by which ν is divided; None for a law that asks for pressures."""
+        return None
+
+    @property
+    def feedforward(self) -> FeedForward:
+        """What is added to ν from what is known of the plant."""
+        return NONE
+
+    @property
+    def options(self) -> dict[str, Fraction]:
+        """Exact numbers that it has beside its gains, by name."""
+        return {}
+
+    @classmethod
+    def for_authority(cls, values: "tuple[str | float | Fraction, ...]", authority: Fraction) -> Self:
+        """Return a law from gains in order, as they are given for a fault with the least μN̂ of `authority` [m²/kg]."""
+        return cls.from_values(values)
+
+    def scaled(self, scale: str | float | Fraction) -> Self:
+        """Return the same base gains with another λ; refused by a law without."""
+        raise ParameterError(f"a scale belongs to a sliding mode. Received {self.name}. Leave it out.")
+
+    def with_divisor(self, divisor: Fraction) -> Self:
+        """Return the same gains with another divisor; refused by a law without."""
+        raise ParameterError(f"{self.name} has no divisor. Received the divisor {divisor}. Leave it out.")
+
+    def with_feedforward(self, feedforward: FeedForward) -> Self:
+        """Return the same law with another feed-forward; any but none is refused by a law without."""
+        if feedforward != NONE:
+            raise ParameterError(f"a feed-forward belongs to a sliding mode. Received {self.name}. Leave it out.")
+        return self
+
+    @classmethod
+    def design(cls, problem: DesignProblem[Designed]) -> Designed:
+        """Return gains with a proof for a fault, by the method of the law's family; a law may have a way of its own."""
+        return problem.by_method(cls)
+
+    def premises(self, fault: Fault, certificate: Any) -> tuple[Any, ...]:
+        """Premises of its proofs on a fault beside those of its family, see `quakedesign.certificates.premise`."""
+        return ()
 
     @abstractmethod
     def pressure(self, signals: Signals) -> sp.Expr:

@@ -20,7 +20,6 @@ from typing import Any
 import sympy as sp
 
 from quakedesign.controllers.base import Controller, Signals
-from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.errors import ParameterError
 from quakedesign.fault.radical import Radical, radical
 from quakedesign.fault.scales import Scales, power_product
@@ -95,10 +94,8 @@ def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction
     start = gains if isinstance(gains, CarriedGains) else exact(gains)
     law, output = start.law, scales.of("Pa")
     if divisor is not None:
-        if not isinstance(law, SlidingMode):
-            raise ParameterError(f"{law.name} has no divisor. Received the divisor {divisor}. Leave it out.")
-        output *= Fraction(divisor) / law.divisor
-        law = replace(law, divisor=divisor, gains=dict(law.gains))
+        law = law.with_divisor(divisor)
+        output *= Fraction(divisor) / (start.law.divisor or 1)
     factors = {"slip": scales.of("slip_m"), "time": scales.of("s"), "output": output}
     dimensions = law_dimensions(law)
     return CarriedGains(

@@ -63,9 +63,26 @@ class SlidingMode(Controller):
     def lipschitz_limit(self) -> Fraction:
         """Bound on |h'| that no Lyapunov function can exceed with these gains (ERRATA, end)."""
 
+    @property
+    def options(self) -> dict[str, Fraction]:
+        """``scale``, ``divisor``, a feed-forward that is on, and the numbers of the scheme of a law of samples."""
+        added = {} if self.feedforward == NONE else self.feedforward.coefficients
+        known = {f"feedforward_{name}": value for name, value in added.items()}
+        settings = self.sampling.settings if self.sampling else ()
+        return {"scale": self.scale, "divisor": self.divisor, **known, **dict(settings)}
+
+    @classmethod
+    def for_authority(cls, values: "tuple[str | float | Fraction, ...]", authority: Fraction) -> Self:
+        """Return a law from base gains in order, with a divisor."""
+        return cls.from_values(values, divisor=authority)
+
     def scaled(self, scale: str | float | Fraction) -> Self:
         """Return the same base gains with another λ."""
         return replace(self, gains=dict(self.gains), scale=rational(scale, "scale"))
+
+    def with_divisor(self, divisor: Fraction) -> Self:
+        """Return the same gains with another divisor."""
+        return replace(self, gains=dict(self.gains), divisor=divisor)
 
     def with_feedforward(self, feedforward: FeedForward) -> Self:
         """Return the same law with another feed-forward."""

@@ -7,7 +7,8 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
-from quakedesign.controllers import Controller, SlidingMode
+from quakedesign.controllers import Controller
+from quakedesign.controllers.feed_forward import NONE
 from quakedesign.fault import Fault
 from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.rationals import rational
@@ -151,7 +152,7 @@ class ClosedLoop(Metered):
     @property
     def divisor(self) -> sp.Rational:
         """μ0N̂0 [m²/kg]: the law's own, or μ_res·N̂_min for a law without one."""
-        if isinstance(self.controller, SlidingMode):
+        if self.controller is not None and self.controller.divisor is not None:
             return sp.Rational(str(self.controller.divisor))
         least = rational(self.fault.friction.bounds[0]) * (1 - self.fault.box.authority)
         return sp.Rational(str(least)) * plant.plant_values(self.fault)[plant.N_hat]
@@ -184,9 +185,8 @@ class ClosedLoop(Metered):
     @property
     def known(self) -> sp.Expr:
         """What the law adds to ν, and so to h, from what is known of the plant [unit of ν]."""
-        if not isinstance(self.controller, SlidingMode):
-            return sp.Integer(0)
-        return self.controller.feedforward.acceleration(plant.x1, plant.x2, r_acceleration)
+        known = self.controller.feedforward if self.controller is not None else NONE
+        return known.acceleration(plant.x1, plant.x2, r_acceleration)
 
     @cached_property
     def perturbation(self) -> Any:

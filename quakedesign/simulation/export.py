@@ -10,8 +10,6 @@ from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop.schemes import Scheme, own_way, simulation_scheme
-from quakedesign.loop.sensing import Sensor
-from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.loop.steps.sampled import Sampled
 from quakedesign.output import require_room, whole_folder, write_whole
 from quakedesign.simulation.c_source import ControllerStep, header_text, source_text
@@ -55,7 +53,7 @@ def controller_step(
     require_positive(step=period)
     chosen = _software(simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme)
     loop, measurement = ClosedLoop(fault, controller), {"slip": "m", "slip_rate": "m/s"}
-    if isinstance(chosen.measurement, Sensor) or not _uses_rate(_function(loop, chosen, float(period), 2)[0]):
+    if chosen.measurement.of_slip_alone or not _uses_rate(_function(loop, chosen, float(period), 2)[0]):
         measurement.pop("slip_rate")
     function, start = _function(loop, chosen, float(period), len(measurement))
     facts = _facts(fault, controller, chosen)
@@ -125,8 +123,7 @@ def _software(scheme: Scheme) -> Sampled:
     if scheme.actuator.flowing:
         names = ", ".join(stage.name for stage in scheme.actuator.flowing)
         raise ParameterError(f"what moves between samples belongs to the plant. Received {names}. Leave it out.")
-    kept = scheme.measurement.software if isinstance(scheme.measurement, Sensor) else EXACT
-    return replace(scheme, measurement=kept, substeps=1)
+    return replace(scheme, measurement=scheme.measurement.software, substeps=1)
 
 
 def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> tuple[Any, dict[str, float]]:

@@ -10,7 +10,6 @@ from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, simulation_scheme
 from quakedesign.loop.sensing import Sensor
-from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
 from quakedesign.simulation.assembly import trajectory
 from quakedesign.simulation.backend import prepare
@@ -31,7 +30,7 @@ def sampled_scheme(
     scheme: str | Scheme,
     substeps: int = 1,
     actuator: Actuator | None = None,
-    measurement: Measurement | Sensor | None = None,
+    measurement: Sensor | None = None,
     **numbers: Any,
 ) -> Scheme:
     """Scheme with what lies around the controller, as `simulate` takes it.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quakedesign.controllers import Controller, SlidingMode
+from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Fault
 from quakedesign.loop.sensing.measurement import Measurement
@@ -107,7 +107,7 @@ class Study:
 
 def accuracy(
     fault: Fault,
-    controller: SlidingMode,
+    controller: Controller,
     *,
     steps: Sequence[float],
     schemes: Sequence[str] = SCHEMES,
@@ -119,7 +119,7 @@ def accuracy(
     Parameters
     ----------
     fault : Fault
-    controller : SlidingMode
+    controller : Controller
         Without feed-forward, so that e3 = ξ1 + h.
     steps : sequence of float
         T_s [s].

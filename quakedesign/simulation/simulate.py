@@ -8,7 +8,6 @@ from quakedesign.fault import Fault, require_fault
 from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, own_way
 from quakedesign.loop.sensing import Sensor
-from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator
 from quakedesign.simulation.loading import Load
@@ -39,7 +38,7 @@ def simulate(
     checkpoint: str | Path | None = None,
     substeps: int = 1,
     actuator: Actuator | None = None,
-    measurement: Measurement | Sensor | None = None,
+    measurement: Sensor | None = None,
 ) -> Trajectory:
     """Simulate a fault under a controller, from rest, with the fault's own disturbance and reference.
 

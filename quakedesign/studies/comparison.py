@@ -2,17 +2,17 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee
 from quakedesign.certificates.linear_premises import sectors
-from quakedesign.certificates.premises import Variant, certified_lipschitz
-from quakedesign.controllers import SlidingMode, published
+from quakedesign.certificates.premises import Variant
+from quakedesign.controllers import Controller, published
 from quakedesign.fault import Fault, require_fault
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate, simulation_scheme
 from quakedesign.simulation.step_stability import amplification
+from quakedesign.studies.on_trajectory import certified_bound
 from quakedesign.synthesis import Design, assess
 from quakedesign.synthesis.analysis.sampling_time import largest_sampling_time, on_trajectory
 from quakedesign.synthesis.guaranteed import CLASSES, Answer, attacked
@@ -149,16 +149,16 @@ def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell) 
         design.fault, design.controller, scheme=scheme, measurement=told, progress=lambda done: tell(label, done)
     )
     entry = Entry(label=label, origin=origin, design=design, run=run)
-    if isinstance(design.controller, SlidingMode):
-        return _sliding_mode(entry, design.controller, run, tell)
+    if design.controller.lipschitz_limit is not None:
+        return _with_rate(entry, design.controller, float(design.controller.lipschitz_limit), run, tell)
     return entry if sampling else _linear(entry, run, tell)
 
 
 def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
     """A linear law in continuous time: held, and its peaks."""
     design = entry.design
-    growth = None
-    if run.provenance["scheme"] == AS_IN_THE_PAPER:
+    growth, held = None, design.held_loop()
+    if held is not None and run.provenance["scheme"] == AS_IN_THE_PAPER:
         poles = vertex_poles(sectors(design.fault), list(design.gains.values()))
         growth = amplification(poles, run.provenance["step"], run.provenance["method"])
     tell(f"{entry.label}: held pressure and peaks", 0.0)
@@ -166,14 +166,15 @@ def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
     classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
     peaks = {kind: design.certified_peaks(kind) for kind in classes}
     proved = {kind: found for kind, found in peaks.items() if isinstance(found, ContinuousPeaks)}
-    return replace(entry, growth_per_step=growth, held=design.held_loop(), peaks=proved)
+    return replace(entry, growth_per_step=growth, held=held, peaks=proved)
 
 
-def _sliding_mode(entry: Entry, law: SlidingMode, run: Trajectory, tell: Tell) -> Entry:
+def _with_rate(entry: Entry, law: Controller, limit: float, run: Trajectory, tell: Tell) -> Entry:
     """A sliding mode: |h'| of its run, and in continuous time how often to sample and what a feed-forward would add."""
-    design, bound = entry.design, float(_lipschitz(entry.design, law))
-    premise = on_trajectory(law, bound, run)
-    if design.certificate is None or design.verdict is not Verdict.PROVED or premise is None:
+    design, certified = entry.design, certified_bound(entry.design)
+    bound = limit if certified is None else float(certified * (law.scale or 1))
+    premise = on_trajectory(bound, run)
+    if certified is None or premise is None:
         return entry
     judged, step = design.with_premise(premise), None
     if entry.origin != "designed" or law.sampling is not None:
@@ -183,9 +184,3 @@ def _sliding_mode(entry: Entry, law: SlidingMode, run: Trajectory, tell: Tell) -
         step = largest_sampling_time(design.fault, law, bound)
     tell(f"{entry.label}: feed-forward", 0.0)
     return replace(entry, design=judged, largest_step=step, variants=design.feedforward_variants())
-
-
-def _lipschitz(design: Design, law: SlidingMode) -> Fraction:
-    if design.certificate is None or design.verdict is not Verdict.PROVED:
-        return law.lipschitz_limit
-    return certified_lipschitz(design.certificate) * law.scale

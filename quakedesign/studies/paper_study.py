@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import pi
 
-from quakedesign.loop import SampledController
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.studies import FrontPoint, objective_front
 from quakedesign.studies.comparison import Compared
@@ -68,6 +67,6 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
             )
     laws = [entry.design.controller for entry in comparison.of("designed")]
     tell("peak against tracking", 0.0)
-    steps = [law.step for law in laws if isinstance(law, SampledController)]
+    steps = [law.sampling.step for law in laws if law and law.sampling and law.lipschitz_limit is None]
     front = objective_front(fault, steps[0]) if steps else ()
     return PaperRuns(comparison=comparison, induced=induced, close_ups=close_ups, front=front)

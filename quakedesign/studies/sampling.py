@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates.premises import Premise
-from quakedesign.controllers import Controller, SlidingMode, published
+from quakedesign.controllers import Controller, published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
@@ -56,7 +56,7 @@ class Row:
             "origin": self.origin,
             "law": law.name,
             "gains": {name: str(v) for name, v in law.gains.items()},
-            "scale": str(law.scale) if isinstance(law, SlidingMode) else None,
+            "scale": str(law.scale) if law.scale is not None else None,
             "scheme": self.scheme,
             "outcome": self.run.outcome.to_dict(),
             "metrics": self.run.metrics.to_dict(),
@@ -152,10 +152,6 @@ def sampling_report(
 
 def _variants(controller: Controller, scales: Sequence[str]) -> list[Controller]:
     """The law, and the same base gains with other λ."""
-    if not scales:
-        return [controller]
-    if not isinstance(controller, SlidingMode):
-        raise ParameterError(f"a scale belongs to a sliding mode. Received {controller.name}. Leave it out.")
     return [controller, *(controller.scaled(rational(scale, "scale")) for scale in scales)]
 
 
@@ -168,13 +164,11 @@ def _row(
     duration: float | None,
     tell: Tell,
 ) -> Row:
-    label = f"{law.title}{f', λ {float(law.scale):.3g}' if isinstance(law, SlidingMode) else ''}"
+    label = f"{law.title}{f', λ {float(law.scale):.3g}' if law.scale is not None else ''}"
     label = f"{law.title}, published" if origin == "published" else label
     said = f"{label}, {scheme}"
     run = simulate(fault, law, scheme=scheme, duration=duration, samples=1000, progress=lambda done: tell(said, done))
-    premise = None
-    if isinstance(law, SlidingMode):
-        premise = trajectory_premise(law, None if bound is None else float(bound * law.scale), run)
+    premise = trajectory_premise(law, None if bound is None else float(bound * (law.scale or 1)), run)
     return Row(label=label, origin=origin, controller=law, scheme=scheme, run=run, premise=premise)
 
 
@@ -184,7 +178,7 @@ def _studies(
     task = fault.reference.operation_time
     window = (task if duration is None else duration) * SHARE
     found = {}
-    if isinstance(law, SlidingMode) and not any(law.feedforward.coefficients.values()):
+    if law.scale is not None and not any(law.feedforward.coefficients.values()):
         tell("orders of accuracy", 0.0)
         found["orders"] = orders(fault, law, schemes)
     for i, of in enumerate(("slip_noise", "rate_noise")):
@@ -197,7 +191,7 @@ def _studies(
     return found | {"input_gain": gain_sensitivity(box, law, points=3, schemes=schemes, duration=duration)}
 
 
-def orders(fault: Fault, law: SlidingMode, schemes: Sequence[str] = SCHEMES) -> Study:
+def orders(fault: Fault, law: Controller, schemes: Sequence[str] = SCHEMES) -> Study:
     """Errors over three decades of T_s below that of the fault, in runs of 650 of its T_s, from half of them on."""
     longest = fault.sampling_time
     steps = [longest * 10 ** (-k / 2) for k in range(2 * DECADES + 1)]

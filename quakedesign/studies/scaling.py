@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.certificates.premises import least_authority
-from quakedesign.controllers import Controller, SlidingMode, control_law
+from quakedesign.controllers import Controller, control_law
 from quakedesign.controllers import published as published_controllers
 from quakedesign.controllers.scaling import (
     UNROUNDED,
@@ -73,7 +73,7 @@ def scale_answer(
     start, end = (f if isinstance(f, Fault) else load_fault(f) for f in (source, target))
     given = (gains,) if isinstance(gains, str) else tuple(gains)
     law = chosen_controller(start, controller_name, given)
-    own = given != ("published",) and isinstance(law, SlidingMode)
+    own = given != ("published",) and law.divisor is not None
     relation = similarity(start, end, clock=clock)
     carried = carry(law, relation.scales, divisor=least_authority(end) if own else None)
     return {
@@ -99,7 +99,7 @@ def _texts(values: Mapping[str, Radical]) -> dict[str, str]:
 
 
 def _exponents(law: Controller, own: bool) -> dict[str, str]:
-    output = ("pressure·divisor" if own else "pressure") if isinstance(law, SlidingMode) else "pressure"
+    output = "pressure·divisor" if own else "pressure"
     return {name: _product_text(form, output) for name, form in law_dimensions(law).gains.items()}
 
 
@@ -111,7 +111,7 @@ def _product_text(form: Form, output: str) -> str:
 
 def _options(law: Controller, carried: CarriedGains) -> dict[str, Any]:
     """λ and the divisors of a sliding mode, the feedback of a linear law."""
-    if isinstance(law, SlidingMode) and isinstance(carried.law, SlidingMode):
+    if law.divisor is not None:
         return {"scale": str(law.scale), "source_divisor": str(law.divisor), "divisor": str(carried.law.divisor)}
     return {"feedback": law.feedback} if hasattr(law, "feedback") else {}
 

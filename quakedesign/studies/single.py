@@ -6,14 +6,15 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates.premises import Premise, least_authority
-from quakedesign.controllers import Controller, SlidingMode, control_law, published
+from quakedesign.controllers import Controller, control_law, published
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Fault
 from quakedesign.loop.actuators import DIRECT
 from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.loop.sensing import OutputFeedback, Sensor
-from quakedesign.loop.sensing.measurement import EXACT, Measurement
+from quakedesign.loop.sensing.measurement import EXACT
+from quakedesign.rationals import rational
 from quakedesign.simulation import Actuator, Load, Trajectory, natural_earthquake
 from quakedesign.simulation import simulate as run_loop
 from quakedesign.studies.estimation import differentiator_premise
@@ -85,27 +86,21 @@ def choice(
     UnknownNameError, ParameterError
     """
     law, base = _with_gains(fault, name, gains)
-    if not isinstance(law, SlidingMode):
+    if law.divisor is None:
         if scale is None and feedforward == "none":
-            return Choice(controller=law)
+            return Choice(controller=law, lipschitz=base)
         raise ParameterError(f"a scale and a feed-forward belong to a sliding mode. Received {name}. Leave them out.")
     if law.sampling is not None and feedforward != "none":
         raise ParameterError(
             "a feed-forward has no guarantee with the pressure held over T_s, as designed gains run. "
             f"Received {feedforward}. Give --gains continuous, or leave it out."
         )
-    scaled = law if scale is None else law.scaled(_rational(scale))
-    known = feed_forward(feedforward, fault, scaled.divisor)
+    scaled = law if scale is None else law.scaled(rational(scale, "scale"))
+    known = feed_forward(feedforward, fault, law.divisor)
     return Choice(
         controller=law if scaled is law and feedforward == "none" else scaled.with_feedforward(known),
-        lipschitz=None if base is None else base * scaled.scale,
+        lipschitz=None if base is None else base * (scaled.scale or 1),
     )
-
-
-def _rational(scale: str) -> Any:
-    from quakedesign.rationals import rational
-
-    return rational(scale, "scale")
 
 
 def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> tuple[Controller, Fraction | None]:
@@ -124,9 +119,7 @@ def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> tuple[Contro
         if found.controller is None:
             raise ParameterError(f"no gains with a proof were found for {name} on {fault.name}. Give --gains.")
         return found.controller, certified_bound(found)
-    if issubclass(law, SlidingMode):
-        return law.from_values(gains, divisor=least_authority(fault)), None
-    return law.from_values(gains), None
+    return law.for_authority(gains, least_authority(fault)), None
 
 
 def run_single(
@@ -136,7 +129,7 @@ def run_single(
     tell: Callable[[float], None],
     duration: float | None = None,
     load: Load | None = None,
-    noise: Measurement | Sensor = EXACT,
+    noise: Sensor = EXACT,
     actuator: Actuator = DIRECT,
     tuning: Mapping[str, float] | None = None,
     **settings: Any,
@@ -190,12 +183,10 @@ def run_single(
     return run, _premises(fault, known, run, noise, name)
 
 
-def _premises(fault: Fault, known: Choice, run: Trajectory, seen: Measurement | Sensor, scheme: str) -> list[Premise]:
+def _premises(fault: Fault, known: Choice, run: Trajectory, seen: Sensor, scheme: str) -> list[Premise]:
     """Premises that a run decides, or a differentiator needs."""
     law, bound = known.controller, known.lipschitz
-    found: list[Premise | None] = []
-    if isinstance(law, SlidingMode):
-        found.append(trajectory_premise(law, None if bound is None else float(bound), run))
+    found = [trajectory_premise(law, None if bound is None else float(bound), run)]
     if isinstance(seen, OutputFeedback):
         found.append(differentiator_premise(fault, law, seen, scheme=scheme))
     return [premise for premise in found if premise is not None]

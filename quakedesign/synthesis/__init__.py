@@ -3,9 +3,11 @@
 from quakedesign.arguments import check_arguments
 from quakedesign.sos.solve.conic import stated_problems
 from quakedesign.synthesis.analysis.certify import certify
-from quakedesign.synthesis.design import DESIGNABLE, Design, assess, design
+from quakedesign.synthesis.design import Design, assess, design
 from quakedesign.synthesis.gains.synthesise import synthesise
+from quakedesign.synthesis.guarantee import answer
+from quakedesign.synthesis.methods.base import designable
 
-__all__ = ["DESIGNABLE", "Design", "assess", "certify", "design", "stated_problems", "synthesise"]
+__all__ = ["Design", "answer", "assess", "certify", "design", "designable", "stated_problems", "synthesise"]
 
 check_arguments(__name__)

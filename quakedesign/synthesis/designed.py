@@ -6,21 +6,16 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Certificate, Verdict
-from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee
 from quakedesign.certificates.guarantee.statement import Around
-from quakedesign.certificates.premises import Domain, Premise, Variant, feedforward_variants
-from quakedesign.controllers import Controller, SlidingMode, control_law
-from quakedesign.controllers.elqr import ExtendedLQR
-from quakedesign.controllers.feed_forward import NONE
+from quakedesign.certificates.premises import Domain, Premise, Variant
+from quakedesign.controllers import Controller, control_laws
 from quakedesign.fault import Fault
-from quakedesign.loop import SampledController, summed_integrals
 from quakedesign.loop.sensing.measurement import Measurement
-from quakedesign.rationals import rational
-from quakedesign.synthesis.guaranteed import Compensation, guarantee_of
-from quakedesign.synthesis.guaranteed.continuous import certified_peaks
+from quakedesign.synthesis.guaranteed import Compensation
 from quakedesign.synthesis.guaranteed.default_design import REACH
-from quakedesign.synthesis.linear.plant.problem import LinearProblem
-from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
+from quakedesign.synthesis.linear.sampled.held import HeldLoop
+from quakedesign.synthesis.methods.base import method_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -69,17 +64,13 @@ class Design:
         A sliding mode of samples has the numbers of its scheme too, ``weight`` [-] and ``authority`` B0 [m²/kg].
         """
         law = self.controller
-        if not isinstance(law, SlidingMode):
-            return dict(law.gains) if law else {}
-        added = {} if law.feedforward == NONE else law.feedforward.coefficients
-        known = {f"feedforward_{name}": value for name, value in added.items()}
-        settings = dict(law.sampling.settings) if law.sampling else {}
-        return {**law.gains, "scale": law.scale, "divisor": law.divisor, **known, **settings}
+        return {**law.gains, **law.options} if law else {}
 
     @property
     def title(self) -> str:
         """Name for people."""
-        return control_law(self.name).title
+        known = self.controller or control_laws().get(self.name)
+        return known.title if known else self.name
 
     @property
     def measurement(self) -> Measurement | None:
@@ -102,9 +93,8 @@ class Design:
 
         Takes a few seconds.
         """
-        if not isinstance(self.controller, SlidingMode):
-            return ()
-        return feedforward_variants(self.fault, self.controller, self.certificate)
+        law = self.controller
+        return method_of(type(law)).variants(self.fault, law, self.certificate) if law else ()
 
     def certified_peaks(self, disturbance_class: str = "amplitude") -> ContinuousPeaks | NoGuarantee:
         """How far an e-LQR lets slip, slip rate and pressure go at most if the pressure acts at once.
@@ -121,9 +111,10 @@ class Design:
         ParameterError
             For the class ``rate`` and a disturbance that does not start at 0.
         """
-        if not isinstance(self.controller, ExtendedLQR):
-            return NoGuarantee(reason=f"no bound of peaks of {self.title} is known here", small_gain=None)
-        return certified_peaks(self.fault, self.controller, disturbance_class=disturbance_class)
+        law = self.controller
+        if law is None:
+            return NoGuarantee(reason=f"no gains of {self.title} are known", small_gain=None)
+        return method_of(type(law)).certified_peaks(self.fault, law, disturbance_class)
 
     @property
     def guarantee(self) -> Guarantee | NoGuarantee:
@@ -135,39 +126,21 @@ class Design:
         law = self.controller
         if self.runs is not None:
             return self.runs
-        if isinstance(law, SampledController):
-            noise = Around(slip_noise=self.slip_noise, rate_noise=self.rate_noise)
-            return guarantee(task_of(self.fault), Held(law=law.law, step=law.step, **noise))
-        if isinstance(law, SlidingMode):
-            return guarantee_of(task_of(self.fault), law)
-        summed = isinstance(law, ExtendedLQR) and law.feedback == "error" and law.limits is None and not law.offset
-        if law is None or not summed:
-            return NoGuarantee(
-                reason=f"no analysis of {self.title} under a held pressure is known here", small_gain=None
-            )
-        step = rational(self.fault.sampling_time)
-        held = Held(law=summed_integrals(tuple(law.gains.values()), step), step=step)
-        return guarantee(task_of(self.fault), held)
+        if law is None:
+            return NoGuarantee(reason=f"no gains of {self.title} are known", small_gain=None)
+        noise = Around(slip_noise=self.slip_noise, rate_noise=self.rate_noise)
+        return method_of(type(law)).guarantee(self.fault, law, noise)
 
     @property
     def compensation(self) -> Compensation | None:
         """A sliding mode of samples with its guarantee; None for another law."""
         law = self.controller
-        if not isinstance(law, SlidingMode) or law.sampling is None:
-            return None
-        return Compensation(controller=law, found=self.guarantee)
+        return method_of(type(law)).compensation(law, self.guarantee) if law and law.sampling else None
 
     def held_loop(self) -> HeldLoop | None:
         """What is decided of an e-LQR when p is held over the fault's sampling time; None for another law."""
-        if self.controller is None or not self._linear_in_continuous_time:
-            return None
-        gains = tuple(self.controller.gains.values())
-        return held_loop(LinearProblem.of(self.fault), gains, self.fault.sampling_time)
-
-    @property
-    def _linear_in_continuous_time(self) -> bool:
         law = self.controller
-        return law is not None and law.sampling_time is None and not isinstance(law, SlidingMode)
+        return method_of(type(law)).held_loop(self.fault, law) if law else None
 
     def __repr__(self) -> str:
         gains = ", ".join(f"{name} = {value}" for name, value in self.gains.items()) or "none"

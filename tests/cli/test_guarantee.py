@@ -131,7 +131,7 @@ def test_what_cannot_be_understood_is_one_line(call, arguments, words):
 @pytest.fixture
 def unattacked(monkeypatch):
     """Without the search for the worst, which has tests of its own."""
-    module = import_module("quakedesign.synthesis.guaranteed.answer")  # its function has the same name
+    module = import_module("quakedesign.synthesis.guaranteed.answer")
     monkeypatch.setattr(module, "worst_found", lambda *_, **__: None)
 
 

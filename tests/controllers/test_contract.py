@@ -21,15 +21,18 @@ AT = (0.3, -0.2, 0.11, -0.07, 0.05, -0.4)
 SIGNAL_UNITS = ("m", "m/s", "m", "m/s")
 
 
-@pytest.fixture(params=sorted(laws()))
+OWN = ("own_parts:PID", "own_parts:OwnTwisting")  # a user's
+
+
+@pytest.fixture(params=[*sorted(laws()), *OWN])
 def law(request):
-    return laws()[request.param]
+    return law_named(request.param)
 
 
-@pytest.fixture(params=sorted(control_laws()))
+@pytest.fixture(params=[*sorted(control_laws()), *OWN])
 def acting(request):
     """A law that acts on a fault."""
-    return control_laws()[request.param]
+    return control_law(request.param)
 
 
 def some_gains(law, number=0):
@@ -72,10 +75,11 @@ def test_laws_for_other_plants_are_found_for_proofs_and_kept_from_faults():
         law_named("pid")
 
 
-def test_a_claim_can_be_about_a_name_a_class_or_a_bare_loop(law):
-    named, model = model_of(law.name)
-    assert (named, model) == model_of(law)
-    assert named == law.name
+@pytest.mark.parametrize("given", [*laws(), *OWN])
+def test_a_claim_can_be_about_a_name_a_class_or_a_bare_loop(given):
+    named, model = model_of(given)
+    assert (named, model) == model_of(law_named(given))
+    assert named == law_named(given).name
     assert model_of(model) == ("custom", model)
 
 

@@ -13,9 +13,10 @@ from quakedesign.controllers import published
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Disturbance
 from quakedesign.simulation.step_stability import amplification
-from quakedesign.synthesis.design import assess, smallest_root
+from quakedesign.synthesis import assess
 from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
 from quakedesign.synthesis.linear.design.riccati import riccati_design
+from quakedesign.synthesis.methods.sliding_mode import smallest_root
 
 
 @pytest.fixture(scope="module")

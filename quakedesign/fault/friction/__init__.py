@@ -3,8 +3,7 @@
 from functools import cache
 
 from quakedesign.arguments import check_arguments
-from quakedesign.discovery import discovered
-from quakedesign.errors import UnknownNameError
+from quakedesign.discovery import discovered, named
 from quakedesign.fault.friction.base import FrictionLaw
 
 __all__ = ["FrictionLaw", "friction_law", "friction_laws"]
@@ -20,17 +19,14 @@ def friction_laws() -> dict[str, type[FrictionLaw]]:
 
 
 def friction_law(name: str) -> type[FrictionLaw]:
-    """Friction law of a given name.
+    """Friction law of a given name, or of the user's own as ``module:Class``.
 
     Raises
     ------
     UnknownNameError
         When there is none.
     """
-    laws = friction_laws()
-    if name not in laws:
-        raise UnknownNameError(f"friction law must be one of {', '.join(sorted(laws))}. Received {name!r}.")
-    return laws[name]
+    return named(name, friction_laws(), FrictionLaw, "friction law")
 
 
 check_arguments(__name__)

@@ -6,7 +6,7 @@ from typing import Any
 
 from quakedesign.arguments import check_arguments
 from quakedesign.controllers import Controller
-from quakedesign.discovery import discovered
+from quakedesign.discovery import discovered, named
 from quakedesign.errors import ParameterError
 from quakedesign.loop.schemes.base import Scheme, Stepped
 
@@ -20,16 +20,16 @@ def schemes() -> dict[str, type[Scheme]]:
 
 
 def simulation_scheme(name: str, **settings: Any) -> Scheme:
-    """Scheme of a given name, with settings other than its own defaults.
+    """Scheme of a given name, or of the user's own as ``module:Class``, with settings other than its own defaults.
 
     Raises
     ------
     ParameterError
         When there is none, or it does not have one of the settings.
     """
-    if name not in schemes():
+    if name not in schemes() and ":" not in name:
         raise ParameterError(f"scheme must be one of {', '.join(sorted(schemes()))}. Received {name!r}.")
-    kind = schemes()[name]
+    kind = named(name, schemes(), Scheme, "scheme")
     known: set[str] = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
     for setting in sorted(settings.keys() - known):
         able = [n for n, one in schemes().items() if is_dataclass(one) and setting in {f.name for f in fields(one)}]

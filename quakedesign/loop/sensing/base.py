@@ -9,18 +9,28 @@ _SAME = 1e-12  # relative difference of two sampling periods that are meant to b
 
 
 class Sensor(ABC):
-    """From the true slip to the slip and slip rate that a law is told, once per sample.
+    """From the true slip and slip rate to those that a law is told, once per sample.
 
-    Its numbers and its memory are entries of the vector that the compiled loop carries along, as those of
-    `quakedesign.loop.sensing.measurement.Measurement`, whose place it takes; `measure` works on CasADi SX.
+    Its numbers and its memory are entries of the vector that the compiled loop carries along; `measure` works on CasADi
+    SX. Unless it says otherwise it is one that estimates both from the slip.
+
+    Attributes
+    ----------
+    of_slip_alone : bool
+        Whether it does without the slip rate.
     """
 
-    noisy: ClassVar[bool] = True
+    of_slip_alone: ClassVar[bool] = True
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the law is told anything but slip and slip rate as they are."""
+        return True
 
     @property
     @abstractmethod
-    def step(self) -> float:
-        """Sampling period [s] that it was made for."""
+    def step(self) -> float | None:
+        """Sampling period [s] that it was made for; None for any."""
 
     @property
     @abstractmethod
@@ -34,7 +44,7 @@ class Sensor(ABC):
 
     @abstractmethod
     def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
-        """Estimated slip [m] and slip rate [m/s], and the memory afterwards; of the true state x only x[0] is read."""
+        """Slip [m] and slip rate [m/s] that the law is told, and the memory afterwards, at the true state x."""
 
     @property
     @abstractmethod
@@ -53,7 +63,7 @@ class Sensor(ABC):
         ------
         ParameterError
         """
-        if abs(step - self.step) > _SAME * self.step:
+        if self.step is not None and abs(step - self.step) > _SAME * self.step:
             raise ParameterError(
                 f"the sampling period must be that of the sensor, {self.step:.6g} s. Received {step:.6g} s. "
                 "Make the sensor for the period of the loop."

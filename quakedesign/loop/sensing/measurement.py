@@ -1,10 +1,11 @@
 """What a controller sees of the fault."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import require_nonnegative
+from quakedesign.loop.sensing.base import Sensor
 
 # Multiplicative congruential generators of L'Ecuyer (1988), Commun. ACM 31, 742, combined as there: every product is a
 # whole number below 2^53, so that floating point carries them out exactly, in machine code as elsewhere.
@@ -13,7 +14,7 @@ _MODULI = (2147483563, 2147483399)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Measurement:
+class Measurement(Sensor):
     """Slip and slip rate with independent noise, once per sample.
 
     Attributes
@@ -30,6 +31,8 @@ class Measurement:
     ParameterError
     """
 
+    of_slip_alone: ClassVar[bool] = False
+
     slip_noise: float = 0.0
     rate_noise: float = 0.0
     seed: int = 0
@@ -44,6 +47,15 @@ class Measurement:
     def noisy(self) -> bool:
         """Whether there is any noise."""
         return self.slip_noise > 0 or self.rate_noise > 0
+
+    @property
+    def step(self) -> None:
+        """Any."""
+
+    @property
+    def software(self) -> "Measurement":
+        """None: all of its noise is that of instruments."""
+        return EXACT
 
     @property
     def numbers(self) -> tuple[float, ...]:

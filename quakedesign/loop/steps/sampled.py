@@ -8,7 +8,7 @@ from quakedesign.loop.actuators import DIRECT, Actuator
 from quakedesign.loop.actuators.base import FLOWS
 from quakedesign.loop.schemes.base import Scheme, Stepped
 from quakedesign.loop.sensing.base import Sensor
-from quakedesign.loop.sensing.measurement import EXACT, Measurement
+from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.loop.steps import sampled_law
 from quakedesign.loop.steps.control_step import SIGNALS, ControlStep, Decided, control_step
 from quakedesign.loop.steps.sampled_law import Law, Values
@@ -53,7 +53,7 @@ class Sampled(Scheme, Decided):
 
     substeps: int = 1
     actuator: Actuator = DIRECT
-    measurement: Measurement | Sensor = EXACT
+    measurement: Sensor = EXACT
     authority: float | None = None
 
     def __post_init__(self) -> None:
@@ -75,8 +75,7 @@ class Sampled(Scheme, Decided):
     def memory(self, loop: Stepped, step: float) -> dict[str, float]:
         """See `Scheme.memory`; refuses a sensor that was made for another step."""
         self.actuator.require_resolved(step / self.substeps)
-        if isinstance(self.measurement, Sensor):
-            self.measurement.require_step(step)
+        self.measurement.require_step(step)
         parts = self._parts(loop)
         return {f"{name}_{i}": float(v) for name, values in parts.items() for i, v in enumerate(values)}
 

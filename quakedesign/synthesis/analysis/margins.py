@@ -7,7 +7,6 @@ from time import perf_counter
 
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.controllers import LoopField, Subject, law
-from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
 from quakedesign.sos.solve.joint import Proposal
@@ -193,10 +192,9 @@ def largest_gain_range(
 
 def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
     """Bound on |d| from which on nothing can be proved of these gains, known from the law or a refuting equilibrium."""
-    found = []
     chosen = None if isinstance(subject, LoopField) else law(subject) if isinstance(subject, str) else subject
-    if chosen is not None and issubclass(chosen, SlidingMode):
-        found.append(max(Fraction(0), chosen(gains=dict(loop.gains)).lipschitz_limit))
+    limit = chosen(gains=dict(loop.gains)).lipschitz_limit if chosen is not None else None
+    found = [] if limit is None else [max(Fraction(0), limit)]
     for bound in (Fraction(0), max(_FAR, 4 * _reachable(loop))):
         held = refute(replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), subject)
         if held is not None and held.refutation is not None:

@@ -1,7 +1,7 @@
 """How finely a loop must be sampled for its premise on |h'| to hold on the run itself."""
 
 from quakedesign.certificates.premises import Premise
-from quakedesign.controllers import SlidingMode
+from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
 from quakedesign.simulation import Trajectory, simulate
 
@@ -10,7 +10,7 @@ _FINEST = 1000.0
 _HALVINGS = 6
 
 
-def on_trajectory(controller: SlidingMode, lipschitz: float, run: Trajectory) -> Premise | None:
+def on_trajectory(lipschitz: float, run: Trajectory) -> Premise | None:
     """Largest |Δh/Δt| of a run against the certified bound; None for a run that diverged."""
     measured = run.metrics.max_h_rate
     if measured is None:
@@ -25,7 +25,7 @@ def on_trajectory(controller: SlidingMode, lipschitz: float, run: Trajectory) ->
     )
 
 
-def largest_sampling_time(fault: Fault, controller: SlidingMode, lipschitz: float) -> float | None:
+def largest_sampling_time(fault: Fault, controller: Controller, lipschitz: float) -> float | None:
     """Largest T_s [s] for which a run stays inside |Δh/Δt| ≤ lipschitz, by bisection on a window of 4000 T_s.
 
     Measured on the first part of the task only, so an indication; None when even a thousandth of T_s does not do.

@@ -9,18 +9,18 @@ import numpy as np
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.premises import coefficient_range, least_authority
-from quakedesign.controllers import SlidingMode, control_law
+from quakedesign.controllers import Controller, control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.simulation import Metrics, simulate, simulation_scheme
 from quakedesign.synthesis.analysis.certify import Number
-from quakedesign.synthesis.design import required_lipschitz, smallest_root
 from quakedesign.synthesis.gains.dilation import scaled_norm
 from quakedesign.synthesis.gains.path_following import look, short, with_gains
 from quakedesign.synthesis.gains.problem import Question, question
 from quakedesign.synthesis.gains.synthesise import Compared, Synthesis, synthesise
 from quakedesign.synthesis.lyapunov.search import find_certificate
+from quakedesign.synthesis.methods.sliding_mode import required_lipschitz, smallest_root
 
 _HEADROOM = Fraction(11, 10)
 _WINDOW = 4000
@@ -36,7 +36,7 @@ class Sampling:
     Attributes
     ----------
     fault : Fault
-    law : type of SlidingMode
+    law : type of Controller
     gain_range : tuple of two
         b_m and b_M that the gains must be proved for.
     scale, divisor : Fraction
@@ -47,7 +47,7 @@ class Sampling:
     """
 
     fault: Fault
-    law: type[SlidingMode]
+    law: type[Controller]
     gain_range: tuple[Fraction, Fraction]
     scale: Fraction
     divisor: Fraction
@@ -56,9 +56,9 @@ class Sampling:
     step: float
     duration: float
 
-    def controller(self, gains: Sequence[Fraction]) -> SlidingMode:
+    def controller(self, gains: Sequence[Fraction]) -> Controller:
         """Controller of base gains."""
-        return self.law.from_values(tuple(gains), scale=self.scale, divisor=self.divisor)
+        return self.law.for_authority(tuple(gains), self.divisor).scaled(self.scale)
 
     def error(self, gains: Sequence[Fraction]) -> float | None:
         """Metric of a run from rest; None if it diverges."""
@@ -111,7 +111,9 @@ def sampling(
         For a law that is no sliding mode, an unknown metric or scheme, or numbers that are not positive.
     """
     chosen = control_law(law)
-    if not issubclass(chosen, SlidingMode):
+    divisor = least_authority(fault)
+    law_of_ones = chosen.for_authority((1,) * len(chosen.gain_units), divisor)
+    if law_of_ones.scale is None:
         raise ParameterError(f"sampled errors are searched for sliding modes. Received {law!r}.")
     if metric not in (small := [name for name in Metrics.__dataclass_fields__ if name not in _NO_AIM]):
         raise ParameterError(f"metric must be one of {', '.join(small)}. Received {metric!r}.")
@@ -119,9 +121,7 @@ def sampling(
     for name, given in (("step", step), ("duration", duration)):
         if given is not None and not 0 < given < math.inf:
             raise ParameterError(f"{name} must be positive. Received {given} s.")
-    divisor = least_authority(fault)
-    law_of_ones = chosen.from_values((1,) * len(chosen.gain_units), divisor=divisor)
-    needed = required_lipschitz(fault, law_of_ones, divisor) * _HEADROOM if lipschitz is None else rational(lipschitz)
+    needed = required_lipschitz(fault, divisor) * _HEADROOM if lipschitz is None else rational(lipschitz)
     if not needed > 0:
         raise ParameterError(f"lipschitz must be positive. Received {lipschitz}.")
     low, high = coefficient_range(fault, divisor) if gain_range is None else map(rational, gain_range)

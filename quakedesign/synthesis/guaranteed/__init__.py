@@ -2,7 +2,7 @@
 
 from quakedesign.arguments import check_arguments
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
-from quakedesign.synthesis.guaranteed.answer import Answer, answer, attacked
+from quakedesign.synthesis.guaranteed.answer import Answer, attacked
 from quakedesign.synthesis.guaranteed.compensated import Compensation, compensated, design_compensated
 from quakedesign.synthesis.guaranteed.continuous import CLASSES, certified_peaks
 from quakedesign.synthesis.guaranteed.default_design import (
@@ -23,7 +23,6 @@ __all__ = [
     "Compensation",
     "SampledDesign",
     "WorstFound",
-    "answer",
     "attacked",
     "certified_peaks",
     "compensated",

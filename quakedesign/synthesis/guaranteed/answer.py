@@ -1,24 +1,15 @@
 """What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds."""
 
-from dataclasses import dataclass, replace
-from fractions import Fraction
-from typing import Any, Unpack
+from dataclasses import dataclass
+from typing import Any
 
-from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, guarantee, task_of
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
-from quakedesign.controllers import SlidingMode, control_law
-from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.loop import LinearLaw, summed_integrals
-from quakedesign.rationals import rational
+from quakedesign.loop import LinearLaw
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
-from quakedesign.synthesis.guaranteed.continuous import CLASSES
-from quakedesign.synthesis.guaranteed.design import design_held
 from quakedesign.synthesis.guaranteed.families import MEASURED
-from quakedesign.synthesis.guaranteed.reach import design_at, longest_step
-from quakedesign.synthesis.guaranteed.sliding import GUARANTEED, sliding_mode
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,85 +106,11 @@ class Answer:
         }
 
 
-def answer(
-    fault: Fault,
-    *,
-    controller: str = "elqr",
-    gains: tuple[str, ...] = (),
-    objective: str = "tracking",
-    scheme: str | None = None,
-    step: Fraction | None = None,
-    measured: str = MEASURED[0],
-    disturbance_class: str = "amplitude",
-    **around: Unpack[Around],
-) -> Answer:
-    """Guarantee of given e-LQR gains with summed integrals, of a law that is designed for it, or of a sliding mode.
-
-    Parameters
-    ----------
-    fault : Fault
-    controller : str
-        ``elqr``, or a sliding mode, ``cta`` or ``dia``.
-    gains : tuple of str
-        k1 … k4 of the e-LQR, run by the scheme ``explicit``; none to design a law with a disturbance estimate. Base
-        gains of a sliding mode; none for those that a design tries first.
-    objective : str
-        ``tracking`` or ``peak``, of a design.
-    scheme : str, optional
-        Of a sliding mode: ``compensated`` unless given, the only one with a guarantee; of the e-LQR ``explicit``.
-    step : Fraction, optional
-        T_s [s]; the fault's unless given.
-    measured : str
-        ``slip-and-rate``, or ``slip`` for a designed e-LQR with an observer.
-    disturbance_class : str
-        ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
-    **around : Fraction
-        Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s]; 0 unless given.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if disturbance_class not in CLASSES:
-        raise ParameterError(f"class must be one of {', '.join(CLASSES)}. Received {disturbance_class!r}.")
-    period = rational(fault.sampling_time) if step is None else step
-    if not Fraction(1, 10**9) <= period <= 10**9:
-        raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")
-    task = task_of(fault, rate_limited=disturbance_class == "rate")
-    law = control_law(controller)
-    if measured != MEASURED[0] and (gains or issubclass(law, SlidingMode)):
-        raise ParameterError(
-            f"measured is for a designed e-LQR, all other laws need slip and slip rate. Received {measured!r}. "
-            "Leave it out, or the gains and the controller."
-        )
-    if issubclass(law, SlidingMode):
-        made = sliding_mode(task, law, period, gains=gains, scheme=scheme or GUARANTEED, objective=objective, **around)
-        if isinstance(made, NoGuarantee):
-            return Answer(fault=fault, found=made)
-        return replace(attacked(fault, made.found), compensation=made)
-    if scheme not in (None, "explicit"):
-        raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {scheme!r}. Leave it out.")
-    if gains:
-        summed = summed_integrals(_four(gains), period)
-        return attacked(fault, guarantee(task, Held(law=summed, step=period, **around)))
-    found = design_held(task, period, objective=objective, measured=measured, **around)
-    if isinstance(found, Guarantee):
-        return attacked(fault, found)
-    longest = longest_step(task, period, measured=measured, **around)
-    return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest, objective))
-
-
 def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> Answer:
     """A guarantee beside the worst that a search finds on its loop; about a second."""
     if isinstance(found, NoGuarantee):
         return Answer(fault=fault, found=found)
     return Answer(fault=fault, found=found, worst=worst_found(found), worst_with_stick=worst_found(found, sticks=True))
-
-
-def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
-    if len(gains) != 4:
-        raise ParameterError(f"gains must be four numbers, k1 to k4. Received {len(gains)}. Leave them out to design.")
-    return tuple(rational(v, f"k{i}") for i, v in enumerate(gains, 1))
 
 
 def _seen(worst: WorstFound | None) -> dict[str, float] | None:

@@ -7,7 +7,7 @@ from typing import Unpack
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
 from quakedesign.certificates.guarantee.statement import Around
-from quakedesign.controllers import SlidingMode, family
+from quakedesign.controllers import SlidingMode
 from quakedesign.errors import ParameterError
 from quakedesign.loop.schemes import schemes
 from quakedesign.synthesis.guaranteed.compensated import GUARANTEED, Compensation, compensated, design_compensated
@@ -59,8 +59,8 @@ def sliding_mode(
     """
     if scheme not in schemes():
         raise ParameterError(f"scheme must be one of {', '.join(sorted(schemes()))}. Received {scheme!r}.")
-    base = law.from_values(gains) if gains else family(law.name)[0].law
-    if scheme != GUARANTEED or not isinstance(base, SlidingMode):
+    base = law.from_values(gains) if gains else law.base_gains()[0].law
+    if scheme != GUARANTEED:
         return NoGuarantee(reason=_why_none(task, law, scheme, step), small_gain=None)
     known = replace(base, gains=dict(base.gains), divisor=task.authority)
     return design_compensated(task, known, step, objective=objective, **around)

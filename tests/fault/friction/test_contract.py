@@ -29,9 +29,9 @@ NAMES = sorted(friction_laws())
 RATE, THETA = sp.symbols("rate theta", positive=True)
 
 
-@pytest.fixture(params=NAMES)
+@pytest.fixture(params=[*NAMES, "own_parts:Hyperbolic"])
 def law(request):
-    kind = friction_laws()[request.param]
+    kind = friction_law(request.param)
     return kind(**{name: VALUES[name] for name in kind.quantities()})
 
 

@@ -32,7 +32,7 @@ DATA = Path(__file__).parents[2] / "data"
 SLOW = load_fault(DATA / "undersampled_fault.toml")
 STEP = F("0.184")
 DESIGN, COMPENSATED = map(
-    import_module, ("quakedesign.synthesis.design", "quakedesign.synthesis.guaranteed.compensated")
+    import_module, ("quakedesign.synthesis.methods.sliding_mode", "quakedesign.synthesis.guaranteed.compensated")
 )
 CERTIFICATE = Path(__file__).parents[3] / "proofs" / "certificates" / "cta_7_5_2.3_1.1.json"
 

@@ -16,7 +16,8 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.studies import comparison
-from quakedesign.synthesis.guaranteed import answer, design_held, worst_found
+from quakedesign.synthesis import answer
+from quakedesign.synthesis.guaranteed import design_held, worst_found
 from quakedesign.synthesis.guaranteed.design import first_held
 from quakedesign.synthesis.guaranteed.reach import design_at
 

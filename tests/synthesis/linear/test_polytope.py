@@ -11,7 +11,7 @@ from quakedesign.certificates.linear_premises import sectors
 from quakedesign.controllers import Signals, published
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic import plant
-from quakedesign.synthesis.design import linear_loop
+from quakedesign.synthesis.linear.analysis.common_quadratic import sector_loop
 from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, Polytope, error_loop, modal_scaling, polytope_of
 
 
@@ -70,7 +70,7 @@ def test_the_substitution_turns_the_force_balance_into_the_error_loop(feedback):
 
 def test_both_coordinates_have_the_same_poles(real):
     controller = published("real-fault")["elqr"]
-    first = polytope_of(linear_loop(real, controller)).floats()
+    first = polytope_of(sector_loop(controller, sectors(real))).floats()
     second = error_loop(tuple(controller.gains.values()), sectors(real)).polytope().floats()
     assert len(first) == len(second) == 4
     for A, M in zip(first, second, strict=True):

@@ -1,0 +1,63 @@
+"""What is guaranteed of a controller on a fault as it runs, given or designed for it."""
+
+from fractions import Fraction
+from typing import Unpack
+
+from quakedesign.certificates.guarantee import task_of
+from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.controllers import Controller, control_law
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, Answer
+from quakedesign.synthesis.methods.base import Wanted, method_of
+
+
+def answer(
+    fault: Fault,
+    *,
+    controller: str | type[Controller] = "elqr",
+    gains: tuple[str, ...] = (),
+    objective: str = "tracking",
+    scheme: str | None = None,
+    step: Fraction | None = None,
+    measured: str = MEASURED[0],
+    disturbance_class: str = "amplitude",
+    **around: Unpack[Around],
+) -> Answer:
+    """Guarantee of given e-LQR gains with summed integrals, of a law that is designed for it, or of a sliding mode.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : str or type of Controller
+        ``elqr``, or a sliding mode, ``cta`` or ``dia``.
+    gains : tuple of str
+        k1 … k4 of the e-LQR, run by the scheme ``explicit``; none to design a law with a disturbance estimate. Base
+        gains of a sliding mode; none for those that a design tries first.
+    objective : str
+        ``tracking`` or ``peak``, of a design.
+    scheme : str, optional
+        Of a sliding mode: ``compensated`` unless given, the only one with a guarantee; of the e-LQR ``explicit``.
+    step : Fraction, optional
+        T_s [s]; the fault's unless given.
+    measured : str
+        ``slip-and-rate``, or ``slip`` for a designed e-LQR with an observer.
+    disturbance_class : str
+        ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
+    **around : Fraction
+        Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s]; 0 unless given.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if disturbance_class not in CLASSES:
+        raise ParameterError(f"class must be one of {', '.join(CLASSES)}. Received {disturbance_class!r}.")
+    period = rational(fault.sampling_time) if step is None else step
+    if not Fraction(1, 10**9) <= period <= 10**9:
+        raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")
+    task = task_of(fault, rate_limited=disturbance_class == "rate")
+    law = control_law(controller)
+    wanted = Wanted(gains=gains, objective=objective, scheme=scheme, measured=measured, around=around)
+    return method_of(law).sampled(fault, task, law, period, wanted)

@@ -1,0 +1,214 @@
+"""What is asked of every family of laws, and what is answered of a law that belongs to none."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cache
+from typing import Any, ClassVar, Generic, TypeVar
+
+import sympy as sp
+
+from quakedesign.certificates import Certificate, Verdict
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee, Task
+from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.linear_premises import linear_premises, sectors
+from quakedesign.certificates.premises import Domain, Premise, Variant
+from quakedesign.controllers import Controller, Signals, control_laws
+from quakedesign.controllers.feed_forward import NONE, FeedForward
+from quakedesign.discovery import discovered
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.fault import Fault
+from quakedesign.rationals import to_sympy
+from quakedesign.synthesis.guaranteed import MEASURED, OBJECTIVES, Answer, Compensation
+from quakedesign.synthesis.linear.analysis.common_quadratic import sector_loop
+from quakedesign.synthesis.linear.sampled.held import HeldLoop
+from quakedesign.synthesis.lyapunov.search import find_certificate
+
+Designed = TypeVar("Designed")
+L = TypeVar("L", bound=Controller)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem(Generic[Designed]):
+    """Gains that are wanted for a fault; see `quakedesign.synthesis.design`.
+
+    Attributes
+    ----------
+    fault : Fault
+    answer : callable
+        What is made of all that is found.
+    objective : str
+    continuous : bool
+    feedforward : FeedForward
+    measured : str
+    noise : Around
+    """
+
+    fault: Fault
+    answer: Callable[..., Designed]
+    objective: str = OBJECTIVES[0]
+    continuous: bool = False
+    feedforward: FeedForward = NONE
+    measured: str = MEASURED[0]
+    noise: Around = field(default_factory=Around)
+
+    @property
+    def told(self) -> bool:
+        """Whether a law is told less than slip and slip rate as they are."""
+        return self.measured != MEASURED[0] or any(self.noise.values())
+
+    def by_method(self, law: type[Controller]) -> Designed:
+        """Gains by the method of the family that a law belongs to."""
+        return method_of(law).design(self, law)
+
+    def assessed(self, controller: Controller) -> Designed:
+        """Verdict on gains, by the method of the family of their law."""
+        return method_of(type(controller)).assess(self, controller)
+
+    def judged(
+        self,
+        controller: Controller,
+        certificate: Certificate | None = None,
+        *,
+        runs: Guarantee | NoGuarantee | None = None,
+        premises: tuple[Premise, ...] = (),
+        **more: Any,
+    ) -> Designed:
+        """Gains with what was found of them, premises of what runs first.
+
+        The verdict is that on the certificate unless given; of a law of samples it is that on what runs.
+        """
+        own, domain = method_of(type(controller)).premises(self.fault, controller, certificate)
+        verdict = certificate.check(type(controller)) if certificate is not None else Verdict.UNDECIDED
+        if runs is not None and controller.sampling is not None:
+            verdict = runs.check()
+        found = {"name": controller.name, "verdict": verdict, "domain": domain, "runs": runs, **self.noise, **more}
+        known = (*premises, *own, *controller.premises(self.fault, certificate))
+        return self.answer(fault=self.fault, controller=controller, certificate=certificate, premises=known, **found)
+
+    def undecided(self, name: str, reason: str, runs: NoGuarantee | None = None) -> Designed:
+        """Answer where no gains were found."""
+        none: dict[str, Any] = {"controller": None, "certificate": None, "premises": (), "details": {"reason": reason}}
+        return self.answer(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What is asked of a law as it runs; see `quakedesign.synthesis.answer`."""
+
+    gains: tuple[str, ...] = ()
+    objective: str = OBJECTIVES[0]
+    scheme: str | None = None
+    measured: str = MEASURED[0]
+    around: Around = field(default_factory=Around)
+
+    def require_all_measured(self) -> None:
+        """Refuse a law that is told the slip alone where it needs the slip rate as well."""
+        if self.measured != MEASURED[0]:
+            raise ParameterError(
+                "measured is for a designed e-LQR, all other laws need slip and slip rate. "
+                f"Received {self.measured!r}. Leave it out, or the gains and the controller."
+            )
+
+
+def linear_about_a_reference(controller: Controller) -> bool:
+    """Whether the loop that a law states is x2' = s·x1 − w·x2 + β·b·p with its own p and ξ', as an e-LQR's."""
+    try:
+        model = controller.loop_field()
+    except UnsupportedError:
+        return False
+    names = {str(symbol): symbol for symbol in (*model.uncertain, *model.constants)}
+    if set(names) != {"beta", "s", "w", "b"} or model.domain != "reals" or len(model.states) < 2:
+        return False
+    slip, rate, *own = model.states
+    signals = Signals(slip=slip, slip_rate=rate, slip_error=slip, slip_rate_error=rate, integrals=tuple(own))
+    pushed = names["s"] * slip - names["w"] * rate + names["beta"] * names["b"] * controller.pressure(signals)
+    rates = (rate, pushed, *controller.integral_rates(signals))
+    gains = {gain: to_sympy(controller.gains[str(gain)]) for gain in model.gains}
+    stated = [model.field[state].subs(gains) for state in model.states]
+    return len(rates) == len(stated) and all(sp.expand(a - b) == 0 for a, b in zip(rates, stated, strict=True))
+
+
+class Method(Generic[L]):
+    """How laws of a family are designed and judged; this one, for laws of no family, knows what they say themselves.
+
+    Attributes
+    ----------
+    name : str
+    family : type of Controller
+        From which the laws of the family derive.
+    designs : bool
+        Whether it finds gains for a fault.
+    """
+
+    name: ClassVar[str] = "any"
+    family: ClassVar[type] = Controller
+    designs: ClassVar[bool] = False
+
+    def design(self, problem: Problem[Designed], law: type[L]) -> Designed:
+        """Find gains with a proof.
+
+        Raises
+        ------
+        UnsupportedError
+            Where no way is known.
+        """
+        raise UnsupportedError(f"no way to design {law.title} is known. Give its class a classmethod design(problem).")
+
+    def assess(self, problem: Problem[Designed], controller: L) -> Designed:
+        """Judge given gains: by a quadratic V where the closed loop is linear about any constant reference."""
+        if not linear_about_a_reference(controller):
+            return problem.judged(controller, details={"reason": f"no way to prove {controller.title} is known"})
+        loop = sector_loop(controller, sectors(problem.fault))
+        return problem.judged(controller, find_certificate(loop, 2, subject=type(controller)))
+
+    def premises(
+        self, fault: Fault, controller: L, certificate: Certificate | None
+    ) -> tuple[tuple[Premise, ...], Domain | None]:
+        """Premises of the certificate, and the domain that it certifies."""
+        known = linear_about_a_reference(controller)
+        return tuple(linear_premises(fault, controller, certificate)) if known else (), None
+
+    def guarantee(self, fault: Fault, controller: L, noise: Around) -> Guarantee | NoGuarantee:
+        """What is proved of the law as it runs, p held."""
+        return NoGuarantee(
+            reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
+        )
+
+    def certified_peaks(self, fault: Fault, controller: L, disturbance_class: str) -> ContinuousPeaks | NoGuarantee:
+        """How far slip, slip rate and pressure go at most if the pressure acts at once."""
+        return NoGuarantee(reason=f"no bound of peaks of {controller.title} is known here", small_gain=None)
+
+    def compensation(self, controller: L, found: Guarantee | NoGuarantee) -> Compensation | None:
+        """A law of samples that runs in the scheme ``compensated``, with its guarantee; None for another."""
+        return None
+
+    def held_loop(self, fault: Fault, controller: L) -> HeldLoop | None:
+        """What is decided when p is held over the fault's sampling time; None where nothing is."""
+        return None
+
+    def variants(self, fault: Fault, controller: L, certificate: Certificate | None) -> tuple[Variant, ...]:
+        """Premises and domain of the same gains with every named feed-forward; none for laws without."""
+        return ()
+
+    def sampled(self, fault: Fault, task: Task, law: type[L], step: Fraction, wanted: Wanted) -> Answer:
+        """Guarantee of given gains, or of a design, as they run once every T_s [s]."""
+        reason = f"no analysis of {law.title} under a held pressure is known here"
+        return Answer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
+
+
+@cache
+def methods() -> dict[str, Method[Any]]:
+    """Every method by name."""
+    return {name: method() for name, method in discovered("quakedesign.synthesis.methods", Method).items()}
+
+
+def method_of(law: type[Controller]) -> Method[Any]:
+    """Method of the family that a law belongs to: that of the nearest class that it derives from."""
+    known = {method.family: method for method in methods().values()}
+    return next(known[base] for base in law.__mro__ if base in known)
+
+
+def designable() -> tuple[str, ...]:
+    """Names of the package's laws that find gains for a fault."""
+    return tuple(name for name, law in control_laws().items() if method_of(law).designs)

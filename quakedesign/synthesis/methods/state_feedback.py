@@ -1,0 +1,166 @@
+"""Linear state feedback with integral action: Riccati equations, quadratic V, guarantees of the loop that runs."""
+
+from fractions import Fraction
+from typing import Any, ClassVar
+
+from quakedesign.certificates import Certificate, Loop, Verdict
+from quakedesign.certificates.guarantee import (
+    ContinuousPeaks,
+    Guarantee,
+    Held,
+    NoGuarantee,
+    Task,
+    guarantee,
+    task_of,
+)
+from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.linear_premises import sectors
+from quakedesign.controllers.elqr import ExtendedLQR
+from quakedesign.controllers.feed_forward import NONE
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.loop import summed_integrals
+from quakedesign.rationals import rational
+from quakedesign.synthesis.guaranteed import Answer, attacked, certified_peaks, design_held, sampled_design
+from quakedesign.synthesis.guaranteed.reach import design_at, longest_step
+from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
+from quakedesign.synthesis.linear.analysis.robust_stability import unstable_vertex, why_undecided
+from quakedesign.synthesis.linear.design.riccati import RiccatiDesign, riccati_design
+from quakedesign.synthesis.linear.plant.polytope import error_loop
+from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix
+from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
+from quakedesign.synthesis.lyapunov.certify_exactly import claims_of, finish
+from quakedesign.synthesis.lyapunov.quadratic import quadratic_margin
+from quakedesign.synthesis.lyapunov.search import find_certificate
+from quakedesign.synthesis.methods.base import Designed, Method, Problem, Wanted
+
+
+class StateFeedback(Method[ExtendedLQR]):
+    """Feedback with an estimate of the disturbance for what runs, the Riccati equation in continuous time."""
+
+    name: ClassVar[str] = "state-feedback"
+    family: ClassVar[type] = ExtendedLQR
+    designs: ClassVar[bool] = True
+
+    def design(self, problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
+        """As it runs, or with an exact proof about any constant reference in continuous time."""
+        if problem.feedforward != NONE:
+            raise ParameterError(
+                f"a feed-forward is part of sliding-mode laws. Received {problem.feedforward.name!r} with {law.name}. "
+                "Leave it out."
+            )
+        if problem.continuous and problem.told:
+            raise ParameterError(
+                "a design in continuous time knows slip and slip rate exactly. Received noise, or the slip alone. "
+                "Leave continuous out."
+            )
+        return _continuous(problem, law) if problem.continuous else _sampled(problem, law)
+
+    def assess(self, problem: Problem[Designed], controller: ExtendedLQR) -> Designed:
+        """Over the fault's sectors."""
+        loop = sector_loop(controller, sectors(problem.fault))
+        return _judged(problem, controller, quadratic_certificate(loop), {})
+
+    def guarantee(self, fault: Fault, controller: ExtendedLQR, noise: Around) -> Guarantee | NoGuarantee:
+        """With integrals summed over the T_s of the fault."""
+        if controller.feedback != "error" or controller.limits is not None or controller.offset:
+            return super().guarantee(fault, controller, noise)
+        step = rational(fault.sampling_time)
+        return guarantee(task_of(fault), Held(law=summed_integrals(tuple(controller.gains.values()), step), step=step))
+
+    def certified_peaks(
+        self, fault: Fault, controller: ExtendedLQR, disturbance_class: str
+    ) -> ContinuousPeaks | NoGuarantee:
+        """In continuous time."""
+        return certified_peaks(fault, controller, disturbance_class=disturbance_class)
+
+    def held_loop(self, fault: Fault, controller: ExtendedLQR) -> HeldLoop | None:
+        """The law as it is, over the fault's T_s."""
+        return held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
+
+    def sampled(self, fault: Fault, task: Task, law: type[ExtendedLQR], step: Fraction, wanted: Wanted) -> Answer:
+        """Integrals of given gains are summed; without gains, a law with an estimate of the disturbance."""
+        if wanted.gains:
+            wanted.require_all_measured()
+        if wanted.scheme not in (None, "explicit"):
+            raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {wanted.scheme!r}. Leave it out.")
+        if wanted.gains:
+            summed = summed_integrals(_four(wanted.gains), step)
+            return attacked(fault, guarantee(task, Held(law=summed, step=step, **wanted.around)))
+        told: Any = {"measured": wanted.measured, **wanted.around}
+        found = design_held(task, step, objective=wanted.objective, **told)
+        if isinstance(found, Guarantee):
+            return attacked(fault, found)
+        longest = longest_step(task, step, **told)
+        return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest, wanted.objective))
+
+
+def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
+    if len(gains) != 4:
+        raise ParameterError(f"gains must be four numbers, k1 to k4. Received {len(gains)}. Leave them out to design.")
+    return tuple(rational(v, f"k{i}") for i, v in enumerate(gains, 1))
+
+
+def _sampled(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
+    fault = problem.fault
+    step, measured = rational(fault.sampling_time), problem.measured
+    found = sampled_design(task_of(fault), step, problem.objective, measured=measured, **problem.noise)
+    if found.runs is None:
+        return problem.undecided(law.name, found.reason)
+    held = found.runs.held
+    details = {
+        "objective": problem.objective,
+        "step": str(held.step),
+        "reason": found.reason or None,
+        "measured": measured,
+        **{name: str(value) for name, value in held.noise.items()},
+    }
+    return problem.judged(held.controller, name=law.name, details=details, runs=found.runs, premises=found.premises())
+
+
+def _continuous(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
+    try:
+        found = riccati_design(problem.fault)
+    except ParameterError as error:
+        return problem.undecided(law.name, str(error))
+    loop = sector_loop(found.controller, sectors(problem.fault))
+    certificate = _of_riccati(loop, found) or quadratic_certificate(loop, theta=found.theta)
+    details = {
+        "R": found.R,
+        "poles": [[float(z.real), float(z.imag)] for z in found.E],
+        "fastest_pole": found.fastest_pole,
+    }
+    return _judged(problem, found.controller, certificate, details)
+
+
+def _of_riccati(loop: Loop, found: RiccatiDesign) -> Certificate | None:
+    """Certificate with the V of the Riccati equation."""
+    margin = quadratic_margin(loop, found.lyapunov)
+    claims = claims_of(loop, found.lyapunov, (margin, Fraction(0)))
+    return finish(loop, found.lyapunov, claims) if min(claims.values()) > 0 else None
+
+
+def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certificate | None:
+    """Quadratic V for a linear loop: searched in two scalings, then a known one, whose rate is decided exactly.
+
+    Parameters
+    ----------
+    loop : Loop
+    theta : matrix (4 × 4) of Fraction, optional
+        V = xᵀΘx in SI that may be a proof.
+    """
+    found = find_certificate(loop, 2) or robust_stability(loop)
+    return found or (finished_exactly(loop, theta) if theta is not None else None)
+
+
+def _judged(
+    problem: Problem[Designed], controller: ExtendedLQR, certificate: Certificate | None, details: dict[str, Any]
+) -> Designed:
+    """Refuted where a constant vertex of the box is not stable, undecided where no V was found."""
+    details = {**details, "rate": str(certificate.claims["rate"]) if certificate else None}
+    if certificate is not None:
+        return problem.judged(controller, certificate, details=details)
+    loop = error_loop(tuple(controller.gains.values()), sectors(problem.fault))
+    verdict = Verdict.UNDECIDED if unstable_vertex(loop) is None else Verdict.REFUTED
+    return problem.judged(controller, verdict=verdict, details={**details, "reason": why_undecided(loop)})
