@@ -14,6 +14,7 @@ import argparse
 import ast
 import copy
 import fnmatch
+import functools
 import gc
 import importlib
 import inspect
@@ -227,6 +228,14 @@ def apply(mutant: Mutant, functions: list[types.FunctionType], modules: list[typ
                         setattr(module, name, new)
 
 
+def caches_in(objects: list[object], folder: Path) -> list[functools._lru_cache_wrapper]:
+    """Caches of functions of a folder: what they hold since the tests were collected knows no mutation."""
+    caches = [entry for entry in objects if isinstance(entry, functools._lru_cache_wrapper)]
+    codes = [getattr(inspect.unwrap(entry), "__code__", None) for entry in caches]
+    pairs = zip(caches, codes, strict=True)
+    return [entry for entry, code in pairs if code and Path(code.co_filename).is_relative_to(folder)]
+
+
 def exchange_defaults(old: Mapping[str, object], new: Mapping[str, object]) -> None:
     """Give functions, inside of what is wrapped around them, the defaults of others of the same name."""
     for name, function in old.items():
@@ -329,6 +338,7 @@ class Mutation:
         self.options = options
         self.paths = [path.resolve() for path in options.modules]
         self.controlled: dict[tuple, bool] = {}
+        self.caches: list[functools._lru_cache_wrapper] = []
         self.seconds: dict[str, float] = {}
 
     @pytest.hookimpl(tryfirst=True)
@@ -348,6 +358,7 @@ class Mutation:
             if isinstance(entry, types.FunctionType):
                 by_path[entry.__code__.co_filename].append(entry)
         modules = [entry for entry in objects if isinstance(entry, types.ModuleType)]
+        self.caches = caches_in(objects, ROOT)
         del objects
         gc.collect()
         gc.freeze()  # what children need not look at
@@ -394,6 +405,8 @@ class Mutation:
         def work() -> bytes:
             try:
                 apply(mutant, functions, modules)
+                for cache in self.caches:
+                    cache.cache_clear()
             except Exception as error:
                 return f"on import: {error!r}".encode()
             return first_failure(items)
