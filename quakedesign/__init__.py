@@ -4,7 +4,6 @@ The public names load on first use, so that ``import quakedesign`` costs nothing
 """
 
 from importlib import import_module
-from importlib.metadata import version as _version
 
 _HOME = {
     "Certificate": "certificates",
@@ -42,7 +41,7 @@ __all__ = list(_HOME)
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
-        return _version("quakedesign")
+        return import_module("importlib.metadata").version("quakedesign")
     if name not in _HOME:
         raise AttributeError(f"module 'quakedesign' has no attribute {name!r}")
     return getattr(import_module(f"quakedesign.{_HOME[name]}"), name)

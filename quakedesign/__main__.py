@@ -1,14 +1,29 @@
 """``python -m quakedesign``, and the command ``quakedesign``."""
 
-from quakedesign.interruption import ending
+import sys
+
+from quakedesign.interruption import ending, leave
 
 
 def main() -> None:
     """Run the command line; an interruption is one line from the first import on."""
-    with ending(process=True):
-        from quakedesign.cli import main as run
+    try:
+        with ending(process=True):
+            _run()
+    except SystemExit as end:
+        leave(end.code)
+        raise
 
-        run()
+
+def _run() -> None:
+    if sys.argv[1:] in ([], ["--help"], ["-h"]):
+        from quakedesign.overview import print_overview
+
+        if print_overview():
+            sys.exit(0)
+    from quakedesign.cli import main as run
+
+    run()
 
 
 if __name__ == "__main__":

@@ -6,11 +6,11 @@ import select
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from threading import Thread, current_thread, main_thread
 from time import monotonic
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any
 
 from quakedesign.output import number_placed
 from quakedesign.temporary import discard_all, sweep_system
@@ -88,7 +88,7 @@ class _Ending:
                 raise
             code = self._conclude()
             if self._last:
-                _leave(code)
+                leave(code, whatever=True)
             raise SystemExit(code) from None
 
     def _conclude(self) -> int:
@@ -179,13 +179,26 @@ def _received(by: _Ending, last: bool) -> Iterator[None]:
         os.close(writer)
 
 
-def _leave(code: int) -> NoReturn:
-    """End the process once what is registered for its end is done."""
+def leave(code: str | int | None, *, whatever: bool = False) -> None:
+    """End the process once what is registered for its end is done, without taking apart all that it has loaded.
+
+    Parameters
+    ----------
+    code : str or int or None
+        As `SystemExit` has it; with a text the process does not end here.
+    whatever : bool
+        Also where nobody reads what has been said; unless given, the process does not end here then.
+    """
+    if isinstance(code, str):
+        return
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):  # nobody reads it any more
+        try:
             stream.flush()
-    os._exit(code)
+        except (OSError, ValueError):
+            if not whatever:
+                return
+    os._exit(code or 0)
 
 
 def _say(line: str) -> None:

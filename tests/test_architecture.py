@@ -19,7 +19,18 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "quakedesign"
 EVERYWHERE = {
     f"quakedesign.{name}"
-    for name in ("arguments", "errors", "rationals", "input", "output", "temporary", "text", "bounds", "discovery")
+    for name in (
+        "arguments",
+        "errors",
+        "rationals",
+        "input",
+        "output",
+        "temporary",
+        "text",
+        "bounds",
+        "discovery",
+        "faces",
+    )
 }
 BELOW = ("fault", "symbolic", "sos", "sos.exact", "sos.solve", "controllers", "loop", "certificates", "simulation")
 MAY_IMPORT = {
@@ -36,7 +47,7 @@ MAY_IMPORT = {
     "studies": (*BELOW, "synthesis"),
     "report": (*BELOW, "synthesis", "studies"),
     "cli": (*BELOW, "synthesis", "studies", "report", "interruption"),
-    "__main__": ("cli", "interruption"),
+    "__main__": ("cli", "interruption", "overview"),
     "workers": ("interruption",),
     "interruption": (),
     "temporary": (),
@@ -45,6 +56,8 @@ MAY_IMPORT = {
     "text": (),
     "discovery": (),
     "arguments": (),
+    "faces": (),
+    "overview": (),
     "input": (),
     "rationals": (),
     "output": (),

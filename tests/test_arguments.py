@@ -16,7 +16,7 @@ import pytest
 import sympy as sp
 
 import quakedesign as qd
-from quakedesign.arguments import check_arguments, matches
+from quakedesign.arguments import matches
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Claims, guarantee
 from quakedesign.controllers import Law
@@ -183,9 +183,3 @@ def test_of_a_wrong_run_nothing_else_is_said(tmp_path):
     run = qd.simulate(LAB, qd.published("lab-fault")["elqr"], scheme="explicit", duration=0.01)
     with pytest.raises(ParameterError, match=r"path of Recording.save must be a text or a Path. Received 3"):
         run.save(3)
-
-
-def test_checking_twice_is_checking_once():
-    before = qd.simulate
-    check_arguments("quakedesign.simulation")
-    assert importlib.import_module("quakedesign.simulation").simulate is before

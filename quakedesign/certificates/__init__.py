@@ -1,9 +1,13 @@
 """Claims about closed loops, their files, and the exact decision."""
 
-from quakedesign.arguments import check_arguments
-from quakedesign.certificates.certificate import Certificate, load_certificate, parse_certificate
-from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Verdict, Witness, loop_of
-from quakedesign.certificates.files import certificate_text, save_certificate
+from typing import TYPE_CHECKING
+
+from quakedesign.faces import face
+
+if TYPE_CHECKING:
+    from quakedesign.certificates.certificate import Certificate, load_certificate, parse_certificate
+    from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Verdict, Witness, loop_of
+    from quakedesign.certificates.files import certificate_text, save_certificate
 
 __all__ = [
     "Certificate",
@@ -19,4 +23,4 @@ __all__ = [
     "save_certificate",
 ]
 
-check_arguments(__name__)
+face(__name__)

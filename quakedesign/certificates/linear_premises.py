@@ -182,7 +182,8 @@ def _net_stress() -> sp.Expr:
     """σ' − p* at rest at r0 with friction μ, a disturbance that grows with slip, and a drift k̂v∞t."""
     balance = plant.shifted_acceleration().replace(plant.disturbance, lambda x, *_: _growth * x + _drift)
     balance = balance.replace(plant.mu, lambda *_: _mu).subs({plant.x1: _r, plant.x2: 0})
-    return sp.expand(plant.sigma - sp.solve(balance, plant.p)[0])
+    balance = sp.expand(balance)  # linear in p
+    return sp.expand(plant.sigma + balance.coeff(plant.p, 0) / balance.coeff(plant.p))
 
 
 def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]:

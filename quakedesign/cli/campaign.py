@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.cli.hardware import ActuatorOptions, SensorOptions
+from quakedesign.cli.options import FaultName
 from quakedesign.cli.shared import (
     Force,
     Gains,
@@ -29,7 +30,7 @@ _DIRECT, _EXACT = ActuatorOptions(), SensorOptions()
 
 @app.command
 def campaign(
-    fault: str,
+    fault: FaultName,
     /,
     *,
     samples: Whole,
@@ -67,8 +68,6 @@ def campaign(
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     samples
         Number of samples.
     controller

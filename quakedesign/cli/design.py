@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from quakedesign.cli.options import FaultName
 from quakedesign.cli.shared import (
     ExactMetres,
     ExactMetresPerSecond,
@@ -76,7 +77,7 @@ _AS_USUAL = DesignOptions()
 
 @app.command
 def design(
-    fault: str,
+    fault: FaultName,
     /,
     *,
     controller: str = "all",
@@ -95,8 +96,6 @@ def design(
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     controller
         cta, dia, elqr or all.
     box

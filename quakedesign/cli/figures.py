@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from quakedesign.cli.design import DesignOptions, controllers, positive
+from quakedesign.cli.options import FaultName
 from quakedesign.cli.shared import Force, Json, app, console, print_json, print_lines, progress
 
 _AS_USUAL = DesignOptions()
@@ -10,7 +11,7 @@ _AS_USUAL = DesignOptions()
 
 @app.command
 def compare(
-    fault: str,
+    fault: FaultName,
     /,
     *,
     controller: str = "all",
@@ -25,8 +26,6 @@ def compare(
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     controller
         Law to design: cta, dia, elqr or all.
     box
@@ -58,7 +57,7 @@ def compare(
 
 @app.command
 def figures(
-    fault: str,
+    fault: FaultName,
     /,
     *,
     controller: str = "all",
@@ -75,8 +74,6 @@ def figures(
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     controller
         Law to design: cta, dia, elqr or all.
     box

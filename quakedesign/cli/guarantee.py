@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from quakedesign.cli.options import FaultName
 from quakedesign.cli.shared import (
     ExactMetres,
     ExactMetresPerSecond,
@@ -22,7 +23,7 @@ from quakedesign.rationals import rational
 
 @app.command
 def guarantee(
-    fault: str,
+    fault: FaultName,
     /,
     *,
     controller: str = "elqr",
@@ -49,8 +50,6 @@ def guarantee(
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     controller
         elqr, or a sliding mode: cta, dia.
     objective

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.cli.hardware import ActuatorOptions, EstimateOptions, SensorOptions
+from quakedesign.cli.options import FaultName
 from quakedesign.cli.shared import (
     Force,
     Gains,
@@ -11,6 +12,7 @@ from quakedesign.cli.shared import (
     MetresPerSecond,
     Push,
     Seconds,
+    Texts,
     Whole,
     app,
     console,
@@ -26,7 +28,7 @@ _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
 
 @app.command
 def simulate(
-    fault: str,
+    fault: FaultName,
     /,
     *,
     controller: str = "none",
@@ -57,8 +59,6 @@ def simulate(
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     controller
         none, cta, dia or elqr.
     gains
@@ -172,13 +172,13 @@ def _print_run(trajectory: Any, fault: Any, premises: Any) -> None:
 
 @app.command
 def sampling(
-    fault: str,
+    fault: FaultName,
     /,
     *,
     controller: str = "cta",
     gains: Gains = ("designed",),
-    scale: Gains = (),
-    schemes: Gains = ("explicit", "implicit", "semi-implicit", "compensated"),
+    scale: Texts = (),
+    schemes: Texts = ("explicit", "implicit", "semi-implicit", "compensated"),
     duration: Seconds | None = None,
     out: Path | None = None,
     force: Force = False,
@@ -191,8 +191,6 @@ def sampling(
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     controller
         cta, dia or elqr.
     gains
@@ -239,7 +237,7 @@ def sampling(
 
 @app.command
 def export(
-    fault: str,
+    fault: FaultName,
     /,
     *,
     controller: str = "cta",
@@ -257,8 +255,6 @@ def export(
 
     Parameters
     ----------
-    fault
-        Preset or path of a .toml file.
     controller
         cta, dia or elqr.
     gains

@@ -1,6 +1,6 @@
 """Options that several commands share, each told once."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -8,7 +8,17 @@ from cyclopts import Parameter
 
 from quakedesign.cli.shared import print_json, print_lines
 
-FaultName = Annotated[str, Parameter(help="Preset (real-fault, lab-fault) or path of a .toml file.")]
+
+def _fault_name(_type: Any, tokens: Sequence[Any]) -> str:
+    """Name of a fault, refused before anything else is loaded if there is none."""
+    from quakedesign.fault.sources import require_source
+
+    return require_source(tokens[0].value)
+
+
+FaultName = Annotated[
+    str, Parameter(help="Preset (real-fault, lab-fault) or path of a .toml file.", converter=_fault_name)
+]
 Box = Annotated[str | None, Parameter(help="Uncertainty box: paper or ten-percent.")]
 Force = Annotated[bool, Parameter(negative="", help="Replace what an earlier run has written.")]
 

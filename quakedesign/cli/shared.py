@@ -18,8 +18,19 @@ from quakedesign.text import visible
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Force = Annotated[bool, Parameter(negative="")]
-# Negative decimals are values anyhow; with leading hyphens allowed, options after the gains would be gains too.
-Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
+# Negative decimals are values anyhow; with leading hyphens allowed, options after the values would be values too.
+Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
+
+
+def _gains(_type: Any, tokens: Sequence[Any]) -> tuple[str, ...]:
+    """One word, or numbers as they are written."""
+    texts = tuple(token.value for token in tokens)
+    for place, text in enumerate(texts if len(texts) > 1 else (), start=1):
+        rational(text, f"gain k{place}")
+    return texts
+
+
+Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_gains)]
 
 
 def _reader(unit: str) -> Callable[[Any, Sequence[Any]], float]:

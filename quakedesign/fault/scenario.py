@@ -2,23 +2,20 @@
 
 import tomllib
 from dataclasses import MISSING, fields
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from quakedesign.errors import ScenarioError, UnknownNameError
+from quakedesign.errors import ScenarioError
 from quakedesign.fault.checks import Problems, require_name, require_positive
 from quakedesign.fault.defaults import completed
 from quakedesign.fault.disturbance import Disturbance
 from quakedesign.fault.friction import friction_law
 from quakedesign.fault.parameters import Fault, require_plant
+from quakedesign.fault.sources import LARGEST_FILE, source_text
 from quakedesign.fault.tables import Table
 from quakedesign.fault.uncertainty import UncertaintyBox, uncertainty_box
-from quakedesign.input import read_text
 from quakedesign.rationals import rational
-from quakedesign.text import nearest_name
 
-_LARGEST_FILE = 1 << 16  # reading a key of many dots takes the square of its length
 PLANT = {
     "density": "kg/m^3",
     "shear_modulus": "Pa",
@@ -39,12 +36,6 @@ WIDTHS = ("stiffness", "damping", "authority")
 OPTIONAL = ("damping", "width")  # of the plant
 _NO_SOURCE = "no source given"
 _UNDISTURBED = "no disturbance; what is guaranteed holds without one"
-
-
-def presets() -> list[str]:
-    """Names of the faults that come with the package."""
-    folder = files("quakedesign.fault") / "presets"
-    return sorted(p.name.removesuffix(".toml") for p in folder.iterdir() if p.name.endswith(".toml"))
 
 
 def load_fault(source: str | Path, *, box: str | None = None) -> Fault:
@@ -71,24 +62,13 @@ def load_fault(source: str | Path, *, box: str | None = None) -> Fault:
     UnitError, ParameterError
         For a wrong unit or an unphysical value.
     """
-    fault = parse_fault(_read(source), str(source))
+    fault = parse_fault(source_text(source), str(source))
     return fault.with_box(box) if box else fault
-
-
-def _read(source: str | Path) -> str:
-    if str(source) in presets():
-        return (files("quakedesign.fault") / "presets" / f"{source}.toml").read_text(encoding="utf-8")
-    if Path(source).suffix != ".toml":
-        raise UnknownNameError(
-            f"fault must be a preset ({', '.join(presets())}) or the path of a .toml file. Received {str(source)!r}."
-            + nearest_name(str(source), presets())
-        )
-    return read_text(source, "fault file", largest=_LARGEST_FILE, refusal=ScenarioError)
 
 
 def parse_fault(text: str, name: str) -> Fault:
     """Fault from the text of a TOML file; `name` names it in messages, all errors in one. Raises as `load_fault`."""
-    if len(text) > _LARGEST_FILE:
+    if len(text) > LARGEST_FILE:
         raise ScenarioError(f"{name}: a fault file must be at most 64 KiB. Received {len(text)} characters.")
     try:
         raw = tomllib.loads(text)

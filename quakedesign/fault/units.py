@@ -8,6 +8,36 @@ from typing import Any
 from quakedesign.errors import UnitError
 from quakedesign.text import shown
 
+_TIMES = {"s": "1", "ms": "0.001", "us": "0.000001", "min": "60", "h": "3600", "hour": "3600", "day": "86400"}
+_LENGTHS = {"m": "1", "cm": "0.01", "mm": "0.001", "um": "0.000001", "nm": "1E-9", "km": "1000"}
+_PLAIN: dict[str, dict[str, str]] = {
+    "": {"": "1"},
+    "s": _TIMES,
+    "m": _LENGTHS,
+    "m/s": {f"{unit}/s": size for unit, size in _LENGTHS.items()},
+    "m/s^2": {"m/s^2": "1"},
+    "Pa": {"Pa": "1", "kPa": "1000", "MPa": "1000000", "GPa": "1E+9"},
+    "Pa/s": {"Pa/s": "1", "kPa/s": "1000", "MPa/s": "1000000"},
+    "kg/m^3": {"kg/m^3": "1"},
+    "kg/s": {"kg/s": "1"},
+    "m^2/s": {"m^2/s": "1"},
+    "m^3/Pa": {"m^3/Pa": "1"},
+    "rad/s": {"rad/s": "1"},
+    "Hz": {"Hz": "1", "kHz": "1000"},
+    "1/s": {"1/s": "1"},
+    "1/s^2": {"1/s^2": "1"},
+}
+"""Sizes of the usual units in SI units: pint, which knows all others and says the same of these, loads for half a
+second."""
+_WRITTEN = re.compile(r"([+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d{1,3})?)(?: ([A-Za-z1][A-Za-z0-9/^]*))?", re.ASCII)
+
+
+def _plain(quantity: Any, unit: str) -> Decimal | None:
+    """Value of a number with a usual unit; None for anything else."""
+    found = _WRITTEN.fullmatch(quantity) if isinstance(quantity, str) and len(quantity) <= 100 else None
+    size = _PLAIN.get(unit, {}).get(found[2] or "") if found else None
+    return Decimal(found[1]) * Decimal(size) if found and size else None
+
 
 @cache
 def _registry() -> Any:
@@ -38,8 +68,8 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
         For an unknown unit, a wrong dimension, a missing unit or no number at all; and for hertz where an
         angular frequency is wanted, because pint takes 1 Hz for 1 rad/s.
     """
-    import pint
-
+    if (known := _plain(quantity, unit)) is not None:
+        return float(known)
     wanted = f"a quantity in {unit}, such as {_example(unit)!r}" if unit else "a plain number"
     received = f"{name} must be {wanted}. Received {shown(quantity)}"
     if isinstance(quantity, bool) or not isinstance(quantity, str | int | float):
@@ -48,6 +78,8 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
         return _plain_number(quantity, unit, received)
     if len(quantity) > 100:
         raise UnitError(f"{name} must be {wanted}. Received a text of {len(quantity)} characters.")
+    import pint
+
     try:
         parsed = _registry().Quantity(quantity)
         converted = parsed.to(unit or "dimensionless") if not (unit and parsed.unitless) else None

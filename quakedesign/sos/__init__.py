@@ -1,20 +1,17 @@
-"""Positivity of polynomials with exact proofs; knows nothing of faults."""
+"""Positivity of polynomials with exact proofs; knows nothing of faults. What decides needs no solver."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from quakedesign.arguments import check_arguments, checked
-from quakedesign.sos.exact.answer import Answer, Positivity
-from quakedesign.sos.exact.polynomial import Polynomial
-from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares, holds
-from quakedesign.sos.exact.statement import Statement, statement
+from quakedesign.faces import face
 
-_SEARCH = {
-    "prove": "engine",
-    "decide": "engine",
-    "Program": "program",
-    "largest": "program",
-    "Membership": "membership",
-}
+if TYPE_CHECKING:
+    from quakedesign.sos.exact.answer import Answer, Positivity
+    from quakedesign.sos.exact.polynomial import Polynomial
+    from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares, holds
+    from quakedesign.sos.exact.statement import Statement, statement
+
+    def __getattr__(name: str) -> Any: ...
+
 
 __all__ = [
     "Answer",
@@ -34,14 +31,12 @@ __all__ = [
     "statement",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Part of the search, loaded on first use: what decides needs no solver."""
-    if name not in _SEARCH:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    return checked(getattr(import_module(f"quakedesign.sos.solve.{_SEARCH[name]}"), name))
-
-
-check_arguments(__name__)
+_SEARCH = "quakedesign.sos.solve"  # no import, not even for type checkers: what decides knows no solver
+face(
+    __name__,
+    prove=f"{_SEARCH}.engine",
+    decide=f"{_SEARCH}.engine",
+    Program=f"{_SEARCH}.program",
+    largest=f"{_SEARCH}.program",
+    Membership=f"{_SEARCH}.membership",
+)

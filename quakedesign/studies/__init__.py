@@ -1,9 +1,13 @@
 """Questions that several rooms answer together."""
 
-from quakedesign.arguments import check_arguments
-from quakedesign.studies.fault_limits import Limit, Limits, limits
-from quakedesign.studies.objectives import FrontPoint, objective_front
+from typing import TYPE_CHECKING
+
+from quakedesign.faces import face
+
+if TYPE_CHECKING:
+    from quakedesign.studies.fault_limits import Limit, Limits, limits
+    from quakedesign.studies.objectives import FrontPoint, objective_front
 
 __all__ = ["FrontPoint", "Limit", "Limits", "limits", "objective_front"]
 
-check_arguments(__name__)
+face(__name__)

@@ -5,10 +5,11 @@ from math import isfinite
 from typing import Any
 
 from quakedesign.bounds import LowerBound
+from quakedesign.certificates.guarantee import task_of
+from quakedesign.certificates.impossibility import longest_reaction
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault, fault_toml
 from quakedesign.rationals import rational
-from quakedesign.studies import limits
 from quakedesign.studies.needed_pressure import need_sentence, needed_pressure, ways
 from quakedesign.symbolic import derive
 from quakedesign.synthesis.analysis.sampling_adequacy import LARGEST_PRODUCT, SamplingAdequacy, sampling_adequacy
@@ -87,7 +88,8 @@ def sampling_sentence(found: SamplingAdequacy) -> str:
 def beyond_control(fault: Fault) -> list[str]:
     """That no controller can hold a fault at its T_s, where that is proved."""
     try:
-        longest = limits(fault, prove=False).largest_step.impossible_beyond
+        task = task_of(fault)
+        longest = longest_reaction(task, task.normal_stress)
     except (ParameterError, UnsupportedError):  # friction with a state, or that nothing can be proved with
         return []
     if longest is None or rational(fault.sampling_time) <= longest:

@@ -1,11 +1,15 @@
 """The pressure that a task needs at equilibrium, and whether a run had it."""
 
+from typing import TYPE_CHECKING
+
 from quakedesign.bounds import Enclosure
 from quakedesign.certificates.linear_premises import equilibrium_pressure
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.simulation import Trajectory
+
+if TYPE_CHECKING:
+    from quakedesign.simulation import Trajectory
 
 _MARGIN = 0.01
 """Of the range that is needed: what is closer to zero, or to the range, makes no difference."""
@@ -40,13 +44,13 @@ def need_sentence(needed: Enclosure) -> str:
     return f"pressure at equilibrium along the reference {ends} (p < 0 is withdrawal): {taken}"
 
 
-def pressure_extremes(run: Trajectory) -> tuple[float, float] | None:
+def pressure_extremes(run: "Trajectory") -> tuple[float, float] | None:
     """Least and largest pressure [Pa] of a run; None without a controller, and for one that diverged."""
     least, largest = run.metrics.min_pressure, run.metrics.max_pressure
     return None if least is None or largest is None else (least, largest)
 
 
-def shortfall(run: Trajectory, fault: Fault) -> str | None:
+def shortfall(run: "Trajectory", fault: Fault) -> str | None:
     """Pressure that the reference of a run needs at equilibrium and the run never had; None for a run that tracked."""
     extremes = pressure_extremes(run)
     if run.reference is None or extremes is None or run.outcome.kind == "tracked":

@@ -1,14 +1,18 @@
 """SymPy derivations: signed powers, plant, error dynamics, homogeneity, Filippov fields, cells, lifts, enclosures."""
 
-from quakedesign.arguments import check_arguments
-from quakedesign.symbolic.filippov import FilippovField, filippov_derivative
-from quakedesign.symbolic.homogeneity import Homogeneity, dilate, homogeneous
-from quakedesign.symbolic.lifting import lift
-from quakedesign.symbolic.model import Model, derive
-from quakedesign.symbolic.normal_form import normal_form, solve_signed
-from quakedesign.symbolic.set_valued import SetValued, restrict
-from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, off_kinks
-from quakedesign.symbolic.weights import weights_for
+from typing import TYPE_CHECKING
+
+from quakedesign.faces import face
+
+if TYPE_CHECKING:
+    from quakedesign.symbolic.filippov import FilippovField, filippov_derivative
+    from quakedesign.symbolic.homogeneity import Homogeneity, dilate, homogeneous
+    from quakedesign.symbolic.lifting import lift
+    from quakedesign.symbolic.model import Model, derive
+    from quakedesign.symbolic.normal_form import normal_form, solve_signed
+    from quakedesign.symbolic.set_valued import SetValued, restrict
+    from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, off_kinks
+    from quakedesign.symbolic.weights import weights_for
 
 __all__ = [
     "AbsolutePower",
@@ -29,4 +33,4 @@ __all__ = [
     "weights_for",
 ]
 
-check_arguments(__name__)
+face(__name__)

@@ -10,6 +10,7 @@ import sympy as sp
 
 from quakedesign.fault import Fault, FrictionLaw
 from quakedesign.rationals import rational
+from quakedesign.symbolic.kept import kept
 
 t = sp.Symbol("t", nonnegative=True)
 x1, x2 = sp.symbols("x_1 x_2", real=True)
@@ -55,7 +56,7 @@ def force_balance() -> sp.Eq:
     return sp.Eq(m * acceleration, -friction_force + k * (far - z) - eta * v + m * disturbance(z, v, t))
 
 
-@cache
+@kept
 def shifted_acceleration() -> sp.Expr:
     """x2' of eq. shift: the force balance measured from the equilibrium without pressure and disturbance."""
     z, v, acceleration, far, z_star = sp.symbols("z v a delta_far z^*", real=True)
@@ -95,7 +96,7 @@ def jacobian() -> sp.Matrix:
     return field.jacobian([x1, x2]).subs(named).subs({x1: 0, x2: 0})
 
 
-@cache
+@kept
 def instability() -> sp.Or:
     """Condition for an unstable origin: det J < 0 or trace J > 0, solved for k̂ and η̂ (ERRATA 2)."""
     J = jacobian()
@@ -146,7 +147,7 @@ r0, r1, r2, r3 = sp.symbols("r_0 r_1 r_2 r_3", real=True)
 acceleration_error = sp.Symbol(r"\dot{e}_2", real=True)
 
 
-@cache
+@kept
 def matched_rate() -> sp.Expr:
     """h' along a solution, in values of friction, its slopes, the reference and its derivatives, and e1, e2, e2'.
 

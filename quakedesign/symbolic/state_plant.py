@@ -11,6 +11,7 @@ import sympy as sp
 from quakedesign.errors import UnsupportedError
 from quakedesign.fault import FrictionLaw
 from quakedesign.symbolic import plant
+from quakedesign.symbolic.kept import kept
 from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, mu_star, p, sigma
 
 loading_rate = sp.Symbol(r"v_\infty", nonnegative=True)
@@ -34,7 +35,7 @@ def _state_rates(names: tuple[str, ...]) -> list[sp.Expr]:
     return [sp.Function(rf"g_{name}", real=True)(plant.x1, rate, *state_symbols(names)) for name in names]
 
 
-@cache
+@kept
 def sliding_acceleration(names: tuple[str, ...] = ()) -> sp.Expr:
     """v' [m/s²] of the force balance, measured from sliding at v_∞ without pressure and disturbance.
 
@@ -72,7 +73,7 @@ def slope_symbols(names: tuple[str, ...] = ()) -> dict[sp.Expr, sp.Symbol]:
     return found
 
 
-@cache
+@kept
 def jacobian(names: tuple[str, ...] = ()) -> sp.Matrix:
     """Jacobian of (x1, v, states) in the slopes of `slope_symbols`, at a pressure p that the far end balances."""
     quiet = sliding_acceleration(names).replace(plant.disturbance, lambda *_: sp.Integer(0))
@@ -104,7 +105,7 @@ def _tidy(expression: sp.Expr) -> sp.Expr:
     return sp.factor(expression) if expression.is_rational_function() else expression
 
 
-@cache
+@kept
 def characteristic(names: tuple[str, ...] = (), *, inertia: bool = True) -> tuple[sp.Expr, ...]:
     """Coefficients of det(λE − J), highest power first, in the slopes and `effective_stress`.
 

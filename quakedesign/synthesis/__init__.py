@@ -1,13 +1,17 @@
 """Every search: gains with a proof, and verdicts on given gains."""
 
-from quakedesign.arguments import check_arguments
-from quakedesign.sos.solve.conic import stated_problems
-from quakedesign.synthesis.analysis.certify import certify
-from quakedesign.synthesis.design import Design, assess, design
-from quakedesign.synthesis.gains.synthesise import synthesise
-from quakedesign.synthesis.guarantee import answer
-from quakedesign.synthesis.methods.base import designable
+from typing import TYPE_CHECKING
+
+from quakedesign.faces import face
+
+if TYPE_CHECKING:
+    from quakedesign.sos.solve.conic import stated_problems
+    from quakedesign.synthesis.analysis.certify import certify
+    from quakedesign.synthesis.design import Design, assess, design
+    from quakedesign.synthesis.gains.synthesise import synthesise
+    from quakedesign.synthesis.guarantee import answer
+    from quakedesign.synthesis.methods.base import designable
 
 __all__ = ["Design", "answer", "assess", "certify", "design", "designable", "stated_problems", "synthesise"]
 
-check_arguments(__name__)
+face(__name__)

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from quakedesign.errors import UnitError
+from quakedesign.fault import units
 from quakedesign.fault.units import si_value
 
 
@@ -81,3 +82,28 @@ def test_wrong_quantities(quantity, unit, reason):
 def test_hertz_are_not_silently_radians_per_second(quantity):
     with pytest.raises(UnitError, match=r"must be an angular frequency in rad/s\. Received .* Give 2π times it"):
         si_value(quantity, "rad/s", "frequency")
+
+
+USUAL = [(unit, each) for unit, sizes in units._PLAIN.items() for each in sizes]
+NUMBERS = [
+    "0",
+    "-0",
+    "30",
+    "5E-3",
+    "-2.7",
+    "+3",
+    "0.1",
+    "1e400",
+    "1e-400",
+    "3.14159265358979323846264338327950288",
+    "1e22",
+]
+
+
+@pytest.mark.parametrize(("unit", "written"), USUAL)
+def test_pint_says_the_same_of_usual_units(unit, written, monkeypatch):
+    texts = [f"{number} {written}".strip() for number in NUMBERS]
+    assert all(units._plain(text, unit) is not None for text in texts)
+    usual = [si_value(text, unit, "it") for text in texts]
+    monkeypatch.setattr(units, "_PLAIN", {})
+    assert list(map(repr, usual)) == [repr(si_value(text, unit, "it")) for text in texts]

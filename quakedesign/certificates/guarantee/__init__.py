@@ -1,10 +1,14 @@
 """Peaks of the loop that runs, proved: `task` reads the fault, `norms` the loop, `theorem` joins them."""
 
-from quakedesign.arguments import check_arguments
-from quakedesign.certificates.guarantee.continuous import ContinuousPeaks, continuous_peaks
-from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held, guarantee
-from quakedesign.certificates.guarantee.task import Task, task_of
-from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
+from typing import TYPE_CHECKING
+
+from quakedesign.faces import face
+
+if TYPE_CHECKING:
+    from quakedesign.certificates.guarantee.continuous import ContinuousPeaks, continuous_peaks
+    from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held, guarantee
+    from quakedesign.certificates.guarantee.task import Task, task_of
+    from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
 
 __all__ = [
     "Bounds",
@@ -20,4 +24,4 @@ __all__ = [
     "task_of",
 ]
 
-check_arguments(__name__)
+face(__name__)

@@ -1,12 +1,16 @@
 """Campaigns: many samples of one closed loop, in batches that survive whatever stops them."""
 
-from quakedesign.arguments import check_arguments
-from quakedesign.simulation.campaign.crews import SerialExecutor
-from quakedesign.simulation.campaign.problem import Problem, SampleResult
-from quakedesign.simulation.campaign.result import Campaign, Failure
-from quakedesign.simulation.campaign.running import campaign_problem, run_campaign
-from quakedesign.simulation.campaign.search import Worst
-from quakedesign.simulation.campaign.space import Sample, Space
+from typing import TYPE_CHECKING
+
+from quakedesign.faces import face
+
+if TYPE_CHECKING:
+    from quakedesign.simulation.campaign.crews import SerialExecutor
+    from quakedesign.simulation.campaign.problem import Problem, SampleResult
+    from quakedesign.simulation.campaign.result import Campaign, Failure
+    from quakedesign.simulation.campaign.running import campaign_problem, run_campaign
+    from quakedesign.simulation.campaign.search import Worst
+    from quakedesign.simulation.campaign.space import Sample, Space
 
 __all__ = [
     "Campaign",
@@ -21,4 +25,4 @@ __all__ = [
     "run_campaign",
 ]
 
-check_arguments(__name__)
+face(__name__)

@@ -1,0 +1,73 @@
+"""The face of a room: its public names, each loaded when it is asked for, and checking its arguments from then on.
+
+A room imports its public names under ``TYPE_CHECKING``, where tools and people find them, and ends in ``face``.
+"""
+
+import ast
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
+
+from quakedesign.arguments import check_arguments, checked
+
+_CLASSES: dict[str, list[str]] = {}
+"""Public names by the module that defines them: its classes check their arguments as soon as it is loaded."""
+
+
+class _Face(ModuleType):
+    """A room whose public names are loaded when they are asked for."""
+
+    _homes: dict[str, str]
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self._homes:
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        value = checked(getattr(import_module(self._homes[name]), name))
+        self.__dict__[name] = value
+        return value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Take a module of the room that Python has loaded; a public name of the same spelling goes before it."""
+        if isinstance(value, ModuleType) and value.__name__ == f"{self.__name__}.{name}":
+            for public in _CLASSES.get(value.__name__, ()):
+                if isinstance(vars(value).get(public), type):
+                    checked(vars(value)[public])
+            if name in self._homes:
+                return
+        super().__setattr__(name, value)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*self.__dict__, *self._homes})
+
+
+def face(room: str, **elsewhere: str) -> None:
+    """Load the public names of a room when they are asked for; those that it has already check their arguments too.
+
+    Parameters
+    ----------
+    room : str
+        Name of the package.
+    **elsewhere : str
+        Where those names are defined that it does not import for type checkers.
+    """
+    module = sys.modules[room]
+    homes = _homes(room) | elsewhere
+    for name, home in homes.items():
+        _CLASSES.setdefault(home, []).append(name)
+    module.__dict__["_homes"] = homes
+    module.__class__ = _Face
+    if hasattr(module, "__all__"):
+        check_arguments(room)
+
+
+def _homes(room: str) -> dict[str, str]:
+    """Where the names are defined that a room imports for type checkers alone."""
+    spec = find_spec(room)
+    loader: Any = spec.loader if spec else None
+    blocks = (node for node in ast.parse(loader.get_source(room)).body if isinstance(node, ast.If))
+    imports = (node for block in blocks if ast.unparse(block.test) == "TYPE_CHECKING" for node in block.body)
+    return {
+        alias.name: str(node.module) for node in imports if isinstance(node, ast.ImportFrom) for alias in node.names
+    }
