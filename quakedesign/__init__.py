@@ -26,6 +26,7 @@ _HOME = {
     "limits": "studies",
     "load_certificate": "certificates",
     "load_fault": "fault",
+    "loop_transfer": "simulation.linear_models",
     "published": "controllers",
     "run_campaign": "simulation.campaign",
     "scaled_fault": "fault",
@@ -34,6 +35,7 @@ _HOME = {
     "synthesise": "synthesis",
     "to_casadi": "simulation",
     "to_iosystem": "simulation",
+    "to_statespace": "simulation.linear_models",
 }
 
 __all__ = list(_HOME)

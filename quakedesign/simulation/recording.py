@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from quakedesign.errors import ParameterError
 from quakedesign.output import write_whole
 
 CONVENTIONS = "CF-1.11"
@@ -53,6 +54,28 @@ class Recording(ABC):
         for variable in found.variables.values():
             variable.encoding["_FillValue"] = None
         return found
+
+    def resample(self, dt: float) -> Any:
+        """Return an xarray Dataset at uniform instants, as filters and spectra need them, interpolated linearly.
+
+        Parameters
+        ----------
+        dt : float
+            [s]. No shorter than the mean distance of the instants that are kept, between which nothing is known.
+
+        Raises
+        ------
+        ParameterError
+            For a shorter one, or one longer than the run.
+        """
+        duration, kept = float(self.time[-1] - self.time[0]), max(len(self.time) - 1, 1)
+        if not duration / kept * (1 - 1e-9) <= dt <= duration:
+            raise ParameterError(
+                f"dt must be between {duration / kept:.4g} s, the mean distance of the instants that are kept, and "
+                f"{duration:.4g} s, the run. Received {dt!r}. Ask simulate for more samples."
+            )
+        count = int(duration / dt * (1 + 1e-12)) + 1
+        return self.to_xarray().interp(time=self.time[0] + dt * np.arange(count))
 
     def to_pandas(self) -> Any:
         """Return a pandas DataFrame over the time [s]; the columns carry their units."""

@@ -1,0 +1,107 @@
+"""Linear models for python-control against closed forms, automatic derivatives and another discretisation."""
+
+import math
+
+import casadi as ca
+import control
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+import quakedesign as qd
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.simulation.linear_models import resting_pressure
+
+REAL = qd.load_fault("real-fault")
+LAW = qd.published("real-fault")["elqr"]
+
+
+def closed_form(slip):
+    """Slope of the acceleration in slip, and in pressure, at rest at a slip: the force balance by hand."""
+    drop, length = REAL.friction.drop, REAL.friction.critical_slip
+    mu, start = REAL.friction.residual + drop * math.exp(-slip / length), REAL.friction.residual + drop
+    area, mass, stress = 25e6, 2500 * 125e9, 50e6
+    k = 30e9 * 5e3
+    effective = (start * stress - k * slip / area) / mu
+    fall = drop / length * math.exp(-slip / length)
+    growth = REAL.disturbance.slip_growth
+    return fall * effective * area / mass - k / mass + growth, mu * area / mass, stress - effective
+
+
+@pytest.mark.parametrize("slip", [0.0, 0.1, 0.785])
+def test_a_fault_about_rest_is_that_of_the_force_balance(slip):
+    plant = qd.to_statespace(REAL, slip)
+    steep, push, pressure = closed_form(slip)
+    assert resting_pressure(REAL, slip) == pytest.approx(pressure, rel=1e-12, abs=1e-6)
+    assert plant.A == pytest.approx(np.array([[0, 1], [steep, -1.6]]), rel=1e-12)
+    assert plant.B[:, 0] == pytest.approx([0, push], rel=1e-12)
+    assert (plant.input_labels, plant.output_labels) == (["p"], ["slip", "slip_rate"])
+    assert (plant.state_labels, plant.name) == (["slip", "slip_rate"], "real-fault")
+
+
+def test_the_loop_has_the_poles_of_the_closed_loop():
+    field = qd.to_casadi(REAL, LAW)
+    time, state = ca.SX.sym("t"), ca.SX.sym("x", 4)
+    slopes = ca.Function("A", [state], [ca.substitute(ca.jacobian(field(time, state)[0], state), time, 0)])
+    expected = np.linalg.eigvals(slopes([0, 0, 0, 0]).full())
+    found = control.feedback(qd.loop_transfer(REAL, LAW), 1).poles()
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(expected), rel=1e-7)
+
+
+def test_margins_are_where_the_loop_loses_stability():
+    loop = qd.loop_transfer(REAL, LAW)
+    lower = control.stability_margins(loop)[0]  # an unstable plant: it may not be pushed less than this
+    B = loop.B @ loop.C
+
+    def growth(factor):
+        return np.linalg.eigvals(loop.A - factor * B).real.max()
+
+    edge = brentq(growth, 1e-3, 0.5, xtol=1e-12)
+    assert lower == pytest.approx(edge, rel=1e-6)
+
+
+def test_a_law_of_samples_meets_a_fault_that_is_held():
+    design = qd.design(REAL, "elqr")
+    loop = qd.loop_transfer(REAL, design.controller)
+    assert loop.dt == pytest.approx(0.184)
+    steep, push, _ = closed_form(0.0)
+    held = expm(np.array([[0, 1, 0], [steep, -1.6, push], [0, 0, 0]]) * 0.184)
+    law = qd.to_iosystem(design.controller)
+    n = law.nstates
+
+    def closed(z):  # one period, step by step
+        x, own = z[:2], z[2:]
+        seen = np.array([*x, 0.0, 0.0])
+        return np.concatenate(
+            [held[:2, :2] @ x + held[:2, 2] * law.output(0, own, seen)[0], law.dynamics(0, own, seen)]
+        )
+
+    expected = np.linalg.eigvals(np.column_stack([closed(e) for e in np.eye(2 + n)]))
+    found = control.feedback(loop, 1).poles()
+    assert np.sort(abs(found)) == pytest.approx(np.sort(abs(expected)), abs=1e-7)
+    assert max(abs(found)) < 1
+    gain, phase = control.stability_margins(loop)[:2]
+    assert gain < 1
+    assert phase > 0
+
+
+def test_what_is_not_linear_has_no_transfer_function():
+    with pytest.raises(UnsupportedError, match=r"needs a linear law. Received cta"):
+        qd.loop_transfer(REAL, qd.published("real-fault")["cta"])
+    with pytest.raises(ParameterError, match=r"at must be"):
+        qd.to_statespace(REAL, float("nan"))
+
+
+def test_a_run_is_resampled_at_uniform_instants():
+    run = qd.simulate(REAL, duration=30.0, step=0.01)
+    even = run.resample(0.05)
+    steps = np.diff(even.time.values)
+    assert steps == pytest.approx(np.full(600, 0.05), rel=1e-9)
+    assert even.slip.attrs["units"] == "m"
+    inside = even.time.values[::60]
+    assert even.slip.values[::60] == pytest.approx(np.interp(inside, run.time, run.slip), rel=1e-12, abs=1e-15)
+    assert even.slip.values[-1] == pytest.approx(run.slip[-1], rel=1e-6)
+    for wrong in (0.0, 1e-3, 31.0, float("nan")):
+        with pytest.raises(ParameterError, match=r"dt must be between"):
+            run.resample(wrong)
