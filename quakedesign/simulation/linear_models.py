@@ -111,7 +111,7 @@ def _linear(system: Any) -> Any:
     )
     if not straight:
         raise UnsupportedError(
-            f"a loop transfer function needs a linear law. Received {system.name}. Use describing functions, or simulate."
+            f"a loop transfer function needs a linear law. Received {system.name}. Simulate it."
         )
     A, B, C, D = once[:n, :n], once[:n, n : n + 2], once[n:, :n], once[n:, n : n + 2]
     return control.ss(A, B, C, D, system.dt or 0, inputs=["slip", "slip_rate"], outputs=["p"], name=system.name)
