@@ -110,8 +110,6 @@ def _linear(system: Any) -> Any:
         np.abs(twice - 2 * once).max() <= _LINEAR * size and np.abs(mixed - once.sum(axis=1)).max() <= _LINEAR * size
     )
     if not straight:
-        raise UnsupportedError(
-            f"a loop transfer function needs a linear law. Received {system.name}. Simulate it."
-        )
+        raise UnsupportedError(f"a loop transfer function needs a linear law. Received {system.name}. Simulate it.")
     A, B, C, D = once[:n, :n], once[:n, n : n + 2], once[n:, :n], once[n:, n : n + 2]
     return control.ss(A, B, C, D, system.dt or 0, inputs=["slip", "slip_rate"], outputs=["p"], name=system.name)
