@@ -7,7 +7,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates.command import check_files
 from quakedesign.controllers import published
-from quakedesign.errors import OutputError, UnknownNameError
+from quakedesign.errors import OutputError, ParameterError, UnknownNameError
 from quakedesign.synthesis.linear.analysis.verdict import judge
 
 LAB = qd.load_fault("lab-fault")
@@ -30,6 +30,10 @@ def test_every_proof_of_the_published_gains_is_a_file_that_checks(tmp_path):
     assert judged.save(out, force=True) == paths
 
 
-def test_an_unknown_class_is_refused():
+def test_what_cannot_be_asked_is_refused_before_the_work(monkeypatch):
+    for place in ("analysis.verdict.linear_facts", "sampled.held.largest_step"):
+        monkeypatch.setattr(f"quakedesign.synthesis.linear.{place}", lambda *_, **__: pytest.fail("worked"))
     with pytest.raises(UnknownNameError, match="amplitude, rate"):
         judge(LAB, published("lab-fault")["elqr"], peaks="any")
+    with pytest.raises(ParameterError, match="step must be positive"):
+        judge(LAB, published("lab-fault")["elqr"], step=-1)

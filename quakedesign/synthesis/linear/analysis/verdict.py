@@ -123,8 +123,8 @@ def judge(
     """
     fault.require_memoryless("a verdict on gains")
     period = rational(fault.sampling_time if step is None else step, "step")
-    held = held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), period)
     bounded = certified_peaks(fault, controller, disturbance_class=peaks) if peaks is not None else None
+    held = held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), period)
     return LinearVerdict(
         fault=fault,
         controller=controller,

@@ -8,6 +8,7 @@ from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Verdict
+from quakedesign.fault.checks import require_positive
 from quakedesign.rationals import rational
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.sampled.stability import hold_verdict, largest_radius, largest_step
@@ -106,19 +107,25 @@ def held_loop(problem: LinearProblem, gains: Sequence[Fraction], step: float | s
     gains : sequence of 4 Fraction
     step : number or text
         T_s [s].
+
+    Raises
+    ------
+    ParameterError
+        For a period that is not positive.
     """
-    period, longest = rational(step, "step"), largest_varying_step(problem, gains)
+    period = rational(step, "step")
+    require_positive("Give it in seconds.", step=period)
+    constant = {name: largest_step(problem, gains, integration=way) for name, way in INTEGRATIONS.items()}
+    longest = largest_varying_step(problem, gains, constant["summed"])
     return HeldLoop(
         runs=varying_verdict(problem, gains, period, known=longest),
         longest=longest,
         radius=largest_radius(problem, gains, float(period), "euler"),
-        constant={name: _constant(problem, gains, period, way) for name, way in INTEGRATIONS.items()},
-    )
-
-
-def _constant(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, integration: str) -> ConstantLoop:
-    longest = largest_step(problem, gains, integration=integration)
-    return ConstantLoop(
-        verdict=hold_verdict(problem, gains, step, integration=integration).verdict,
-        largest_step=longest.proved if longest else None,
+        constant={
+            name: ConstantLoop(
+                verdict=hold_verdict(problem, gains, period, integration=INTEGRATIONS[name]).verdict,
+                largest_step=reach.proved if reach else None,
+            )
+            for name, reach in constant.items()
+        },
     )

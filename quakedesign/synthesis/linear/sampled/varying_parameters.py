@@ -10,7 +10,7 @@ from quakedesign.rationals import rational
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Vertex
 from quakedesign.synthesis.linear.sampled.clock_dependent import DEGREE, ClockProof, clock_proof
 from quakedesign.synthesis.linear.sampled.input_delay import DelayProof, delay_proof
-from quakedesign.synthesis.linear.sampled.stability import hold_verdict, largest_step
+from quakedesign.synthesis.linear.sampled.stability import LargestStep, hold_verdict
 
 CLAIM = (
     "p held, integrals summed over the samples as in the scheme explicit, parameters measurable in time anywhere in "
@@ -100,18 +100,27 @@ def varying_verdict(
     return VaryingVerdict(verdict=Verdict.PROVED if proof else Verdict.UNDECIDED, step=period, proof=proof)
 
 
-def largest_varying_step(problem: LinearProblem, gains: Sequence[Fraction]) -> LargestVaryingStep | None:
+def largest_varying_step(
+    problem: LinearProblem, gains: Sequence[Fraction], constant: LargestStep | None
+) -> LargestVaryingStep | None:
     """Longest sampling period up to which the law that runs is proved.
 
     One V for all phases from short periods on, by bisection; then one that depends on the clock, range by range,
     towards the limit for constant parameters. Periods have four digits.
+
+    Parameters
+    ----------
+    problem : LinearProblem
+        In SI.
+    gains : sequence of 4 Fraction
+    constant : LargestStep or None
+        What is known for constant parameters and summed integrals.
 
     Returns
     -------
     LargestVaryingStep or None
         None when no range of periods was proved.
     """
-    constant = largest_step(problem, gains, integration="euler")
     if constant is None:
         return None
     first = _longest_delay(problem, gains, constant.proved)
