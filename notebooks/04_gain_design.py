@@ -59,7 +59,7 @@ for name, found in reach.items():
 # sets take as long again each; `benchmarks/synthesis.py` asks about all of them.)
 
 # %%
-rows = improvements("cta", ("norm", "beta"), against=(0,), degrees=(5,), starts=1)
+rows = improvements("cta", ("beta",), against=(0,), degrees=(5,), starts=1)
 pd.DataFrame(rows)[["objective", "published", "synthesised", "published_value", "value", "ratio"]]
 
 # %% [markdown]
@@ -69,7 +69,7 @@ pd.DataFrame(rows)[["objective", "published", "synthesised", "published_value", 
 
 # %%
 drawn = gain_map(
-    "cta", ("7", "5", "2.3", "1.1"), ("k1", "k2"), points=8, levels=("0.5", "1"), degree=5, interior=2, workers=1
+    "cta", ("7", "5", "2.3", "1.1"), ("k1", "k2"), points=6, levels=("0.5", "1"), degree=5, interior=2, workers=1
 )
 counts = {level: drawn.counts(i + 1) for i, level in enumerate(("0.5", "1"))}
 print(counts)

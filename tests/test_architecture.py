@@ -9,6 +9,7 @@ import re
 import runpy
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -86,8 +87,13 @@ def room(module):
     raise AssertionError(f"{module} is in no room of DESIGN.md")
 
 
+@cache
 def imports(path):
     """Every absolute name that a file imports anywhere, functions and ``import_module`` with a text included."""
+    return tuple(_imports(path))
+
+
+def _imports(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -103,7 +109,7 @@ def imports(path):
 
 def imported_modules(path):
     """Modules of the package that a file imports anywhere, those for type hints alone included."""
-    known = {module_name(p).removesuffix(".__init__") for p in PACKAGE.rglob("*.py")}
+    known = {module_name(p).removesuffix(".__init__") for p in SOURCES}
     for name in imports(path):
         yield from [n for n in (name, name.rpartition(".")[0]) if n in known][:1]
 

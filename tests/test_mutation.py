@@ -104,16 +104,16 @@ def test_defaults_of_fields_and_methods_are_changed_in_place(tmp_path):
 
 def test_a_rule_explains_what_tests_hold_and_leaves_no_check_out():
     explanations = tool.Explanations()
+    texts = {str(path.relative_to(tool.ROOT)): path.read_text(encoding="utf-8") for path in tool.ROOT.glob("**/*.py")}
     for rule in explanations.rules:
-        paths = [path for path in tool.ROOT.glob("**/*.py") if fnmatch(str(path.relative_to(tool.ROOT)), rule.module)]
-        rows = [row.strip() for path in paths for row in path.read_text(encoding="utf-8").splitlines()]
+        rows = [row.strip() for path, text in texts.items() if fnmatch(path, rule.module) for row in text.splitlines()]
         assert any(re.search(rule.line, row) for row in rows), rule.line
         for left_out in ("need(a <= B, 'c', d) → pass", "raise Refused → pass", "a <= B → True", "a <= B → False",
                          "spend(1) → pass", "budget.spend(1, 2) → pass"):  # fmt: skip
             assert not re.search(rule.mutation, left_out), left_out
         for held in rule.held:
             path, _, name = held.partition("::")
-            assert f"def {name}(" in (tool.ROOT / path).read_text(encoding="utf-8"), held
+            assert f"def {name}(" in texts[path], held
 
 
 def test_single_mutants_and_kinds_are_explained():

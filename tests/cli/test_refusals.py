@@ -6,11 +6,14 @@ import json
 import os
 import sys
 import time
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 from quakedesign.cli import main
+from quakedesign.errors import ParameterError
+from quakedesign.rationals import rational
 
 
 def run(capsys, *arguments):
@@ -71,14 +74,20 @@ def test_an_unknown_metric_is_refused_before_any_sample_runs(capsys, tmp_path):
     assert not folder.exists()
 
 
-def test_a_step_has_a_unit_or_is_a_fraction_of_seconds(capsys):
-    gains = ("1.88e9", "5.79e8", "1.02e6", "18.52")
+def test_a_step_has_a_unit_or_is_a_fraction_of_seconds(capsys, monkeypatch):
+    asked = ("certify", "elqr", "real-fault", "--gains", "1.88e9", "5.79e8", "1.02e6", "18.52", "--json", "--step")
+    code, out, _ = run(capsys, *asked, "92 ms")
+    assert (code, json.loads(out)["held"]["step"]) == (0, 0.092)
     steps = []
+
+    def told(*_, step, **__):
+        steps.append(rational(step, "step"))
+        raise ParameterError("that is all")
+
+    monkeypatch.setattr("quakedesign.synthesis.linear.analysis.verdict.judge", told)
     for written in ("92 ms", "23/250", "0.092", "9.2E-2"):
-        code, out, _ = run(capsys, "certify", "elqr", "real-fault", "--gains", *gains, "--step", written, "--json")
-        assert code == 0
-        steps.append(json.loads(out)["held"]["step"])
-    assert len(set(steps)) == 1
+        assert run(capsys, *asked, written)[0] == 2
+    assert steps == [Fraction(92, 1000)] * 4
 
 
 def test_a_proof_about_a_polynomial_says_nothing_about_a_fault(capsys, tmp_path):

@@ -9,7 +9,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.premises import Premise
 from quakedesign.errors import OutputError
 from quakedesign.fault import Reference
-from quakedesign.report import Entry, headline
+from quakedesign.report import Comparison, Entry, headline
 from quakedesign.report.folder import write_folder
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.synthesis import Design
@@ -20,7 +20,15 @@ def comparison():
     """The laboratory fault with a task of 20 s, so that all runs are short."""
     fault = qd.load_fault("lab-fault")
     fault = replace(fault, reference=Reference(target_slip=fault.reference.target_slip, operation_time=20.0))
-    return qd.compare(fault, [qd.design(fault, "elqr")])
+
+    def undecided(fault, law):
+        return Design(
+            fault=fault, name=law.name, verdict=Verdict.UNDECIDED, controller=law, certificate=None, premises=()
+        )
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("quakedesign.studies.comparison.assess", undecided)  # verdicts on them are another test's
+        yield qd.compare(fault, [qd.design(fault, "elqr")])
 
 
 def test_all_controllers_of_the_paper_and_all_designs_are_compared(comparison):
@@ -53,17 +61,21 @@ def test_every_axis_of_every_figure_has_a_label_with_a_unit(comparison):
         assert any("[" in axis.get_xlabel() for axis in figure.axes)
 
 
-def test_the_folder_appears_whole_and_is_not_overwritten(comparison, tmp_path):
+def test_the_folder_appears_whole_and_is_not_overwritten(comparison, tmp_path, monkeypatch):
     out = tmp_path / "results"
     write_folder(comparison, out, force=False)
     assert (out / "results.json").is_file()
+    assert len(list((out / "figures").iterdir())) == 5
     with pytest.raises(OutputError, match="--force"):
         write_folder(comparison, out, force=False)
+    monkeypatch.setattr(Comparison, "figures", lambda _: {})
     write_folder(comparison, out, force=True)
+    assert list((out / "figures").iterdir()) == []
     assert [p.name for p in tmp_path.iterdir()] == ["results"]
 
 
 def test_a_failure_while_writing_leaves_nothing_behind(comparison, tmp_path, monkeypatch):
+    monkeypatch.setattr(Comparison, "figures", lambda _: {})
     monkeypatch.setattr("quakedesign.report.page.page_html", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_folder(comparison, tmp_path / "results", force=False)

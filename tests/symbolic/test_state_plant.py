@@ -176,7 +176,7 @@ def test_the_conditions_of_a_law_with_two_states_agree_with_its_eigenvalues(iner
     law, draw, seen = TwoStates(), random.Random(3), set()
     conditions = state_plant.stability_conditions(law.state_names, inertia=inertia)
     with mpmath.workdps(50):
-        for _ in range(40):
+        for _ in range(14):
             number = random_plant(draw)
             says = all(inserted(c, law, number) > 0 for c in conditions)
             worst = largest_real_part(differences(*field_of(law, number)), inertia=inertia)

@@ -6,6 +6,7 @@ import json
 import time
 from dataclasses import replace
 from fractions import Fraction as F
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,7 @@ CONTINUOUS = exact_integrals(CONTINUOUS_GAINS)
 EVERY = (*(name for name in LOOPS if name != "late rock"), "continuous")
 
 
+@cache
 def claim(name="estimate", rate_limited=False):
     task = task_of(load_fault("real-fault"), rate_limited=rate_limited)
     return continuous_peaks(task, CONTINUOUS) if name == "continuous" else guarantee(task, LOOPS[name])
@@ -113,7 +115,12 @@ def standalone(text):
 
 @pytest.mark.parametrize(
     ("name", "rate_limited"),
-    [(name, kind) for name in EVERY for kind in (False, True) if not kind or "noisy" not in name],
+    [
+        pytest.param(name, kind, marks=pytest.mark.slow if kind and "rock" in name else ())
+        for name in EVERY
+        for kind in (False, True)
+        if not kind or "noisy" not in name
+    ],
 )
 def test_both_checkers_accept_what_the_package_writes(name, rate_limited):
     found = claim(name, rate_limited)
@@ -233,7 +240,8 @@ CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "
 @pytest.mark.parametrize(
     ("loop", "name"),
     [(loop, name) for loop in ("estimate", "sluggish", "continuous") for name in CLAIMS]
-    + [("rock", "slip_rate_error"), ("rock", "largest_pressure"), ("lagging rock", "slip_error")]
+    + [("rock", "slip_rate_error"), ("lagging rock", "slip_error")]
+    + [pytest.param("rock", "largest_pressure", marks=pytest.mark.slow)]
     + [("observer", "slip_rate_error"), ("noisy sluggish", "slip_error"), ("noisy", "least_pressure")],
 )
 def test_one_percent_less_is_refused_by_both(name, loop):
