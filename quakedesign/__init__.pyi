@@ -9,7 +9,7 @@ from quakedesign.fault import FrictionLaw as FrictionLaw
 from quakedesign.fault import Reference as Reference
 from quakedesign.fault import UncertaintyBox as UncertaintyBox
 from quakedesign.fault import load_fault as load_fault
-from quakedesign.fault.scaling import Scales as Scales
+from quakedesign.fault.scales import Scales as Scales
 from quakedesign.fault.scaling import scaled_fault as scaled_fault
 from quakedesign.report import compare as compare
 from quakedesign.simulation import Trajectory as Trajectory

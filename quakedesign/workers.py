@@ -44,7 +44,7 @@ class Crew(ABC):
             When that is not possible.
         """
 
-    def answers(self, task: Callable[..., Any], arguments: Sequence[tuple]) -> Iterator[tuple[int, Any]]:
+    def answers(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
         """Answers to many arguments, each with their place in the sequence, in any order.
 
         Raises
@@ -97,7 +97,7 @@ class Processes(Crew):
     """
 
     def __init__(
-        self, count: int | None = None, begin: Callable[..., object] | None = None, arguments: tuple = ()
+        self, count: int | None = None, begin: Callable[..., object] | None = None, arguments: tuple[Any, ...] = ()
     ) -> None:
         self._count = cores() if count is None else require_workers(count)
         self._begin = pickle.dumps((begin, arguments))  # whose modules take seconds to import

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from itertools import product
+from typing import Any
 
 from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Verdict, loop_of, require
 from quakedesign.certificates.obligations import Obligation, claimed, different
@@ -125,7 +126,7 @@ def _check_equilibrium(loop: Loop, equilibrium: Equilibrium) -> None:
         require(mean == 0, f"the field does not vanish in {state} at the counterexample.")
 
 
-def touching_cells(loop: Loop, point) -> dict[str, dict[str, int]]:
+def touching_cells(loop: Loop, point: Any) -> dict[str, dict[str, int]]:
     """Sign cells whose closure holds a point, by name."""
     choices = [(1, -1) if point[s] == 0 else ((1,) if point[s] > 0 else (-1,)) for s in loop.states]
     return {
@@ -134,7 +135,7 @@ def touching_cells(loop: Loop, point) -> dict[str, dict[str, int]]:
     }
 
 
-def limit(terms, loop: Loop, point, signs, parameters) -> Fraction:
+def limit(terms: Any, loop: Loop, point: Any, signs: Any, parameters: Any) -> Fraction:
     """Limit of a sum of terms at a point from one cell."""
     total = Fraction(0)
     for term in terms:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
+from typing import Any
 
 import sympy as sp
 
@@ -207,7 +208,7 @@ def _friction_at(fault: Fault, slip: Range) -> Range:
     return max(friction.least, start - most), min(friction.most, start + most)
 
 
-def _end(end) -> Fraction:
+def _end(end: Any) -> Fraction:
     exact = end.fmpq()
     return fraction_of(exact)
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 from quakedesign.certificates.claim import Loop, require
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination
@@ -48,7 +49,7 @@ class Obligation:
     inequalities: tuple[Polynomial, ...] = ()
 
     @property
-    def key(self) -> tuple:
+    def key(self) -> tuple[Any, ...]:
         """What two obligations share when one witness serves both."""
         parts = ((self.polynomial,), self.equalities, self.inequalities)
         return tuple(
@@ -255,7 +256,7 @@ def _word(signs: Mapping[str, int]) -> str:
 
 def different(obligations: Iterable[Obligation]) -> Iterator[Obligation]:
     """Obligations of which no witness serves two: the first of each kind."""
-    known = set[tuple]()
+    known = set[tuple[Any, ...]]()
     for one in obligations:
         key = one.key
         if key not in known:

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 
@@ -59,7 +60,7 @@ class Premise:
             return f"at most {self.required:.4g}{unit}", "the same number"
         return f"{self.required:.4g}{unit}", f"{self.certified:.4g}{unit}"
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         """Keys of DESIGN.md and the unit; None for what is infinite."""
         return {
             "name": self.name,

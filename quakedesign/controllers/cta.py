@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import sympy as sp
 
@@ -26,7 +26,7 @@ class ContinuousTwisting(SlidingMode):
     }
 
     @staticmethod
-    def virtual_control(error: sp.Expr, rate_error: sp.Expr, integral: sp.Expr, gains, scale) -> sp.Expr:
+    def virtual_control(error: sp.Expr, rate_error: sp.Expr, integral: sp.Expr, gains: Any, scale: Any) -> sp.Expr:
         """ν of eq. cta."""
         k1, k2, _, _ = gains
         return (
@@ -36,7 +36,7 @@ class ContinuousTwisting(SlidingMode):
         )
 
     @staticmethod
-    def integral_rate(error: sp.Expr, rate_error: sp.Expr, gains, scale) -> sp.Expr:
+    def integral_rate(error: sp.Expr, rate_error: sp.Expr, gains: Any, scale: Any) -> sp.Expr:
         """ξ1' of eq. cta."""
         _, _, k3, k4 = gains
         return -scale * k3 * SignedPower(error, 0) - scale * k4 * SignedPower(rate_error, 0)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import sympy as sp
 
@@ -35,7 +35,7 @@ class DiscontinuousIntegral(SlidingMode):
             )
 
     @staticmethod
-    def virtual_control(error: sp.Expr, rate_error: sp.Expr, integral: sp.Expr, gains, scale) -> sp.Expr:
+    def virtual_control(error: sp.Expr, rate_error: sp.Expr, integral: sp.Expr, gains: Any, scale: Any) -> sp.Expr:
         """ν of eq. dia."""
         k1, k2, _, _ = gains
         root = scale ** sp.Rational(1, 2)
@@ -43,7 +43,7 @@ class DiscontinuousIntegral(SlidingMode):
         return -root * k2 * SignedPower(inner, sp.Rational(1, 3)) + integral
 
     @staticmethod
-    def integral_rate(error: sp.Expr, rate_error: sp.Expr, gains, scale) -> sp.Expr:
+    def integral_rate(error: sp.Expr, rate_error: sp.Expr, gains: Any, scale: Any) -> sp.Expr:
         """ξ1' of eq. dia."""
         _, _, k3, k4 = gains
         inner = error + scale ** sp.Rational(-1, 2) * k4 * SignedPower(rate_error, sp.Rational(3, 2))

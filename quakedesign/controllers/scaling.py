@@ -114,7 +114,7 @@ def exact(controller: Controller) -> CarriedGains:
     )
 
 
-def _grown(values: Mapping[str, Radical], forms: Mapping[str, Form], factors: Mapping[str, Radical]):
+def _grown(values: Mapping[str, Radical], forms: Mapping[str, Form], factors: Mapping[str, Radical]) -> Any:
     return MappingProxyType({name: value * _factor(forms[name], factors) for name, value in values.items()})
 
 

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import sympy as sp
 
@@ -50,12 +50,12 @@ class SlidingMode(Controller):
 
     @staticmethod
     @abstractmethod
-    def virtual_control(error: sp.Expr, rate_error: sp.Expr, integral: sp.Expr, gains, scale) -> sp.Expr:
+    def virtual_control(error: sp.Expr, rate_error: sp.Expr, integral: sp.Expr, gains: Any, scale: Any) -> sp.Expr:
         """ν [m/s²]."""
 
     @staticmethod
     @abstractmethod
-    def integral_rate(error: sp.Expr, rate_error: sp.Expr, gains, scale) -> sp.Expr:
+    def integral_rate(error: sp.Expr, rate_error: sp.Expr, gains: Any, scale: Any) -> sp.Expr:
         """ξ1' [m/s³]."""
 
     @property

@@ -52,7 +52,7 @@ class Problems:
         raise error from None
 
 
-def require_positive(remedy: str = "", **values: float) -> None:
+def require_positive(remedy: str = "", **values: float | Fraction) -> None:
     """Refuse values that are not positive finite numbers, all at once; the keyword is the name.
 
     Raises

@@ -135,12 +135,13 @@ def _number(fault: Fault, dotted: str) -> float | None:
     value: Any = fault
     for part in dotted.split("."):
         value = getattr(value, part)
-    return value
+    number: float | None = value
+    return number
 
 
 def _friction_unit(metadata: Mapping[str, Any]) -> str:
     """Unit with directed lengths: a law may state it as ``directed_unit``; a number is a friction coefficient."""
-    return metadata.get("directed_unit", metadata["unit"] or _FRICTION)
+    return str(metadata.get("directed_unit", metadata["unit"] or _FRICTION))
 
 
 def stretches(law: FrictionLaw) -> bool:
@@ -154,4 +155,4 @@ def stretches(law: FrictionLaw) -> bool:
     symbols = law.symbols()
     numbers = [symbols[n] for n, f in law.quantities().items() if _friction_unit(f.metadata) == _FRICTION]
     grown = plain.subs({symbol: factor * symbol for symbol in numbers}, simultaneous=True)
-    return sp.expand(grown - factor * plain) == 0
+    return bool(sp.expand(grown - factor * plain) == 0)

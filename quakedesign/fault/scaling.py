@@ -205,7 +205,7 @@ def _compared(source: Fault, target: Fault, clock: str) -> Similarity:
     )
 
 
-def _law(fault: Fault) -> tuple:
+def _law(fault: Fault) -> tuple[Any, ...]:
     """Friction as a function, in symbols: equal for equal laws, whatever their parameters' values."""
     import sympy as sp
 

@@ -75,7 +75,7 @@ def parse_fault(text: str, name: str) -> Fault:
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{name} is not valid TOML: {error}. Compare with a preset.") from None
     problems = Problems()
-    fault = _fault(Table(raw, problems), problems)
+    fault: Fault = _fault(Table(raw, problems), problems)
     problems.refuse(name)
     return fault
 

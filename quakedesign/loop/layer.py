@@ -41,7 +41,7 @@ class Layer:
 
     def share(self, number: int) -> Fraction:
         """ĉ_n [-]."""
-        return (-1) ** number * 4 / (_PI * (2 * number + 1))
+        return Fraction((-1) ** number * 4) / (_PI * (2 * number + 1))
 
     def left_out(self, step: Fraction) -> tuple[Fraction, Fraction, Fraction]:
         """h [-], λ̂_N [1/s] and f [-] of a well that steps at most every `step` [s]."""

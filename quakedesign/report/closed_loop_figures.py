@@ -98,7 +98,7 @@ def _rate(axis: Any, entry: "Entry", comparison: "Compared", divisor: float) -> 
 
 
 def _power_of_ten(value: float) -> float:
-    return 10.0 ** np.ceil(np.log10(value))
+    return float(10.0 ** np.ceil(np.log10(value)))
 
 
 def _decades(axis: Any) -> Any:

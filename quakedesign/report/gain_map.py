@@ -106,7 +106,7 @@ def _kind(drawn: GainMap, place: Place) -> str:
 def _borders(values: np.ndarray) -> np.ndarray:
     """Borders of the cells around values that grow by equal steps or equal ratios."""
     if values[0] > 0:
-        return np.exp(_borders_of(np.log(values)))
+        return np.asarray(np.exp(_borders_of(np.log(values))))
     return _borders_of(values)
 
 

@@ -72,7 +72,7 @@ def _shown(value: Any) -> Any:
 
 def table_html(comparison: "Compared") -> str:
     """Tables of a comparison as HTML."""
-    return _environment().from_string(_TABLES).render(**_tables(comparison))
+    return str(_environment().from_string(_TABLES).render(**_tables(comparison)))
 
 
 def _tables(comparison: "Compared") -> dict[str, Any]:
@@ -82,7 +82,7 @@ def _tables(comparison: "Compared") -> dict[str, Any]:
 
 def page_html(comparison: "Compared", facts: Iterable[str], figures: Iterable[str]) -> str:
     """Whole report as HTML; figures are expected at ``figures/NAME.png``."""
-    return (
+    page: str = (
         _environment()
         .from_string(_PAGE)
         .render(
@@ -101,3 +101,4 @@ def page_html(comparison: "Compared", facts: Iterable[str], figures: Iterable[st
             figures=list(figures),
         )
     )
+    return page

@@ -120,7 +120,7 @@ def _functions(fault: Fault, rate: float, inertia: bool) -> tuple[Any, Any, list
 
 def _region(
     axis: Any, across: np.ndarray, effective: np.ndarray, stiffness: np.ndarray, conditions: Any, boundary: Any
-):
+) -> None:
     """Colour one panel by the sign of the worst condition, and draw the critical stiffness."""
     wide, high = _size(np.abs(across).max() / 2)[0], _size(stiffness.max())[0]
     S, K = np.meshgrid(effective, stiffness)

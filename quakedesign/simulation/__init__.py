@@ -30,9 +30,10 @@ if TYPE_CHECKING:
         smallest_bound,
     )
     from quakedesign.loop.sensing.measurement import Measurement
+    from quakedesign.simulation.c_source import ControllerStep
     from quakedesign.simulation.earthquake import natural_earthquake
     from quakedesign.simulation.energy import EnergyBudget
-    from quakedesign.simulation.export import ControllerStep, controller_step, export_controller
+    from quakedesign.simulation.export import controller_step, export_controller
     from quakedesign.simulation.integrators import Integrator, integrator, integrators
     from quakedesign.simulation.interop import to_casadi, to_iosystem
     from quakedesign.simulation.loading import Load

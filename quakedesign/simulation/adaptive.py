@@ -163,7 +163,7 @@ class _Piece:
         states, works = self.flow.follow(vector[0] * step, self.count * step, start, factors)
         first = recorder.index(WORKS[0])
         done = vector[first : first + len(WORKS), None] + works
-        return self.watch(vector, states, done).full()
+        return np.asarray(self.watch(vector, states, done).full())
 
 
 def field(recorder: Recorder) -> Any:

@@ -11,7 +11,8 @@ from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import Setting, loop_class, run
+from quakedesign.simulation.run import loop_class, run
+from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.symbolic import derive
 

@@ -95,7 +95,7 @@ def _fault_system(fault: Fault) -> Any:
     inputs = [ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")]
     slopes = ca.Function("slopes", inputs, [ca.jacobian(field(*inputs), v) for v in inputs[1:]])
 
-    class FaultSystem(control.NonlinearIOSystem):
+    class FaultSystem(control.NonlinearIOSystem):  # type: ignore[misc]
         def linearize(self, x0: Any, u0: Any = None, t: float = 0, *arguments: Any, **options: Any) -> Any:
             if isinstance(x0, control.OperatingPoint):
                 x0, u0 = x0.states, x0.inputs if u0 is None else u0

@@ -139,7 +139,7 @@ class Problem:
 
     def _crossing(self) -> Any:
         def crossing(_: float, y: "np.ndarray") -> float:
-            return y[self.watched] - self.level
+            return float(y[self.watched]) - self.level
 
         crossing.direction = 1.0  # type: ignore[attr-defined]
         return crossing

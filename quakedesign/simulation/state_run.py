@@ -170,7 +170,7 @@ def _wanted(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None
         or wanted[-1] > end * (1 + 1e-12)
     ):
         raise ParameterError(f"times must ascend between 0 and the duration ({end!r} s). Received {times!r}.")
-    return np.minimum(wanted, end)
+    return np.asarray(np.minimum(wanted, end))
 
 
 def _scales(slider: SpringSlider, start: list[float]) -> "np.ndarray":
@@ -247,7 +247,7 @@ class _History:
         """Displacement of the far end [m]."""
         ends = np.cumsum([0.0, *(length for length, _ in self.pieces)])
         passed = np.cumsum([0.0, *(length * load for length, load in self.pieces)])
-        return np.interp(time, ends, passed)
+        return np.asarray(np.interp(time, ends, passed))
 
 
 def _trajectory(

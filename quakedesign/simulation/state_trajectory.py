@@ -82,7 +82,7 @@ class StateTrajectory(Recording):
         Between the instants of `time` by straight lines. `Fault.moment_of` makes it a seismic moment.
         """
         at = self._at_arrest(self.slip)
-        return at - np.interp(self.onsets[: len(at)], self.time, self.slip)
+        return np.asarray(at - np.interp(self.onsets[: len(at)], self.time, self.slip))
 
     @property
     def arrests(self) -> "np.ndarray":
@@ -96,7 +96,7 @@ class StateTrajectory(Recording):
         ends = [next((i for i in falls if self.time[i + 1] > onset), None) for onset in self.onsets]
         at = np.array([i for i in ends if i is not None], dtype=int)
         fast, slow = self.slip_rate[at], self.slip_rate[at + 1]
-        return values[at] + (values[at + 1] - values[at]) * (fast - self.onset_rate) / (fast - slow)
+        return np.asarray(values[at] + (values[at + 1] - values[at]) * (fast - self.onset_rate) / (fast - slow))
 
     def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
         """Values, long name and SI unit of every signal, by name."""

@@ -13,6 +13,6 @@ def amplification(poles: Iterable[complex], step: float, method: str = "dormand-
     advance = integrator(method).advance
 
     def growth(pole: complex) -> float:
-        return abs(advance(lambda _, x: pole * x, 1.0 + 0.0j, step))
+        return float(abs(advance(lambda _, x: pole * x, 1.0 + 0.0j, step)))
 
     return max(map(growth, poles))

@@ -18,7 +18,8 @@ from quakedesign.controllers.scaling import (
 )
 from quakedesign.fault import Fault, load_fault
 from quakedesign.fault.radical import Radical, radical
-from quakedesign.fault.scaling import TOLERANCE, GroupComparison, Scales, Similarity, similarity
+from quakedesign.fault.scales import Scales
+from quakedesign.fault.scaling import TOLERANCE, GroupComparison, Similarity, similarity
 from quakedesign.rationals import rational
 from quakedesign.studies.single import chosen_controller
 

@@ -259,9 +259,9 @@ def _balls(box: Box) -> dict[sp.Symbol, Any]:
     return {symbol: ball(*ends) for symbol, ends in box.items()}
 
 
-def _halves(operations: _Operations, box: dict, values: list[Any]) -> list[tuple[dict, list[Any]]]:
+def _halves(operations: _Operations, box: dict[Any, Any], values: list[Any]) -> list[tuple[dict[Any, Any], list[Any]]]:
     """Halve the box where that lowers the bound most: parts with the balls of all subexpressions."""
-    best: list[tuple[dict, list[Any]]] = []
+    best: list[tuple[dict[Any, Any], list[Any]]] = []
     least: Any = None
     for symbol, (low, high) in box.items():
         if low == high:

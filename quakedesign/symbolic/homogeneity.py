@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations, islice, product
+from typing import Any
 
 import sympy as sp
 
@@ -32,7 +33,7 @@ class Identity:
     @property
     def holds(self) -> bool:
         """Whether both sides have one normal form; computed anew."""
-        return normal_form(self.left - self.right) == 0
+        return bool(normal_form(self.left - self.right) == 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,7 +177,7 @@ def homogeneous(
     return _decided(components, exact, None if degree is None else sp.sympify(degree))
 
 
-def _decided(components: Mapping, weights: Mapping, degree: sp.Rational | None) -> Homogeneity:
+def _decided(components: Mapping[Any, Any], weights: Mapping[Any, Any], degree: sp.Rational | None) -> Homogeneity:
     moved = {s: dilate(e, weights) for s, e in components.items()}
     degrees = {s: _degrees(e) for s, e in moved.items()}
     found = {m - weights.get(s, 0) for s, several in degrees.items() if several is not None for m in several}
@@ -207,7 +208,7 @@ def _degrees(dilated: sp.Expr) -> set[sp.Rational] | None:
     return found
 
 
-def _switching(components: Mapping, weights: Mapping) -> tuple[tuple[sp.Expr, sp.Rational], ...]:
+def _switching(components: Mapping[Any, Any], weights: Mapping[Any, Any]) -> tuple[tuple[sp.Expr, sp.Rational], ...]:
     found = dict[sp.Expr, sp.Rational]()
     for e in components.values():
         for argument in FilippovField(rates={epsilon: e}).switching:
@@ -216,7 +217,9 @@ def _switching(components: Mapping, weights: Mapping) -> tuple[tuple[sp.Expr, sp
     return tuple(found.items())
 
 
-def _claims(components: Mapping, weights: Mapping, degree: sp.Rational | None) -> Iterator[tuple[Identity, str]]:
+def _claims(
+    components: Mapping[Any, Any], weights: Mapping[Any, Any], degree: sp.Rational | None
+) -> Iterator[tuple[Identity, str]]:
     """What homogeneity requires, of the claimed degree or of any."""
     at = {e: e.subs(dilation(weights), simultaneous=True) for e in components.values()}
     if degree is not None:
@@ -232,7 +235,7 @@ def _claims(components: Mapping, weights: Mapping, degree: sp.Rational | None) -
         yield Identity(left=left, right=right), f"one degree for the components of {s} and {other}"
 
 
-def _search(identity: Identity, meaning: str, weights: Mapping) -> Counterexample | None:
+def _search(identity: Identity, meaning: str, weights: Mapping[Any, Any]) -> Counterexample | None:
     symbols = [s for s in symbols_of((identity.left, identity.right)) if s != epsilon]
     states = [s for s in symbols if s in weights]
     primes = dict(zip((s for s in symbols if s not in weights), map(sp.Integer, sp.sieve), strict=False))

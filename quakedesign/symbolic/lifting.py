@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from functools import reduce
 from math import lcm
+from typing import Any
 
 import sympy as sp
 
@@ -71,7 +72,7 @@ def is_zero_on_cells(expression: sp.Expr, states: tuple[sp.Symbol, ...]) -> bool
         divisor = variable**one.power - one.sign * one.polynomial
         current = sp.rem(sp.expand(current), sp.expand(divisor), variable)
     signs = {s for s, _ in lifted.states.values()} | {one.sign for one in lifted.lifts}
-    return _reduced(current, signs) == 0
+    return bool(_reduced(current, signs) == 0)
 
 
 def _exponents(source: sp.Expr, states: tuple[sp.Symbol, ...]) -> dict[sp.Expr, set[sp.Rational]]:
@@ -86,7 +87,7 @@ def _exponents(source: sp.Expr, states: tuple[sp.Symbol, ...]) -> dict[sp.Expr, 
 class _Lifting:
     """Walk over one expression, collecting the lifts, inner ones first."""
 
-    def __init__(self, weights: Mapping, names: Mapping, exponents: Mapping) -> None:
+    def __init__(self, weights: Mapping[Any, Any], names: Mapping[Any, Any], exponents: Mapping[Any, Any]) -> None:
         self.weights, self.names, self.exponents = weights, names, exponents
         self.lifts: dict[sp.Expr, Lift] = {}
 
@@ -154,7 +155,7 @@ def _is_root(e: sp.Expr) -> bool:
 
 
 def _degree(one: Lift, variables: list[sp.Symbol]) -> int:
-    return sp.Poly(one.polynomial, *variables).total_degree()
+    return int(sp.Poly(one.polynomial, *variables).total_degree())
 
 
 def _whole(exponent: sp.Expr, e: sp.Expr) -> int:

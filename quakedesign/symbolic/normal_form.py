@@ -182,7 +182,7 @@ def _rebuilt(y: sp.Expr, total: sp.Expr, odd: bool) -> sp.Expr:
 
 def is_identity(left: sp.Expr, right: sp.Expr | int = 0) -> bool:
     """Whether two expressions have one normal form; False does not mean that they differ."""
-    return normal_form(left - right) == 0
+    return bool(normal_form(left - right) == 0)
 
 
 def symbols_of(expressions: Iterable[sp.Expr]) -> tuple[sp.Symbol, ...]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import product
+from typing import Any
 
 import sympy as sp
 
@@ -142,7 +143,7 @@ def restrict(value: sp.Expr | SetValued, *conditions: Condition) -> SetValued:
     return current
 
 
-def exact_intervals(intervals: Mapping[sp.Symbol, tuple]) -> dict[sp.Symbol, Interval]:
+def exact_intervals(intervals: Mapping[sp.Symbol, tuple[Any, ...]]) -> dict[sp.Symbol, Interval]:
     """Ends as SymPy numbers or expressions; a float means the decimal that Python prints for it.
 
     Raises
@@ -151,7 +152,7 @@ def exact_intervals(intervals: Mapping[sp.Symbol, tuple]) -> dict[sp.Symbol, Int
         When an upper end is below its lower end.
     """
 
-    def end(value) -> sp.Expr:
+    def end(value: Any) -> sp.Expr:
         return sp.Rational(str(rational(value))) if isinstance(value, float) else sp.sympify(value)
 
     exact = {symbol: (end(low), end(high)) for symbol, (low, high) in intervals.items()}
@@ -188,7 +189,7 @@ def _zero(argument: sp.Expr) -> bool:
         When that cannot be decided for a number.
     """
     if not argument.is_number:
-        return argument == 0
+        return bool(argument == 0)
     decided = argument.equals(0)
     if decided is None:
         raise KinkError(f"whether {argument} vanishes cannot be decided; give the point in other numbers.")

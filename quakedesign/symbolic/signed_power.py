@@ -30,7 +30,7 @@ def slope_off_kinks(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
         return expression.diff(variable)
 
 
-class _Power(sp.Function):
+class _Power(sp.Function):  # type: ignore[misc]
     """Common part: argument, exponent, and the rule for derivatives."""
 
     nargs = 2

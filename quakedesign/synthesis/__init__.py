@@ -7,7 +7,8 @@ from quakedesign.faces import face
 if TYPE_CHECKING:
     from quakedesign.sos.solve.conic import stated_problems
     from quakedesign.synthesis.analysis.certify import certify
-    from quakedesign.synthesis.design import Design, assess, design
+    from quakedesign.synthesis.design import assess, design
+    from quakedesign.synthesis.designed import Design
     from quakedesign.synthesis.gains.synthesise import synthesise
     from quakedesign.synthesis.guarantee import answer
     from quakedesign.synthesis.methods.base import designable

@@ -328,5 +328,5 @@ def _range_of(shape: tuple[Fraction, ...]) -> Range:
 def _rises_from_rest_to_rest(shape: tuple[Fraction, ...]) -> bool:
     """Whether a polynomial goes from 0 to 1 on [0, 1] with slope 0 at both ends and never falls."""
     slope = _derived(shape, 1)
-    ends = shape[:1] == (0,) and sum(shape) == 1 and slope[:1] == (0,) and sum(slope) == 0
+    ends = shape[:1] == (Fraction(0),) and sum(shape) == 1 and slope[:1] == (Fraction(0),) and sum(slope) == 0
     return ends and _range_of(slope)[0] >= 0

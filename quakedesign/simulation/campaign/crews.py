@@ -84,7 +84,7 @@ class Cluster(Given):
     @property
     def width(self) -> int:
         """Twice the number of threads that the cluster has now, so that none waits for the next batch."""
-        return 2 * max(1, sum(self._client.nthreads().values()))
+        return 2 * max(1, int(sum(self._client.nthreads().values())))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

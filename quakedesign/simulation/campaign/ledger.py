@@ -37,7 +37,7 @@ def plain(value: Any) -> Any:
 
 def _text(value: Any) -> str:
     """Text of a value that has one, else the name of its type: never an address in memory."""
-    kind = value if isinstance(value, type) else type(value)
+    kind: Any = value if isinstance(value, type) else type(value)
     speaks = kind.__str__ is not object.__str__ or kind.__repr__ is not object.__repr__
     return str(value) if speaks and not isinstance(value, type) else kind.__name__
 

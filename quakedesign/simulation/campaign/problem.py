@@ -22,7 +22,8 @@ from quakedesign.simulation.loading import Load
 from quakedesign.simulation.metrics import events, metrics
 from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import Setting, library_versions, loop_class, run
+from quakedesign.simulation.run import library_versions, loop_class, run
+from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.simulation.variation import Variation
 

@@ -13,7 +13,8 @@ def reseeded(value: Value, seed: int) -> Value:
 
     Entries within entries are reached too; no two get the same seed, so that two noises stay independent.
     """
-    return _walk(value, seed, [0])
+    walked: Value = _walk(value, seed, [0])
+    return walked
 
 
 def _walk(value: Any, seed: int, count: list[int]) -> Any:

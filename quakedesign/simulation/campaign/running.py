@@ -24,7 +24,7 @@ from quakedesign.simulation.campaign.worker import advance
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.metrics import ActuatorMetrics
-from quakedesign.simulation.run import Setting
+from quakedesign.simulation.setting import Setting
 from quakedesign.temporary import temporary_folder
 from quakedesign.workers import Crew, Processes
 

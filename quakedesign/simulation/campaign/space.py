@@ -111,14 +111,14 @@ def point(seed: int, index: int, dimension: int) -> "np.ndarray":
 
     Sobol' (1967) with the scrambling of Matoušek (1998), as in scipy.stats.qmc.
     """
-    return _points(seed, dimension, max(6, index.bit_length()))[index]
+    return np.asarray(_points(seed, dimension, max(6, index.bit_length()))[index])
 
 
 @lru_cache(maxsize=8)
 def _points(seed: int, dimension: int, exponent: int) -> "np.ndarray":
     from scipy.stats import qmc
 
-    return qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(seed)).random_base2(exponent)
+    return np.asarray(qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(seed)).random_base2(exponent))
 
 
 def noise_seed(seed: int, index: int) -> int:

@@ -57,7 +57,7 @@ def load(text: str) -> tuple[Statement, Proof]:
 def _statement(raw: dict[str, Any], names: tuple[str, ...]) -> Statement:
     size = len(names)
 
-    def polynomials(key: str):
+    def polynomials(key: str) -> Any:
         return tuple(read_polynomial(p, key, size, _TERMS) for p in listed(raw[key], key, _CONSTRAINTS))
 
     products = [listed(s, "a product", _CONSTRAINTS) for s in listed(raw["products"], "products", _PRODUCTS)]

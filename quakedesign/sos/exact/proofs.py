@@ -145,13 +145,15 @@ def _with_integers(squares: Iterable[Square]) -> list[tuple[Square, IntegerGram]
     return [(square, integer_gram(square)) for square in squares]
 
 
-def _target(statement: Statement):
+def _target(statement: Statement) -> Any:
     """multiplier · polynomial in the ring."""
     size = len(statement.variables)
     return multiplied(element(statement.multiplier, size), element(statement.polynomial, size))
 
 
-def _right_side(statement: Statement, squares: Iterable[tuple[Square, IntegerGram]], cofactors: Iterable[Polynomial]):
+def _right_side(
+    statement: Statement, squares: Iterable[tuple[Square, IntegerGram]], cofactors: Iterable[Polynomial]
+) -> Any:
     """Σ (Π g_i)·bᵀQb + Σ q_k h_k in the ring."""
     size = len(statement.variables)
     total = _sum(statement, squares)
@@ -160,7 +162,7 @@ def _right_side(statement: Statement, squares: Iterable[tuple[Square, IntegerGra
     return total
 
 
-def _sum(statement: Statement, squares: Iterable[tuple[Square, IntegerGram]]):
+def _sum(statement: Statement, squares: Iterable[tuple[Square, IntegerGram]]) -> Any:
     """Σ (Π g_i)·bᵀQb in the ring."""
     size = len(statement.variables)
     one = ring(size).constant(1)
@@ -224,7 +226,7 @@ def _point_holds(statement: Statement, proof: Point) -> bool:
     )
 
 
-def residual(statement: Statement, squares: Sequence[Square], cofactors: Sequence[Polynomial]):
+def residual(statement: Statement, squares: Sequence[Square], cofactors: Sequence[Polynomial]) -> Any:
     """Target minus the right-hand side of a proposed proof."""
     return mapping(_target(statement) - _right_side(statement, _with_integers(squares), cofactors))
 

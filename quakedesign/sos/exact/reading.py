@@ -12,7 +12,9 @@ from quakedesign.sos.exact.polynomial import Exponents, Polynomial, from_sympy
 _AUTO = "auto"
 
 
-def read(polynomial: Any, on: Sequence[Any], multiplier: Any, variables: Sequence[Any] | None):
+def read(
+    polynomial: Any, on: Sequence[Any], multiplier: Any, variables: Sequence[Any] | None
+) -> tuple[tuple[str, ...], dict[Exponents, Fraction], tuple[Polynomial, ...], tuple[Polynomial, ...], Any]:
     """Variables, polynomial, inequalities, equalities and multiplier (None, ``"auto"`` or a polynomial).
 
     Raises

@@ -10,6 +10,7 @@ convex hull of the basis has 2v in the support of the target, so the basis lies 
 from collections import Counter, defaultdict
 from fractions import Fraction
 from math import comb
+from typing import Any
 
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, times
@@ -63,7 +64,7 @@ def reduced_bases(statement: Statement) -> Bases:
     return tuple(tuple(basis) for basis in alive)
 
 
-def _contributions(statement: Statement, alive):
+def _contributions(statement: Statement, alive: Any) -> Any:
     """Number of off-diagonal entries, and the diagonal ones, that feed each monomial."""
     others: Counter[Exponents] = Counter()
     diagonal: dict[Exponents, set[tuple[int, Exponents, Fraction]]] = defaultdict(set)
@@ -78,7 +79,7 @@ def _contributions(statement: Statement, alive):
     return others, diagonal
 
 
-def _forget(weight: Polynomial, k: int, gone: Exponents, basis, others, diagonal) -> list[Exponents]:
+def _forget(weight: Polynomial, k: int, gone: Exponents, basis: Any, others: Any, diagonal: Any) -> list[Exponents]:
     """Take the entries of one basis element away; the monomials that they fed."""
     touched = []
     for e, c in weight.items():

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from flint import fmpq, fmpq_mat, fmpz_mat
 
@@ -96,7 +96,7 @@ def in_echelon_form(square: Square) -> Square:
     return Square(product=square.product, basis=basis, gram=upper)
 
 
-def form(basis: Sequence[Element], gram: IntegerGram, size: int):
+def form(basis: Sequence[Element], gram: IntegerGram, size: int) -> Any:
     """Form bᵀQb in the ring, added up in integers.
 
     Raises

@@ -1,9 +1,11 @@
 """What is asked: whether multiplier · polynomial is in the cone of a simple semialgebraic set."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import combinations
+from typing import Any
 
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, constant, degree, product
@@ -163,6 +165,6 @@ def statement(
     )
 
 
-def _subsets(indices, largest: int):
+def _subsets(indices: Any, largest: int) -> Iterator[Any]:
     for size in range(largest + 1):
         yield from combinations(indices, size)

@@ -50,7 +50,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
-def _no_float(text: str):
+def _no_float(text: str) -> None:
     raise CertificateError(f"numbers must be integers or texts of rationals; received {text[:20]}.")
 
 

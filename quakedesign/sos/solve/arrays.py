@@ -1,5 +1,7 @@
 """A polynomial as arrays of floating point, for its values and derivatives; nothing here decides."""
 
+from typing import Any
+
 import numpy as np
 
 from quakedesign.sos.exact.polynomial import Polynomial
@@ -12,15 +14,15 @@ class Arrays:
         self.exponents = np.array(list(polynomial), dtype=np.int64).reshape(-1, variables)
         self.coefficients = np.array([float(c) for c in polynomial.values()])
 
-    def __call__(self, x) -> float:
+    def __call__(self, x: Any) -> float:
         """Value at a point."""
         return float(self.coefficients @ np.prod(np.asarray(x)[None, :] ** self.exponents, axis=1))
 
-    def at(self, points):
+    def at(self, points: Any) -> Any:
         """Values at points, one a row."""
         return np.prod(points[:, None, :] ** self.exponents[None, :, :], axis=2) @ self.coefficients
 
-    def gradient(self, x):
+    def gradient(self, x: Any) -> Any:
         """Gradient at a point."""
         x = np.asarray(x)
         result = np.zeros(len(x))
@@ -31,7 +33,7 @@ class Arrays:
             result[i] = factor @ np.prod(x[None, :] ** lower, axis=1)
         return result
 
-    def hessian(self, x):
+    def hessian(self, x: Any) -> Any:
         """Matrix of second derivatives at a point."""
         x, size = np.asarray(x), len(x)
         result = np.zeros((size, size))

@@ -80,7 +80,10 @@ class Compiled:
         """Cone form for the present Parameters, as `cvxpy.Problem.get_problem_data` returns it."""
         import cvxpy as cp
 
-        return self.problem.get_problem_data(cp.CLARABEL, canon_backend=cp.COO_CANON_BACKEND, solver_opts={})
+        form, chain, inverse = self.problem.get_problem_data(
+            cp.CLARABEL, canon_backend=cp.COO_CANON_BACKEND, solver_opts={}
+        )
+        return form, chain, inverse
 
     def solve(self, accuracy: float = 1e-8, *, anew: bool = True) -> bool:
         """Whether Clarabel has an answer worth looking at; variables and constraints then have their values.

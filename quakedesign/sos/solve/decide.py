@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Any
 
 from flint import fmpq, fmpq_mat
 
@@ -139,7 +140,7 @@ class Search:
             exact = _project(exact, self.relations)
         return {e: v for e, v in exact.items() if v}
 
-    def _on_faces(self, candidates, solution: Solution | None) -> Proof | None:
+    def _on_faces(self, candidates: Any, solution: Solution | None) -> Proof | None:
         zeros = rational_zeros(self.statement, candidates, self.units)
         blocks = at_zeros(self.blocks, zeros) if zeros else self.blocks
         for accuracy in _ACCURACIES:
@@ -206,7 +207,7 @@ def block_sizes(statement: Statement) -> dict[str, list[int]]:
     return {"before": before, "after": after}
 
 
-def _project(values: dict[Exponents, Fraction], rows) -> dict[Exponents, Fraction]:
+def _project(values: dict[Exponents, Fraction], rows: Any) -> dict[Exponents, Fraction]:
     """Nearest-looking values that satisfy every relation: the pivots follow from the others."""
     keys = sorted({e for r in rows for e in r} | set(values), key=lambda e: (sum(e), e), reverse=True)
     index = {e: i for i, e in enumerate(keys)}

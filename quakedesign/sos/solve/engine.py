@@ -152,7 +152,7 @@ def _versions() -> dict[str, str]:
     return {name: version(name) for name in ("quakedesign", "clarabel", "python-flint")}
 
 
-def _read(polynomial: Any, on: Sequence[Any], multiplier: Any, variables: Sequence[Any] | None):
+def _read(polynomial: Any, on: Sequence[Any], multiplier: Any, variables: Sequence[Any] | None) -> Any:
     from quakedesign.sos.exact.reading import read
 
     return read(polynomial, on, multiplier, variables)
@@ -175,7 +175,7 @@ def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:
     return combination([(Fraction(1), polynomial), (-amount, powers)])
 
 
-def _multipliers(polynomial, factor, inequalities, equalities, size: int):
+def _multipliers(polynomial: Any, factor: Any, inequalities: Any, equalities: Any, size: int) -> Any:
     """Multipliers to try: the given one, or one and growing powers."""
     if factor != "auto":
         return [factor]
@@ -183,13 +183,13 @@ def _multipliers(polynomial, factor, inequalities, equalities, size: int):
     form = all(sum(e) == top for e in polynomial)
     orthant = inequalities and not equalities and all(Statement.is_variable(g) for g in inequalities)
     step = 1 if orthant and form else 2
-    base: dict = {tuple(step * (i == j) for j in range(size)): Fraction(1) for i in range(size)}
+    base: dict[Any, Any] = {tuple(step * (i == j) for j in range(size)): Fraction(1) for i in range(size)}
     if not form:
         base[(0,) * size] = Fraction(1)
     return [product(size, [base] * k) for k in range(4)]
 
 
-def _squares_of_multiplier(asked: Statement):
+def _squares_of_multiplier(asked: Statement) -> Any:
     """The multiplier as a sum of squares, unless its coefficients show that it is positive."""
     from quakedesign.sos.exact.proofs import multiplier_is_positive
 

@@ -64,7 +64,7 @@ def lowest_samples(statement: Statement) -> list[list[float]]:
         low, high = np.where(held, middle, low), np.where(held, high, middle)
     pool = np.concatenate([inner, start + low * (outer - start)])
     order = np.argsort(_polynomial(statement).at(pool), kind="stable")
-    return pool[order[:_KEPT]].tolist()
+    return [[*map(float, point)] for point in pool[order[:_KEPT]]]
 
 
 def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[float], float]]:

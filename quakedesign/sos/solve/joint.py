@@ -26,7 +26,7 @@ from quakedesign.sos.solve.moment import MomentProgram
 from quakedesign.sos.solve.rounding import relations
 
 _KEPT = 32
-_known: dict[tuple, "JointProgram"] = {}
+_known: dict[tuple[Any, ...], "JointProgram"] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,7 @@ def joint_program(demands: Sequence[Demand]) -> "JointProgram":
     return _known.setdefault(key, found)
 
 
-def _structure(template: Statement) -> tuple:
+def _structure(template: Statement) -> tuple[Any, ...]:
     """What two templates with one cone share."""
     conditions = (tuple(tuple(p.items()) for p in group) for group in (template.inequalities, template.equalities))
     return frozenset(template.target), template.degree, template.products, *conditions

@@ -58,8 +58,8 @@ class Solution:
     """
 
     margin: float
-    grams: list
-    moments: list
+    grams: list[Any]
+    moments: list[Any]
     functional: Mapping[Exponents, float]
     cofactors: Any
 
@@ -141,7 +141,7 @@ class MomentProgram:
 
         return [clarabel.PSDTriangleConeT(s.size) for s in self.blocks]
 
-    def _matrix(self, more: Sequence[tuple[int, int, float]], *, equations: int, limits: int):
+    def _matrix(self, more: Sequence[tuple[int, int, float]], *, equations: int, limits: int) -> Any:
         """Sparse matrix and right side: trace, relations, further rows, then minus the localizing matrices.
 
         The unknowns are the values of L and one more; `more` has further entries.
@@ -198,7 +198,7 @@ class MomentProgram:
         rows, columns, values = self.relation_entries
         return sparse.csr_array((values, (rows, columns)), shape=(self.relation_count, len(self.keys)))
 
-    def vector(self, target: Mapping[Exponents, Any]):
+    def vector(self, target: Mapping[Exponents, Any]) -> Any:
         """Coefficients in the order of the monomials, as floats.
 
         Raises
@@ -223,13 +223,13 @@ def useful(answer: Any) -> bool:
 _USEFUL = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
 
 
-def _zero(size: int):
+def _zero(size: int) -> Any:
     from scipy import sparse
 
     return sparse.csc_matrix((size, size))
 
 
-def _localizing(blocks: Sequence[Shape], entries: list, where, width: int):
+def _localizing(blocks: Sequence[Shape], entries: list[Any], where: Any, width: int) -> Any:
     """Rows, columns and values of all localizing matrices below each other, and the rows of their diagonals."""
     from scipy import sparse
 
@@ -259,7 +259,7 @@ def options(accuracy: float) -> dict[str, Any]:
     return {"presolve_enable": False, "chordal_decomposition_enable": False, "max_iter": 100, **exact}
 
 
-def settings(accuracy: float):
+def settings(accuracy: float) -> Any:
     """Settings of Clarabel with these values."""
     import clarabel
 
@@ -270,7 +270,7 @@ def settings(accuracy: float):
     return settings
 
 
-def _unique(stacked: list):
+def _unique(stacked: list[Any]) -> Any:
     together = np.concatenate(stacked)
     span = together.max(axis=0).astype(object) + 1
     if int(np.prod(span)) < 2**62:
@@ -282,24 +282,24 @@ def _unique(stacked: list):
 
 
 @lru_cache(maxsize=256)
-def pairs(size: int):
+def pairs(size: int) -> Any:
     """Rows and columns of the upper triangle, column by column; read-only."""
     columns, rows = np.tril_indices(size)
     rows.flags.writeable = columns.flags.writeable = False
     return rows, columns
 
 
-def _diagonal(size: int):
+def _diagonal(size: int) -> Any:
     return np.arange(1, size + 1).cumsum() - 1
 
 
-def _unit_vector(size: int):
+def _unit_vector(size: int) -> Any:
     vector = np.zeros(size * (size + 1) // 2)
     vector[_diagonal(size)] = 1.0
     return vector
 
 
-def _entries(block: Shape):
+def _entries(block: Shape) -> Any:
     """Exponents (terms × pairs × variables) and factors of the scaled upper triangle of L(g·m mᵀ)."""
     basis = np.array(block.basis, dtype=np.int64)
     rows, columns = pairs(len(basis))
@@ -310,7 +310,7 @@ def _entries(block: Shape):
     return terms[:, None, :] + sums[None, :, :], values
 
 
-def _congruence(face):
+def _congruence(face: Any) -> Any:
     """Sparse map from the scaled triangle of M to that of F M Fᵀ."""
     from scipy import sparse
 
@@ -322,7 +322,7 @@ def _congruence(face):
     return sparse.csr_matrix(whole)
 
 
-def _full(triangle, size: int):
+def _full(triangle: Any, size: int) -> Any:
     rows, columns = pairs(size)
     matrix = np.zeros((size, size))
     values = np.where(rows == columns, 1.0, 1 / np.sqrt(2.0)) * triangle

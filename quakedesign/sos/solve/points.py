@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import chain, islice, product
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def local_minima(
         yield from _constrained(statement, hints, starts)
 
 
-def _on_sphere(statement: Statement, hints, starts: int) -> Iterator[list[float]]:
+def _on_sphere(statement: Statement, hints: Any, starts: int) -> Iterator[list[float]]:
     from scipy.optimize import minimize
 
     size = len(statement.variables)
@@ -59,10 +60,10 @@ def _on_sphere(statement: Statement, hints, starts: int) -> Iterator[list[float]
     form = Arrays(lift, size + 1)
     weights = np.array([2.0 if s else 1.0 for s in signed])
 
-    def spread(v):
+    def spread(v: Any) -> Any:
         return np.append(v, 0.0 if homogeneous else 1.0) if homogeneous else v
 
-    def value(v):
+    def value(v: Any) -> Any:
         full = np.append(v, 1.0) if homogeneous else v
         x = _state(full[:-1], signed)
         level = float(x @ x) + (0.0 if homogeneous else full[-1] ** 4)
@@ -95,11 +96,11 @@ def _on_sphere(statement: Statement, hints, starts: int) -> Iterator[list[float]
                 yield (x / np.abs(x).max() * far).tolist()
 
 
-def _state(v, signed):
+def _state(v: Any, signed: Any) -> Any:
     return np.where(signed, v**2, v)
 
 
-def _lifted(hint, signed, homogeneous: bool):
+def _lifted(hint: Any, signed: Any, homogeneous: bool) -> Any:
     x = np.where(signed, np.sqrt(np.abs(hint)), hint)
     return x if homogeneous else np.append(x, 1.0)
 
@@ -108,7 +109,7 @@ def _unit(size: int, index: int) -> Exponents:
     return tuple(int(i == index) for i in range(size))
 
 
-def _constrained(statement: Statement, hints, starts: int) -> Iterator[list[float]]:
+def _constrained(statement: Statement, hints: Any, starts: int) -> Iterator[list[float]]:
     from scipy.optimize import minimize
 
     size = len(statement.variables)

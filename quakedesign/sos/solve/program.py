@@ -60,7 +60,7 @@ class Program:
         self.variables, self.decisions = tuple(variables), tuple(decisions)
         self._vector = cp.Variable(len(self.decisions), name="decisions")
         self.constraints: list[Any] = []
-        self._required: list[tuple[list[dict], Statement]] = []
+        self._required: list[tuple[list[dict[Any, Any]], Statement]] = []
         self._definite: list[list[list[dict[Exponents, Fraction]]]] = []
         self._objective: dict[Exponents, Fraction] = {}
 
@@ -270,7 +270,7 @@ def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fra
     )
 
 
-def _membership(vector: Any, parts: Sequence[Mapping], template: Statement, margin: Any) -> list[Any]:
+def _membership(vector: Any, parts: Sequence[Mapping[Any, Any]], template: Statement, margin: Any) -> list[Any]:
     """Equation between the coefficients of the polynomial and of a sum of squares with margin."""
     import cvxpy as cp
 
@@ -312,7 +312,7 @@ def _map(block: Block) -> list[tuple[Exponents, int, int, float]]:
     return found
 
 
-def _sparse(entries, index: Mapping[Exponents, int], size: int) -> Any:
+def _sparse(entries: Any, index: Mapping[Exponents, int], size: int) -> Any:
     from scipy.sparse import coo_array
 
     rows = [index[e] for e, _, _, _ in entries]
@@ -320,7 +320,7 @@ def _sparse(entries, index: Mapping[Exponents, int], size: int) -> Any:
     return coo_array(([c for *_, c in entries], (rows, columns)), shape=(len(index), size * size)).tocsr()
 
 
-def _definite(vector: Any, rows: list[list[dict]], margin: Any) -> Any:
+def _definite(vector: Any, rows: list[list[dict[Any, Any]]], margin: Any) -> Any:
     size = len(rows)
     zero = (0,) * vector.shape[0]
     total: Any = np.array([[float(entry.get(zero, 0)) for entry in row] for row in rows])

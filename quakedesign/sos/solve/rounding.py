@@ -140,7 +140,7 @@ class _System:
         values = [fraction_of(v[0]) for v in answer.tolist()]
         return dict(zip(chosen, values, strict=True))
 
-    def _choose(self):
+    def _choose(self) -> Any:
         """Independent rows and columns, by pivoted QR, with the exact square matrix between them."""
         from scipy.linalg import qr
 

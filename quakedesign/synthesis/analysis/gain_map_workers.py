@@ -144,7 +144,7 @@ class Screeners:
         if self._crew is not None:
             self._crew.__exit__(*error)
 
-    def answers(self, question: str, arguments: Iterable[tuple]) -> Iterator[Any]:
+    def answers(self, question: str, arguments: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
         """Answers of one method of `Screener` to many arguments, in any order.
 
         Raises
@@ -168,5 +168,5 @@ def _begin(sheet: Sheet) -> None:
     _screener.append(Screener(sheet))
 
 
-def _answer(question: str, arguments: tuple) -> Any:
+def _answer(question: str, arguments: tuple[Any, ...]) -> Any:
     return getattr(_screener[0], question)(*arguments)

@@ -84,7 +84,7 @@ def _template(row: Row, loop: Loop, scale: Sequence[Fraction]) -> Statement:
     """Set and monomials of a row, in scaled variables."""
     whole = scales_of(row, scale)
 
-    def normal(p: Polynomial) -> dict:
+    def normal(p: Polynomial) -> Polynomial:
         found = scaled(p, whole)
         size = max(abs(c) for c in found.values())
         return {e: c / size for e, c in found.items()}

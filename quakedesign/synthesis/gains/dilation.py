@@ -58,4 +58,4 @@ def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fractio
 def scaled_norm(loop: Loop, exponents: Mapping[str, Fraction]) -> float:
     """‖(k_i/L̄^{p_i})‖₂ of a loop's gains; no λ changes it. L̄ is the upper end of d."""
     bound = float(loop.uncertain["d"][1])
-    return sum((float(k) / bound ** float(exponents[name])) ** 2 for name, k in loop.gains.items()) ** 0.5
+    return float(sum((float(k) / bound ** float(exponents[name])) ** 2 for name, k in loop.gains.items()) ** 0.5)

@@ -129,7 +129,7 @@ def neighbourhood(
     return Neighbourhood(monomials=monomials, sizes=sizes, program=program, demands=tuple(demands), fixed=tuple(fixed))
 
 
-def _power(base: Sequence, exponents: Sequence[int]):
+def _power(base: Sequence[Any], exponents: Sequence[int]) -> Any:
     return math.prod(b**e for b, e in zip(base, exponents, strict=True) if e)
 
 
@@ -144,7 +144,9 @@ def _columns(row: Row, j: int | None, values: Mapping[str, float], weights: Sequ
     return found
 
 
-def _faster(row: Row, j: int | None, values: Mapping[str, float], pace: Pace | None, factor: float, weights=()) -> Form:
+def _faster(
+    row: Row, j: int | None, values: Mapping[str, float], pace: Pace | None, factor: float, weights: Any = ()
+) -> Form:
     """Part of a row that V decides: V, −V̇, or −w^{m−n}V̇ − κ(n/m)V."""
     function, fall = _columns(row, j, values, weights)
     if not row.fall:
@@ -162,7 +164,7 @@ def _faster(row: Row, j: int | None, values: Mapping[str, float], pace: Pace | N
     return {e: c * factor for e, c in found.items()}
 
 
-def _moved(row: Row, present: Sequence[float], values, other, pace: Pace | None) -> Form:
+def _moved(row: Row, present: Sequence[float], values: Any, other: Any, pace: Pace | None) -> Form:
     """What changed numbers add to a row for V as it is."""
     before = _faster(row, None, values, pace, 1.0, present)
     after = _faster(row, None, other, pace, 1.0, present)
@@ -195,7 +197,7 @@ def _times(left: Form, right: Form) -> Form:
 
 
 @lru_cache(maxsize=32)
-def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool):
+def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> Any:
     """Every row with its set and monomials in scaled variables, and the scale of all of these."""
     found = []
     loop = kin.loop
@@ -221,7 +223,7 @@ def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool):
     return tuple(found)
 
 
-def _raised(support, unit: Form, times: int):
+def _raised(support: Any, unit: Form, times: int) -> Any:
     """Monomials of a product with a linear form to a power."""
     form = dict.fromkeys(support, 1.0)
     for _ in range(times):
@@ -238,6 +240,6 @@ def _program(kin: Kin, scale: tuple[Fraction, ...], paced: bool, changes: int) -
     )
 
 
-def _normal(polynomial: Polynomial) -> dict:
+def _normal(polynomial: Polynomial) -> Polynomial:
     size = max(abs(c) for c in polynomial.values())
     return {e: c / size for e, c in polynomial.items()}

@@ -111,7 +111,7 @@ class LargestDecay(Objective):
         m, n = degrees_of(Obligations(loop, certificate.lyapunov))
         share = (m - n) / m
         largest = on_box(certificate.lyapunov, loop.states, box(loop, setting.units))
-        return float(certificate.claims["decay"]) * share * largest**-share * (1 - 1e-12)
+        return float(certificate.claims["decay"]) * share * float(largest**-share) * (1 - 1e-12)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +146,7 @@ class LargestRange(Objective):
     def figure(self, certificate: Certificate, setting: Setting) -> float:
         """ρ, rounded down."""
         low, high = certificate.loop.uncertain["beta"]
-        return float(high / low) ** 0.5 * (1 - 1e-15)
+        return float(float(high / low) ** 0.5) * (1 - 1e-15)
 
 
 _KNOWN: dict[str, type[Objective]] = {o.name: o for o in (SmallestNorm, LargestDecay, LargestRange)}

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.claim import root_enclosure
@@ -44,7 +45,7 @@ def _digits(number: float) -> Fraction:
     return Fraction(f"{number:.4g}")
 
 
-def climb(setting: Setting, state: State, *, free: bool = True, until: float | None = None, rounds: int = 100):
+def climb(setting: Setting, state: State, *, free: bool = True, until: float | None = None, rounds: int = 100) -> Any:
     """States in the order in which they were found, each better than the one before; the given one first.
 
     Parameters

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,8 @@ class Sampling:
             samples=2,
             compiled=False,
         )
-        return getattr(run.metrics, self.metric)
+        error: float | None = getattr(run.metrics, self.metric)
+        return error
 
 
 def sampling(
@@ -203,7 +205,7 @@ def _tried(
     setting = replace(asked.setting, degree=asked.degrees[-1])
     tried: dict[float, tuple[Fraction, ...]] = {}
 
-    def error(factors) -> float:
+    def error(factors: Any) -> float:
         grown = {**base, **{n: base[n] * math.exp(x) for n, x in zip(free, factors, strict=True)}}
         loop = with_gains(asked.loop, short(asked.loop, grown))
         if look(setting, loop, scaled_norm(loop, setting.exponents)) is None:

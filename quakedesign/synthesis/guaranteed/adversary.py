@@ -109,7 +109,7 @@ class _Search:
         """Costates that change at every step."""
         random = np.random.default_rng(_SEED)
         found = random.standard_normal((self.steps, *self.aim.shape))
-        return found * random.choice([1.0, 1e3], (1, *self.aim.shape))
+        return np.asarray(found * random.choice([1.0, 1e3], (1, *self.aim.shape)))
 
     def switching(self) -> np.ndarray:
         """Costates of the slip-rate error that change sign after random times."""
@@ -140,7 +140,7 @@ class _Search:
 
     def _sampled(self, part: _Pieces, state: np.ndarray, costate: np.ndarray, number: int) -> np.ndarray:
         """After a jump; the first of a period hears noise, for which the costate is that after the first piece."""
-        after = state @ part.jump.T
+        after: np.ndarray = state @ part.jump.T
         if number // _PIECES % len(self.parts):
             return after
         noise = self.noise * np.sign(costate @ part.steps[0] @ self.heard.T)

@@ -111,7 +111,7 @@ class _Sums:
 
     def since(self, rows: np.ndarray) -> np.ndarray:
         """From the jump to every end of a piece."""
-        size = np.abs(rows @ self.response)
+        size: np.ndarray = np.abs(rows @ self.response)
         if self.sudden:
             return size
         return np.insert(np.cumsum((size[:, 1:] + size[:, :-1]) * self.piece / 2, axis=1), 0, 0, axis=1)

@@ -86,7 +86,7 @@ def below(number: float) -> Fraction:
     return Fraction(math.floor(Fraction(number) * shift)) / shift
 
 
-def scaled(polynomial: Polynomial, scale: Sequence[Fraction], factor: Fraction = Fraction(1)) -> dict:
+def scaled(polynomial: Polynomial, scale: Sequence[Fraction], factor: Fraction = Fraction(1)) -> Polynomial:
     """factor · P(scale ∘ ũ)."""
     return {e: c * factor * monomial(scale, e) for e, c in polynomial.items()}
 

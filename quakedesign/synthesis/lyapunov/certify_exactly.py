@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from typing import Any
 
 from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certificate_text, parse_certificate
 from quakedesign.certificates.obligations import Obligation, Obligations, claimed, degree, different, with_decay
@@ -47,7 +48,7 @@ def witness_of(one: Obligation, domain: str) -> Witness | None:
     """Exact witness of one obligation, with the lowest power of the sum of all variables that works as multiplier."""
     size = width(one)
     if not one.polynomial:
-        empty: tuple[dict, ...] = tuple({} for _ in one.equalities)
+        empty: tuple[dict[Any, Any], ...] = tuple({} for _ in one.equalities)
         return Witness(multiplier=constant(size), cofactors=empty, conditions=len(one.inequalities))
     first = _DECAY_LEVEL if one.name.startswith("decay") else 0
     for level in range(first, first + len(_LEVELS)) if domain == "cells" else (0,):
@@ -117,7 +118,7 @@ def with_largest_decay(
 
 def _largest(
     one: Obligation,
-    direction: Mapping,
+    direction: Mapping[Any, Any],
     domain: str,
     scale: Sequence[Fraction],
     level: int,

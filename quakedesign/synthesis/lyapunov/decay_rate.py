@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -113,7 +114,7 @@ def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
     return min(found)
 
 
-def _lifted(points, one: Obligation):
+def _lifted(points: Any, one: Obligation) -> Any:
     """Points with the variables of nested powers, and which of them are in the cell."""
     kept = np.full(len(points), True)
     for equality in one.equalities:
@@ -141,7 +142,7 @@ def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
     return {tuple(int(i == j) for j in range(size)): max(float(c), least) for i, c in enumerate(coefficients)}
 
 
-def _points(potential: Polynomial, m: int):
+def _points(potential: Polynomial, m: int) -> Any:
     """Directions spread over a cell (k × n), every variable in the unit in which V is one on its axis."""
     size = len(next(iter(potential)))
     corners = [abs(float(potential.get(tuple(m * (i == j) for j in range(size)), 0))) for i in range(size)]
@@ -150,7 +151,7 @@ def _points(potential: Polynomial, m: int):
     return rng.dirichlet(np.full(size, 0.5), _POINTS) * units
 
 
-def _values(polynomial: Polynomial, points):
+def _values(polynomial: Polynomial, points: Any) -> Any:
     exponents = np.array(list(polynomial), dtype=float)
     coefficients = np.array([float(c) for c in polynomial.values()])
     return np.prod(points[:, None, :] ** exponents[None, :, :], axis=2) @ coefficients

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
+from typing import Any
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligations
@@ -42,7 +43,7 @@ class Row:
 class Structure:
     """All of a loop that the rows depend on, to tell whether they can be used again."""
 
-    loop: tuple
+    loop: tuple[Any, ...]
     inside: tuple[tuple[str, Fraction], ...]
     points: tuple[tuple[str, bool, bool], ...]
     degree: int
@@ -75,7 +76,7 @@ def rows_of(kin: Kin) -> tuple[Row, ...]:
     """Every different row of the monomials of V."""
     loop, degree = kin.loop, kin.structure.degree
     columns = [Obligations(loop, (term,)) for term in signed_monomials(loop.states, degree, loop.domain)]
-    found: dict[tuple, Row] = {}
+    found: dict[tuple[Any, ...], Row] = {}
     for row in (*_functions(columns), *_falls(loop, columns)):
         conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
         found.setdefault((row.function, row.fall, conditions), row)
@@ -102,7 +103,7 @@ def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[Row]:
         word = "".join("+" if cell.signs[s] > 0 else "-" for s in loop.states)
         for choice in product(*ends.values()):
             vertex = dict(zip(ends, choice, strict=True))
-            total: dict[tuple, float] = {}
+            total: dict[tuple[Any, ...], float] = {}
             for j, names, exponents, coefficient in plain:
                 chosen = [vertex.get(name, (name, 1)) for name in names]
                 key = (j, tuple(exponents[i] for i in kept), tuple(sorted(name for name, _ in chosen)))

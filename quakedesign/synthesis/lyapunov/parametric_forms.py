@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
+from typing import Any
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Cell, Obligations, power_sum
@@ -69,7 +70,7 @@ def rows_of(loop: Loop, monomials: Sequence[Term]) -> tuple[Row, ...]:
         When the law has nested powers that certificates do not know.
     """
     columns = [Obligations(loop, (term,)) for term in monomials]
-    found: dict[tuple, Row] = {}
+    found: dict[tuple[Any, ...], Row] = {}
     for row in (*_functions(columns), *_rates(loop, columns)):
         conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
         found.setdefault((row.rate, row.parts, conditions), row)
@@ -93,7 +94,7 @@ def _rates(loop: Loop, columns: Sequence[Obligations]) -> Iterator[Row]:
         plain = [(j, term.parameters, *_single(term, weights, cell.signs)) for j, term in terms]
         for choice in product(*ends.values()):
             vertex = dict(zip(ends, choice, strict=True))
-            total: dict[tuple, Fraction] = {}
+            total: dict[tuple[Any, ...], Fraction] = {}
             for j, names, exponents, coefficient in plain:
                 chosen = [vertex.get(name, (name, 1)) for name in names]
                 for _, factor in chosen:

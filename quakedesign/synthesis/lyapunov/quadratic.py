@@ -1,6 +1,7 @@
 """Quadratic Lyapunov functions as matrices, in floating point: proposals, no proofs."""
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +12,12 @@ from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov.balancing import below
 
 
-def quadratic_matrix(loop: Loop, lyapunov: tuple[Term, ...]):
+def quadratic_matrix(loop: Loop, lyapunov: tuple[Term, ...]) -> Any:
     """Matrix of a quadratic V, as floats (n × n)."""
     return _matrix(next(iter(Obligations(loop, lyapunov).function()))[1], len(loop.states))
 
 
-def _matrix(polynomial: Polynomial, size: int):
+def _matrix(polynomial: Polynomial, size: int) -> Any:
     full = np.zeros((size, size))
     for exponents, c in polynomial.items():
         i, *rest = [k for k, e in enumerate(exponents) for _ in range(e)]

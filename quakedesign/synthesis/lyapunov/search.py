@@ -160,7 +160,7 @@ def _moved(one: Obligation, scale: Sequence[Fraction], factor: Fraction) -> Obli
         )
     whole = lifted_scale(one.equalities, scale)
 
-    def normal(p: Polynomial) -> dict:
+    def normal(p: Polynomial) -> Polynomial:
         found = scaled(p, whole)
         size = max(abs(c) for c in found.values())
         return {e: c / size for e, c in found.items()}

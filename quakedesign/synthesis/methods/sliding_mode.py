@@ -25,7 +25,8 @@ from quakedesign.errors import CertificateError, KinkError, ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import Answer, Compensation, attacked, guarantee_of, sampled_sliding_mode
-from quakedesign.synthesis.guaranteed.sliding import GUARANTEED, sliding_mode
+from quakedesign.synthesis.guaranteed.compensated import GUARANTEED
+from quakedesign.synthesis.guaranteed.sliding import sliding_mode
 from quakedesign.synthesis.lyapunov.search import find_certificate
 from quakedesign.synthesis.methods.base import Designed, Method, Problem, Wanted
 

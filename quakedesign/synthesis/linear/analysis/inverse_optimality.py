@@ -61,7 +61,7 @@ class InverseOptimality:
         """Mean angular frequency [rad/s] of the refuting signal, √(z2/z1)."""
         if not self.moments or not self.moments[0]:
             return None
-        return (float(self.moments[1] / self.moments[0])) ** 0.5 / float(self.scales.time)
+        return float(float(self.moments[1] / self.moments[0]) ** 0.5) / float(self.scales.time)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values; matrices as texts p/q."""

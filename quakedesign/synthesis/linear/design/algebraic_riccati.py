@@ -75,7 +75,7 @@ def _rational(matrix: Any) -> Matrix:
     return tuple(tuple(v if isinstance(v, Fraction) else Fraction(float(v)) for v in row) for row in matrix)
 
 
-def _scaled(a: Matrix, g: Matrix, q: Matrix, units) -> tuple[Matrix, Matrix, Matrix]:
+def _scaled(a: Matrix, g: Matrix, q: Matrix, units: Any) -> tuple[Matrix, Matrix, Matrix]:
     """Data in states y with x = diag(units)·y."""
 
     def change(m: Matrix, left: int, right: int) -> Matrix:

@@ -51,7 +51,9 @@ def polytope_of(loop: Loop) -> Polytope:
     ParameterError
         For a field that is not linear.
     """
-    linear = all(len(t.factors) == 1 and t.factors[0][1:] == (1, "s") for terms in loop.field.values() for t in terms)
+    linear = all(
+        len(t.factors) == 1 and t.factors[0][1:] == (Fraction(1), "s") for terms in loop.field.values() for t in terms
+    )
     if loop.domain != "reals" or not linear:
         raise ParameterError(f"a polytope needs a linear field. Received the one of {loop.law}.")
     names = tuple(loop.uncertain)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.linear_premises import Sectors, rest_pressure, sectors
@@ -60,7 +61,7 @@ class UncertaintyBounds:
     rest_pressure: Range
     nonvanishing: Fraction
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values, SI."""
         return {
             "g1": float_above(self.sectors.row_bounds[0]),
@@ -130,7 +131,7 @@ def uncertainty_bounds(fault: Fault, *, loading_rate: float | str = 0) -> Uncert
     )
 
 
-def _terms(fault: Fault, found: Sectors, ranges, values, drift: Fraction) -> list[tuple[str, str, Range]]:
+def _terms(fault: Fault, found: Sectors, ranges: Any, values: Any, drift: Fraction) -> list[tuple[str, str, Range]]:
     """Name, what it acts on, and range in x2' of every term of b·h."""
     friction, disturbance = friction_bounds(fault.friction), fault.disturbance
     load = ranges[plant.N_hat][1] * found.largest_effective_stress
