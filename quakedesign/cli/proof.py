@@ -129,7 +129,14 @@ def _certify_on_fault(
 
 
 @app.command
-def check(*files: Path, fault: str | None = None, output: Output = PLAIN) -> int:
+def check(
+    *files: Path,
+    fault: str | None = None,
+    rocq: Annotated[bool, Parameter(negative="")] = False,
+    out: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
     """Re-check certificate files in exact arithmetic. Exit code 0 only if all are proved.
 
     Parameters
@@ -138,16 +145,39 @@ def check(*files: Path, fault: str | None = None, output: Output = PLAIN) -> int
         Certificate files (proofs/FORMAT.md).
     fault
         Preset or .toml file whose constants and ranges the certificates must cover as well.
+    rocq
+        Write a file that Rocq's compiler, coqc, verifies, for every certificate that is not invalid. Exit code 1 if a
+        kind of certificate has none.
+    out
+        With --rocq: folder for its files; ./quakedesign-rocq unless given.
     """
     from quakedesign.certificates.command import check_files
 
     if not files:
         raise ParameterError("check needs at least one certificate file. Received none. Give a path.")
+    if out is not None and not rocq:
+        raise ParameterError("--out is the folder of --rocq. Received it alone. Add --rocq or leave it out.")
     verdicts = check_files(files, fault)
+    kept = [path for path in dict.fromkeys(files) if verdicts[str(path)][0] in ("proved", "refuted")]
+    written = _write_rocq(kept, out or Path("quakedesign-rocq"), force) if rocq else {}
     said = (
         line
         for path, (verdict, statement) in verdicts.items()
-        for line in (f"{path}: {verdict}", *(f"    {line}" for line in statement))
+        for line in (f"{path}: {verdict}", *(f"    {line}" for line in (*statement, *written.get(path, ())[1:])))
     )
-    output.show({"files": {path: verdict for path, (verdict, _) in verdicts.items()}}, said)
-    return 0 if all(verdict == "proved" for verdict, _ in verdicts.values()) else 1
+    facts: dict[str, Any] = {"files": {path: verdict for path, (verdict, _) in verdicts.items()}}
+    if rocq:
+        facts["rocq"] = {path: written[path][0] if path in written else None for path in verdicts}
+    output.show(facts, said)
+    complete = not rocq or None not in facts["rocq"].values()
+    return 0 if complete and all(verdict == "proved" for verdict, _ in verdicts.values()) else 1
+
+
+def _write_rocq(files: list[Path], folder: Path, force: bool) -> dict[str, tuple[str | None, str]]:
+    """Path of the file for coqc, or None, and what is said of it, by certificate."""
+    from quakedesign.certificates.rocq import write_rocq
+
+    return {
+        str(path): (None, f"no file for coqc: {made}") if isinstance(made, str) else (str(made), f"for coqc: {made}")
+        for path, made in write_rocq(files, folder, force=force).items()
+    }

@@ -1,0 +1,195 @@
+"""Self-contained files that Rocq's compiler verifies: the library of ``proofs/rocq``, a statement and its proof."""
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from quakedesign.certificates.claim import Evidence
+from quakedesign.certificates.files import evidence_of, read_json
+from quakedesign.certificates.guarantee.files import is_guarantee
+from quakedesign.certificates.obligations import claimed, different
+from quakedesign.certificates.rocq import gallina
+from quakedesign.certificates.rocq.integers import in_integers
+from quakedesign.certificates.rocq.multipliers import reason
+from quakedesign.certificates.witnesses import statement_of
+from quakedesign.errors import OutputError, UnsupportedError
+from quakedesign.output import write_whole
+from quakedesign.sos.exact.files import is_about_polynomial
+from quakedesign.sos.exact.files import read as read_polynomial_file
+from quakedesign.sos.exact.polynomial import evaluate
+from quakedesign.sos.exact.proofs import Point, SumOfSquares
+from quakedesign.sos.exact.statement import Statement
+
+_LIBRARY = ("squares.v", "positivity.v")
+_DATA = "(* " + "=" * 16 + " the certificate *)\n\nLocal Open Scope nat_scope.\n"
+
+
+def rocq_text(raw: Any) -> str:
+    """Text of the file for ``coqc``, from a parsed certificate file; the same for the same certificate.
+
+    Raises
+    ------
+    CertificateError
+        When the certificate breaks a rule of FORMAT.md.
+    UnsupportedError
+        For a kind that has no theorem in ``proofs/rocq``.
+    """
+    return "\n".join([*library(), _DATA, statement_text(raw)])
+
+
+def statement_text(raw: Any) -> str:
+    """Statement, data and theorem, without the library. Raises as `rocq_text`."""
+    return "\n".join(_polynomial(raw) if is_about_polynomial(raw) else _loop(raw)) + "\n"
+
+
+def write_rocq(paths: Iterable[Path], folder: Path, *, force: bool = False) -> dict[Path, Path | str]:
+    """Write a file for ``coqc`` for every certificate file, whole or not at all.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        Certificate files that were checked.
+    folder : Path
+        Where to write NAME.v, every character of the certificate's name that Rocq does not take an underscore.
+    force : bool
+        Replace files that exist.
+
+    Returns
+    -------
+    dict of Path to Path or str
+        The file, or why there is none.
+
+    Raises
+    ------
+    OutputError
+        When a file exists or cannot be written, or two certificates have one name.
+    """
+    targets: dict[Path, Path] = {}
+    for path in paths:
+        target = folder / f"{module_name(path.stem)}.v"
+        if target in targets.values():
+            raise OutputError(f"files for coqc must differ in name. Received {target} twice. Write one by one.")
+        if target.exists() and not force:
+            raise OutputError(
+                f"file for coqc must be new. Received {target}, which exists. Give --force to replace it."
+            )
+        targets[path] = target
+    return {path: _written(path, target) for path, target in targets.items()}
+
+
+def _written(path: Path, target: Path) -> Path | str:
+    try:
+        text = rocq_text(read_json(path))
+    except UnsupportedError as error:
+        return str(error)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(target, text)
+    return target
+
+
+def module_name(stem: str) -> str:
+    """Name that Rocq takes for a file."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", stem)
+    return name if name[:1].isalpha() else f"certificate_{name}"
+
+
+def library() -> list[str]:
+    """Text of the files of ``proofs/rocq``, in order.
+
+    Raises
+    ------
+    UnsupportedError
+        When they are missing.
+    """
+    package = Path(__file__).resolve().parents[2]
+    places = [base / "proofs" / "rocq" for base in (package, package.parent)]
+    for place in places:
+        if place.is_dir():
+            return [(place / name).read_text(encoding="utf-8") for name in _LIBRARY]
+    raise UnsupportedError(f"the Rocq library must be in {places[0]}. Found nothing. Install the package again.")
+
+
+def _polynomial(raw: Any) -> Iterator[str]:
+    asked, proof = read_polynomial_file(raw)
+    yield f"(* variables 0, 1, ...: {', '.join(asked.variables)} *)"
+    yield f"Definition asked : question := {gallina.question(asked)}."
+    if isinstance(proof, Point):
+        yield from _negative(asked, proof)
+    elif isinstance(proof, SumOfSquares):
+        yield from _nonnegative(asked, proof)
+    else:
+        raise UnsupportedError(
+            "a certificate for coqc must be sos, negative or a proof for a closed loop. Received not-sos. Use check.py."
+        )
+
+
+def _negative(asked: Statement, proof: Point) -> Iterator[str]:
+    yield f"Definition point : list Q := {gallina.listed(map(gallina.rational, proof.coordinates))}."
+    values = (evaluate(p, proof.coordinates) for p in (asked.polynomial, *asked.inequalities))
+    yield f"Definition values : list Q := {gallina.listed(map(gallina.rational, values))}."
+    yield _accepted("negative asked point values")
+    yield (
+        "Theorem certificate :\n"
+        "  within (real_point point) asked /\\ (at_point (real_point point) (target asked) < 0)%R.\n"
+        "Proof. exact (negative_sound asked point values accepted). Qed.\nPrint Assumptions certificate."
+    )
+
+
+def _nonnegative(asked: Statement, proof: SumOfSquares) -> Iterator[str]:
+    why = reason(asked, proof.multiplier)
+    yield f"Definition proof : witness := {gallina.witness(in_integers(asked, proof.squares, proof.cofactors))}."
+    yield f"Definition why : reason := {gallina.reason(why)}."
+    yield _accepted("nonnegative asked proof why")
+    yield (
+        "Theorem certificate : forall x, within x asked -> (0 <= at_point x (target asked))%R.\n"
+        "Proof. exact (nonnegative_sound asked proof why accepted). Qed.\nPrint Assumptions certificate."
+    )
+
+
+def _accepted(check: str, name: str = "accepted") -> str:
+    return f"Lemma {name} : {check} = true.\nProof. vm_cast_no_check (eq_refl true). Qed."
+
+
+def _loop(raw: Any) -> Iterator[str]:
+    if is_guarantee(raw) or (isinstance(raw, dict) and "refutation" in raw):
+        raise UnsupportedError(
+            "a certificate for coqc must be sos, negative or a proof for a closed loop. "
+            f"Received a {'guarantee' if is_guarantee(raw) else 'refutation'}. Use check.py."
+        )
+    evidence = evidence_of(raw)
+    names = []
+    for number, (name, text) in enumerate(_obligations(evidence)):
+        names.append(number)
+        yield f"(* {name} *)\n{text.replace('@', str(number))}"
+    inside = "" if evidence.loop.domain == "reals" else "(forall k, 0 < x k)%R -> "
+    yield (
+        f"Theorem certificate : Forall (fun q => forall x, {inside}within x q -> (0 <= at_point x (target q))%R)\n"
+        f"  {gallina.listed(f'asked_{n}' for n in names)}.\n"
+        f"Proof. exact ({''.join(f'Forall_cons _ holds_{n} (' for n in names)}Forall_nil _{')' * len(names)}). Qed.\n"
+        "Print Assumptions certificate."
+    )
+
+
+def _obligations(evidence: Evidence) -> Iterator[tuple[str, str]]:
+    """Name of every obligation, and its question and proof with @ for its number."""
+    domain = evidence.loop.domain
+    for one in different(claimed(evidence.loop, evidence.lyapunov, evidence.claims)):
+        given = evidence.witnesses[one.name]
+        asked = statement_of(one, domain, given.multiplier)
+        proof = in_integers(asked, given.squares, given.cofactors)
+        check, sound = ("on_cell", "on_cell_sound asked_@ proof_@ accepted_@")
+        if domain == "reals":
+            check, sound = "nonnegative", "nonnegative_sound asked_@ proof_@ Terms accepted_@"
+        tail = " Terms" if domain == "reals" else ""
+        yield (
+            one.name,
+            "\n".join(
+                [
+                    f"Definition asked_@ : question := {gallina.question(asked)}.",
+                    f"Definition proof_@ : witness := {gallina.witness(proof)}.",
+                    _accepted(f"{check} asked_@ proof_@{tail}", "accepted_@"),
+                    f"Definition holds_@ := {sound}.\n",
+                ]
+            ),
+        )
