@@ -4,28 +4,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.cli.hardware import ActuatorOptions, SensorOptions
-from quakedesign.cli.options import FaultName
-from quakedesign.cli.shared import (
-    Force,
-    Gains,
-    Json,
-    Metres,
-    MetresPerSecond,
-    Push,
-    Seconds,
-    Whole,
-    app,
-    console,
-    print_json,
-    progress,
-)
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, LawOptions, Output, RunOptions
+from quakedesign.cli.shared import Metres, MetresPerSecond, Whole, app, console, progress
 from quakedesign.errors import ParameterError
 from quakedesign.interruption import remedy
 
 if TYPE_CHECKING:
     from quakedesign.simulation.campaign import Campaign, Problem
 
-_DIRECT, _EXACT = ActuatorOptions(), SensorOptions()
+_DIRECT, _EXACT, _LAW, _USUAL = ActuatorOptions(), SensorOptions(), LawOptions(), RunOptions()
 
 
 @app.command
@@ -34,19 +21,12 @@ def campaign(
     /,
     *,
     samples: Whole,
-    controller: str = "cta",
-    gains: Gains = ("published",),
-    scale: str | None = None,
-    feedforward: str = "none",
+    law: LawOptions = _LAW,
+    run: RunOptions = _USUAL,
     scheme: str | None = None,
-    step: Seconds | None = None,
-    substeps: Whole = 1,
     method: str = "dormand-prince",
-    duration: Seconds | None = None,
     plant: str = "smooth",
-    drift: MetresPerSecond = 0.0,
-    perturbation: Push | None = None,
-    box: str | None = None,
+    box: Box = None,
     actuator: ActuatorOptions = _DIRECT,
     sensors: SensorOptions = _EXACT,
     initial_slip: Metres = 0.0,
@@ -58,7 +38,7 @@ def campaign(
     scheduler: str | None = None,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Run many samples over the uncertainty box, disturbances, noise and initial states, and report how bad they get.
 
@@ -70,33 +50,13 @@ def campaign(
     ----------
     samples
         Number of samples.
-    controller
-        none, cta, dia or elqr.
-    gains
-        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min).
-    scale
-        λ of a sliding mode in place of that of the gains, decimal or p/q.
-    feedforward
-        none, nominal or centred.
     scheme
         explicit (unless given), implicit, semi-implicit or compensated (sampled control), or continuous. Designed laws
         are sampled and have their own.
-    step
-        Length of one step; the fault's sampling time unless given.
-    substeps
-        Steps of the integrator per sample.
     method
         dormand-prince or rk4.
-    duration
-        Of every run; the operation time unless given.
     plant
         smooth or coulomb.
-    drift
-        Velocity of the far end, such as '3 cm/year'.
-    perturbation
-        Of the user's in m/s^2, added to the fault's own: an expression of slip, slip_rate and time.
-    box
-        Uncertainty box: paper or ten-percent.
     initial_slip
         Largest slip at the start.
     initial_rate
@@ -113,49 +73,40 @@ def campaign(
         Address of a dask.distributed scheduler to use instead.
     out
         Folder; ./quakedesign-FAULT-campaign unless given.
-    force
-        Replace another campaign in the folder.
-    json
-        Print JSON.
     """
     from quakedesign.fault import load_fault
     from quakedesign.loop.schemes import own_way
-    from quakedesign.simulation import Load
-    from quakedesign.simulation import perturbation as read_perturbation
     from quakedesign.simulation.campaign import campaign_problem, run_campaign
     from quakedesign.simulation.run import sampled_scheme
-    from quakedesign.studies.single import optional_choice
 
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
     found = load_fault(fault, box=box)
-    law = optional_choice(found, controller, gains, scale=scale, feedforward=feedforward)
-    way, step, own = own_way(law.controller if law else None, scheme, step)
+    chosen = law.choose(found)
+    controller = chosen.controller if chosen else None
+    way, step, own = own_way(controller, scheme, run.step)
     period = found.sampling_time if step is None else step
     problem = campaign_problem(
         found,
-        law.controller if law else None,
-        scheme=sampled_scheme(way, substeps, actuator.build(period), sensors.build(period), **own),
+        controller,
+        scheme=sampled_scheme(way, run.substeps, actuator.build(period), sensors.build(period), **own),
         step=step,
         method=method,
-        duration=duration,
+        duration=run.duration,
         plant=plant,
-        load=Load(drift=drift, perturbation=None if perturbation is None else read_perturbation(perturbation)),
+        load=run.load(),
         initial_slip=initial_slip,
         initial_slip_rate=initial_rate,
         seed=seed,
     )
     folder = out or Path(f"quakedesign-{found.name}-campaign")
-    chosen: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
+    options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
     remedy(f"the same command goes on from {folder}")
     with progress() as tell:
-        done = run_campaign(problem, samples, folder, tell=tell, **chosen)
+        done = run_campaign(problem, samples, folder, tell=tell, **options)
         done.save(folder)
         answer = done.to_dict() | _again(done, rerun, folder)
-    if json:
-        print_json(answer)
-    else:
-        _print(problem, done, answer, folder)
+    output.show(answer, lambda: _print(problem, done, answer, folder))
     return 1 if done.failures else 0
 
 

@@ -6,18 +6,8 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import FaultName
-from quakedesign.cli.shared import (
-    ExactMetres,
-    ExactMetresPerSecond,
-    Force,
-    Json,
-    app,
-    console,
-    print_json,
-    print_lines,
-    progress,
-)
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Output
+from quakedesign.cli.shared import ExactMetres, ExactMetresPerSecond, app, console, print_lines, progress
 from quakedesign.errors import ParameterError, UnknownNameError
 
 
@@ -81,12 +71,12 @@ def design(
     /,
     *,
     controller: str = "all",
-    box: str | None = None,
+    box: Box = None,
     options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Derive, synthesise, prove, simulate, compare with the published gains, and write a report.
 
@@ -98,16 +88,10 @@ def design(
     ----------
     controller
         cta, dia, elqr or all.
-    box
-        Uncertainty box: paper or ten-percent.
     published_scheme
         Of the runs of published gains, see --scheme.
     out
         Folder to write; ./quakedesign-FAULT unless given.
-    force
-        Replace a folder of earlier results.
-    json
-        Print results.json on stdout.
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare
@@ -123,13 +107,14 @@ def design(
     with progress() as tell:
         comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
         results = write_folder(comparison, folder, force=force, tell=tell)
-    if json:
-        print_json(results)
-    else:
+
+    def said() -> None:
         from quakedesign.report.terminal import print_comparison
 
         print_comparison(comparison, console())
         print_lines(["", f"written: {folder}/ (results.json, report.html, certificates, figures)"])
+
+    output.show(results, said)
     return 0 if positive(comparison) else 1
 
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from quakedesign.cli.design import DesignOptions, controllers, positive
-from quakedesign.cli.options import FaultName
-from quakedesign.cli.shared import Force, Json, app, console, print_json, print_lines, progress
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Output
+from quakedesign.cli.shared import app, console, print_json, print_lines, progress
 
 _AS_USUAL = DesignOptions()
 
@@ -15,10 +15,10 @@ def compare(
     /,
     *,
     controller: str = "all",
-    box: str | None = None,
+    box: Box = None,
     options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Design, prove, simulate and compare with the published gains as `design` does, and write nothing.
 
@@ -28,12 +28,8 @@ def compare(
     ----------
     controller
         Law to design: cta, dia, elqr or all.
-    box
-        Uncertainty box: paper or ten-percent.
     published_scheme
         Of the runs of published gains, see --scheme.
-    json
-        Print JSON with the keys of design's results.json.
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.comparison import designed_comparison
@@ -44,7 +40,7 @@ def compare(
     told = options.told(names)
     with progress() as tell:
         comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
-    if json:
+    if output.json:
         beside = {"numbers": table(comparison), "printed": printed(comparison)}
         print_json({**results(comparison, stored=False), **beside})
     else:
@@ -61,12 +57,12 @@ def figures(
     /,
     *,
     controller: str = "all",
-    box: str | None = None,
+    box: Box = None,
     options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Draw the figures of the paper that show simulations, for any fault, published gains beside designed ones.
 
@@ -76,16 +72,10 @@ def figures(
     ----------
     controller
         Law to design: cta, dia, elqr or all.
-    box
-        Uncertainty box: paper or ten-percent.
     published_scheme
         Of the runs of published gains, see --scheme.
     out
         Folder to write; ./quakedesign-FAULT unless given.
-    force
-        Replace a folder of earlier results.
-    json
-        Print results.json on stdout.
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare, write_folder
@@ -103,7 +93,7 @@ def figures(
         comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
         study = paper_study(comparison, progress=tell)
         results = write_folder(comparison, folder, force=force, study=study, tell=tell)
-    if json:
+    if output.json:
         print_json(results)
         return 0
     runs = ((e.label, "; ".join(run_sentences(e.run, found))) for e in comparison.entries if e.run)

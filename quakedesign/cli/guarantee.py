@@ -5,19 +5,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import FaultName
-from quakedesign.cli.shared import (
-    ExactMetres,
-    ExactMetresPerSecond,
-    ExactSeconds,
-    Force,
-    Gains,
-    Json,
-    app,
-    new_file,
-    print_json,
-    print_lines,
-)
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Output
+from quakedesign.cli.shared import ExactMetres, ExactMetresPerSecond, ExactSeconds, Gains, app, new_file
 from quakedesign.rationals import rational
 
 
@@ -38,10 +27,10 @@ def guarantee(
     slip_noise: ExactMetres = "0",
     rate_noise: ExactMetresPerSecond = "0",
     disturbance_class: Annotated[Literal["amplitude", "rate"], Parameter(name="--class")] = "amplitude",
-    box: str | None = None,
+    box: Box = None,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Prove how far slip, slip rate and pressure of the loop that runs can go: sampled, held, late, for ever.
 
@@ -75,14 +64,8 @@ def guarantee(
         The same of the measured slip rate.
     disturbance_class
         amplitude: any disturbance as large as the fault's; rate: one that starts at 0 and is no faster either.
-    box
-        Uncertainty box: paper or ten-percent.
     out
         Certificate file to write.
-    force
-        Replace an existing file.
-    json
-        Print JSON.
     """
     from time import perf_counter
 
@@ -110,9 +93,6 @@ def guarantee(
     )
     if out is not None and isinstance(found.found, Guarantee):
         save_guarantee(found.found, out)
-    if json:
-        written = str(out) if out is not None and found.proved else None
-        print_json({**found.to_dict(), "certificate": written, "seconds": perf_counter() - began})
-    else:
-        print_lines(found.lines())
+    written = str(out) if out is not None and found.proved else None
+    output.show({**found.to_dict(), "certificate": written, "seconds": perf_counter() - began}, found.lines())
     return 0 if found.proved else 1

@@ -4,13 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.cli.hardware import ActuatorOptions, EstimateOptions, SensorOptions
-from quakedesign.cli.options import FaultName
+from quakedesign.cli.options import PLAIN, FaultName, Force, LawOptions, NoLawOptions, Output, RunOptions
 from quakedesign.cli.shared import (
-    Force,
     Gains,
-    Json,
-    MetresPerSecond,
-    Push,
     Seconds,
     Texts,
     Whole,
@@ -22,8 +18,10 @@ from quakedesign.cli.shared import (
     progress,
 )
 from quakedesign.cli.state import NO_STATE, StateOptions, require_no_state_options, show_state_run
+from quakedesign.errors import ParameterError
 
 _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
+_NONE, _LAW, _USUAL = NoLawOptions(), LawOptions(), RunOptions()
 
 
 @app.command
@@ -31,27 +29,20 @@ def simulate(
     fault: FaultName,
     /,
     *,
-    controller: str = "none",
-    gains: Gains = ("published",),
-    scale: str | None = None,
-    feedforward: str = "none",
-    step: Seconds | None = None,
-    duration: Seconds | None = None,
+    law: NoLawOptions = _NONE,
+    run: RunOptions = _USUAL,
     scheme: str | None = None,
     weight: float | None = None,
     authority: float | None = None,
-    substeps: Whole = 1,
     method: str = "dormand-prince",
     plant: str = "smooth",
-    drift: MetresPerSecond = 0.0,
-    perturbation: Push | None = None,
     actuator: ActuatorOptions = _DIRECT,
     sensors: SensorOptions = _EXACT,
     state: StateOptions = NO_STATE,
     seed: Whole = 0,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Run one closed loop over the whole task, or the natural earthquake without a controller.
 
@@ -59,18 +50,6 @@ def simulate(
 
     Parameters
     ----------
-    controller
-        none, cta, dia or elqr.
-    gains
-        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min).
-    scale
-        λ of a sliding mode in place of that of the gains, decimal or p/q.
-    feedforward
-        none, nominal or centred: what a sliding mode adds to ν from what is known of the fault; not to designed gains.
-    step
-        Length of one step; the fault's sampling time unless given.
-    duration
-        The operation time unless given. Without a controller: the fault under its own disturbance.
     scheme
         continuous (unless given; the law in every stage of the integrator), or sampled and held: explicit, implicit,
         semi-implicit, compensated. Designed laws are sampled and have their own.
@@ -78,62 +57,50 @@ def simulate(
         Of the estimate of the disturbance in the scheme compensated, above 0, at most 1.
     authority
         B0 of a sampled scheme in m^2/kg; guarantee says weight and authority of the sliding modes that it proves.
-    substeps
-        Steps of the integrator per sample.
     method
         dormand-prince or rk4; cvodes or idas for smooth loops; for friction with a state radau, dop853, cvodes or idas.
     plant
         smooth (the paper's, for forward slip) or coulomb (set-valued friction: stick, slip, reversal); for friction
         with a state smooth or quasi-dynamic (without inertia).
-    drift
-        Velocity of the far end, such as '3 cm/year'.
-    perturbation
-        Of the user's in m/s^2, added to the fault's own: an expression of slip, slip_rate and time.
     seed
         Of the noise.
     out
         NetCDF file to write.
-    force
-        Replace an existing file.
-    json
-        Print JSON.
     """
     options = dict(locals())
     from quakedesign.fault import load_fault
     from quakedesign.loop.schemes import own_way
     from quakedesign.simulation import Load
-    from quakedesign.simulation import perturbation as read_perturbation
-    from quakedesign.studies.single import optional_choice, run_single
+    from quakedesign.studies.single import run_single
 
     new_file(out, "output file", force=force)
     found = load_fault(fault)
     if found.friction.state_names:
         return show_state_run(found, simulate, options)
     require_no_state_options(state, found)
-    law = optional_choice(found, controller, gains, scale=scale, feedforward=feedforward)
-    pushed = None if perturbation is None else read_perturbation(perturbation)
-    way, step, _ = own_way(law.controller if law else None, scheme, step, "continuous")
+    chosen, load = law.choose(found), run.load()
+    way, step, _ = own_way(chosen.controller if chosen else None, scheme, run.step, "continuous")
     period = found.sampling_time if step is None else step
     chain, told = actuator.build(period), sensors.build(period, seed)
     with progress() as tell:
         trajectory, premises = run_single(
             found,
-            law,
+            chosen,
             tell=lambda done: tell("simulation", done),
-            duration=duration,
-            load=Load(drift=drift, perturbation=pushed) if drift or pushed is not None else None,
+            duration=run.duration,
+            load=load if load != Load() else None,
             step=step,
             scheme=way,
             method=method,
             plant=plant,
-            substeps=substeps,
+            substeps=run.substeps,
             actuator=chain,
             noise=told,
             tuning={name: v for name, v in {"weight": weight, "authority": authority}.items() if v is not None},
         )
     if out is not None:
         trajectory.save(out)
-    if json:
+    if output.json:
         print_json(_answer(trajectory, found, premises))
     else:
         _print_run(trajectory, found, premises)
@@ -182,7 +149,7 @@ def sampling(
     duration: Seconds | None = None,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Show what sampling does: every scheme beside the published controllers, orders of accuracy, sensitivities.
 
@@ -203,10 +170,6 @@ def sampling(
         Of the runs; the operation time unless given.
     out
         Folder to write; ./quakedesign-FAULT-sampling unless given.
-    force
-        Replace a folder of earlier results.
-    json
-        Print results.json on stdout.
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare
@@ -227,11 +190,12 @@ def sampling(
         )
         report = sampling_report(found, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
         results = write_sampling(report, folder)
-    if json:
-        print_json(results)
-    else:
+
+    def told() -> None:
         print_sampling(report, console())
         print_lines(["", f"written: {folder}/ (results.json, figures)"])
+
+    output.show(results, told)
     return 0
 
 
@@ -240,59 +204,42 @@ def export(
     fault: FaultName,
     /,
     *,
-    controller: str = "cta",
-    gains: Gains = ("published",),
-    scale: str | None = None,
-    feedforward: str = "none",
+    law: LawOptions = _LAW,
     step: Seconds | None = None,
     scheme: str | None = None,
     sensors: EstimateOptions = _TOLD,
     out: Path | None = None,
     force: Force = False,
-    json: Json = False,
+    output: Output = PLAIN,
 ) -> int:
     """Write a controller as C for the computer of a laboratory: one function, called once per sample.
 
     Parameters
     ----------
-    controller
-        cta, dia or elqr.
-    gains
-        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min).
-    scale
-        λ of a sliding mode in place of that of the gains, decimal or p/q.
-    feedforward
-        none, nominal or centred.
     step
         Sampling period; the fault's unless given.
     scheme
         explicit (unless given), implicit, semi-implicit or compensated.
     out
         Folder to write; ./quakedesign-FAULT-CONTROLLER unless given.
-    force
-        Replace a folder that holds an earlier export.
-    json
-        Print JSON.
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.exporting import export_lines
     from quakedesign.studies.exporting import export_answer
-    from quakedesign.studies.single import chosen_controller
 
     found = load_fault(fault)
-    law = chosen_controller(found, controller, gains, scale=scale, feedforward=feedforward)
-    folder = out or Path(f"quakedesign-{found.name}-{controller}")
+    chosen = law.choose(found)
+    if chosen is None:
+        raise ParameterError("export needs a controller. Received none. Give --controller.")
+    folder = out or Path(f"quakedesign-{found.name}-{chosen.controller.name}")
     answer = export_answer(
         found,
-        law,
+        chosen.controller,
         folder,
         step=step,
         scheme=scheme,
         **sensors.told(),
         force=force,
     )
-    if json:
-        print_json(answer)
-    else:
-        print_lines(export_lines(answer))
+    output.show(answer, export_lines(answer))
     return 0

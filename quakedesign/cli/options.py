@@ -2,11 +2,16 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import print_json, print_lines
+from quakedesign.cli.shared import Gains, MetresPerSecond, Push, Seconds, Whole, print_json, print_lines
+
+if TYPE_CHECKING:
+    from quakedesign.fault import Fault
+    from quakedesign.simulation import Load
+    from quakedesign.studies.single import Choice
 
 
 def _fault_name(_type: Any, tokens: Sequence[Any]) -> str:
@@ -31,7 +36,7 @@ class Output:
     Parameters
     ----------
     json
-        Print JSON, in SI units.
+        Print JSON, in SI units; results.json where that is written.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
@@ -47,3 +52,72 @@ class Output:
 
 
 PLAIN = Output()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class LawOptions:
+    """Law with its gains.
+
+    Parameters
+    ----------
+    controller
+        cta, dia or elqr, or module:Class of your own; none where a command can do without.
+    gains
+        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min).
+    scale
+        λ of a sliding mode in place of that of the gains, decimal or p/q.
+    feedforward
+        none, nominal or centred: what a sliding mode adds to ν from what is known of the fault; not to designed gains.
+    """
+
+    controller: str = "cta"
+    gains: Gains = ("published",)
+    scale: str | None = None
+    feedforward: str = "none"
+
+    def choose(self, fault: "Fault") -> "Choice | None":
+        """Controller for a fault and what is certified of it; None where none is asked for."""
+        from quakedesign.studies.single import optional_choice
+
+        return optional_choice(fault, self.controller, self.gains, scale=self.scale, feedforward=self.feedforward)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class NoLawOptions(LawOptions):
+    """Law with its gains; none unless given."""
+
+    controller: str = "none"
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """How a closed loop is run, and what acts on the fault.
+
+    Parameters
+    ----------
+    step
+        Length of one step; the fault's sampling time unless given.
+    duration
+        The operation time unless given. Without a controller: the fault under its own disturbance.
+    substeps
+        Steps of the integrator per sample.
+    drift
+        Velocity of the far end, such as '3 cm/year'.
+    perturbation
+        Of the user's in m/s^2, added to the fault's own: an expression of slip, slip_rate and time.
+    """
+
+    step: Seconds | None = None
+    duration: Seconds | None = None
+    substeps: Whole = 1
+    drift: MetresPerSecond = 0.0
+    perturbation: Push | None = None
+
+    def load(self) -> "Load":
+        """What acts on the fault beside its own disturbance."""
+        from quakedesign.simulation import Load, perturbation
+
+        return Load(drift=self.drift, perturbation=self.perturbation and perturbation(self.perturbation))

@@ -16,8 +16,6 @@ from quakedesign.output import require_room
 from quakedesign.rationals import rational
 from quakedesign.text import visible
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-Force = Annotated[bool, Parameter(negative="")]
 # Negative decimals are values anyhow; with leading hyphens allowed, options after the values would be values too.
 Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
 

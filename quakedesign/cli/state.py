@@ -1,13 +1,13 @@
 """Options of runs without control of faults whose friction has a state."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, is_dataclass
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
-from quakedesign.cli.shared import Seconds, print_json, print_lines
+from quakedesign.cli.shared import Seconds
 from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -66,8 +66,8 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
     from quakedesign.report.state_runs import state_run_lines
     from quakedesign.studies.state_runs import run_state
 
-    known = signature(command).parameters
-    changed = {name: value for name, value in options.items() if value != known[name].default}
+    usual = _single({name: option.default for name, option in signature(command).parameters.items()})
+    changed = {name: value for name, value in _single(options).items() if value != usual[name]}
     if foreign := [name for name in changed if name not in (*_TAKEN, *_AROUND)]:
         raise ParameterError(
             f"{', '.join(foreign)}: not for friction with a state, which runs without control. Received "
@@ -77,8 +77,13 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
     found = run_state(fault, **told, **options["state"].given())
     if options["out"] is not None:
         found.trajectory.save(Path(options["out"]))
-    if options["json"]:
-        print_json(found.to_dict())
-    else:
-        print_lines([found.trajectory.name, *(f"  {line}" for line in state_run_lines(found.to_dict()))])
+    said = [found.trajectory.name, *(f"  {line}" for line in state_run_lines(found.to_dict()))]
+    options["output"].show(found.to_dict(), said)
     return 0
+
+
+def _single(options: dict[str, Any]) -> dict[str, Any]:
+    """Options of all groups but that of the state, by their own names."""
+    groups = [name for name, value in options.items() if is_dataclass(value) and name != "state"]
+    alone = {name: value for name, value in options.items() if name not in groups}
+    return alone | {name: value for group in groups for name, value in asdict(options[group]).items()}

@@ -83,7 +83,7 @@ def test_a_locked_fault_starts_with_an_aged_state(capsys, patch):
     ("given", "said"),
     [
         (("--controller", "elqr"), "controller: not for friction with a state"),
-        (("--saturation", "1 MPa"), "actuator: not for friction with a state"),
+        (("--saturation", "1 MPa"), "saturation: not for friction with a state"),
         (("--plant", "coulomb"), "smooth or quasi-dynamic"),
         (("--start", "early"), "steady, locked or late"),
         (("--start", "locked"), "Give --hold"),
