@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import mul
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.laws import LinearLaw, Matrix, Row
@@ -105,4 +106,5 @@ def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: 
 
 def _sum(*parts: tuple[Fraction, Row]) -> Row:
     """Combination of rows."""
-    return tuple(sum((factor * row[i] for factor, row in parts), Fraction(0)) for i in range(len(parts[0][1])))
+    factors, rows = zip(*parts, strict=True)
+    return tuple(sum(map(mul, factors, column), Fraction(0)) for column in zip(*rows, strict=True))

@@ -65,6 +65,7 @@ def test_a_constant_pressure_against_a_disturbance_is_a_steady_state():
     ],
 )
 def test_sizes_that_do_not_fit_and_pressures_that_move_nothing_are_refused(wrong):
+    assert replace(MODEL, of_slip=F(1)).of_slip == 1
     with pytest.raises(ParameterError, match="a model of 3 pressures needs 3 × 3 numbers"):
         replace(MODEL, **wrong)
 

@@ -308,6 +308,7 @@ def test_exponents_reach_up_to_999():
 
 def test_steps_are_counted_with_the_square_of_the_length():
     budget = exact_numbers.Budget()
+    assert budget.left == exact_numbers.MAX_STEPS
     budget.left = 100
     budget.spend(3, 1023)
     assert budget.left == 97
@@ -318,6 +319,13 @@ def test_steps_are_counted_with_the_square_of_the_length():
     budget.spend(86, 0)
     with pytest.raises(checker.Refused, match="fewer steps"):
         budget.spend(1, 0)
+
+
+def test_other_elements_than_monomials_are_read_where_they_are_asked_for():
+    entry = {"product": [], "basis": [{"1": "3"}], "gram": ["2"]}
+    assert squares.read_square(entry, "here", "product", 1, mixed=True) == ([], [{(1,): 3}], {(2,): 18})
+    with pytest.raises(checker.Refused):
+        squares.read_square(entry, "here", "product", 1)
 
 
 def plain(*equalities, inequalities=(), degree=0):

@@ -22,9 +22,9 @@ def backward_euler(law: Law) -> tuple[sp.Expr, ...]:
     at the end, and the others at the start of the step.
     """
     pressure, ends = _at_end(law, ERRORS | AHEAD)
-    if direction(pressure) not in (0, -1):
+    if direction(pressure) != -1:
         pressure, ends = _at_end(law, ERRORS)
-    feed_forward = pressure.subs(dict.fromkeys((end_slip, end_rate, *law.integrals), 0), simultaneous=True)
+    feed_forward = pressure.subs(dict.fromkeys((end_slip, end_rate, *law.integrals), 0))
     pull = sampled_law.step * sampled_law.authority * (pressure - feed_forward)
     return sp.expand_mul(pull), feed_forward, *map(sp.expand_mul, ends)
 

@@ -62,7 +62,7 @@ class Law:
     @property
     def feed_forward(self) -> sp.Expr:
         """What the law asks for without errors and integral states [Pa]."""
-        return self.pressure.subs(dict.fromkeys((slip_error, rate_error, *self.integrals), 0), simultaneous=True)
+        return self.pressure.subs(dict.fromkeys((slip_error, rate_error, *self.integrals), 0))
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,9 @@ class Lifted:
 
 def _lift(node: Any, found: dict[sp.Expr, sp.Symbol]) -> Any:
     if node.is_number:
-        return node if node in (0, 1, -1) else sp.sign(node) * _named(abs(node), found)
+        if node in (0, 1, -1):
+            return node
+        return sp.sign(node) * found.setdefault(abs(node), sp.Symbol(f"number_{len(found)}", positive=True))
     if node.is_Add or node.is_Mul:
         numbers = node.func(*(arg for arg in node.args if arg.is_number))
         rest = sorted((arg for arg in node.args if not arg.is_number), key=_structure)
@@ -105,7 +107,3 @@ def _lift(node: Any, found: dict[sp.Expr, sp.Symbol]) -> Any:
 def _structure(node: sp.Expr) -> Any:
     """Key for sorting that does not depend on a factor of the node, so that names do not depend on values."""
     return sp.default_sort_key(node.as_independent(*node.free_symbols, as_Add=False)[1])
-
-
-def _named(size: sp.Expr, found: dict[sp.Expr, sp.Symbol]) -> sp.Expr:
-    return sp.Integer(1) if size == 1 else found.setdefault(size, sp.Symbol(f"number_{len(found)}", positive=True))

@@ -99,6 +99,7 @@ def test_the_compensated_scheme_starts_without_a_sample_and_in_the_middle_of_the
 def test_schemes_are_found_by_name_and_settings_are_theirs():
     assert schemes()["explicit"] is Explicit
     assert isinstance(simulation_scheme("compensated", weight=0.1), Compensated)
+    assert isinstance(simulation_scheme("quakedesign.loop.schemes.explicit:Explicit"), Explicit)
     with pytest.raises(ParameterError, match="scheme must be one of compensated, continuous, explicit"):
         simulation_scheme("other")
     with pytest.raises(ParameterError, match=r"settings of weight are for the schemes compensated\. Received explicit"):

@@ -23,6 +23,17 @@ def test_every_integral_state_has_the_one_before_it_at_the_end():
     assert same(backward_euler(law), (pull, 0, first, second))
 
 
+def test_states_are_replaced_at_once_whatever_they_are_called():
+    """Those before come later in the alphabet."""
+    last, middle, first = sp.symbols("a b c", real=True)
+    law = Law(ERRORS - middle - last, (slip_error, first, middle), (first, middle, last))
+    ends = [first + step * end_slip]
+    ends.append(middle + step * ends[0])
+    ends.append(last + step * ends[1])
+    pull = step * authority * (-2 * end_slip - 3 * end_rate - ends[1] - ends[2])
+    assert same(backward_euler(law), (pull, 0, *ends))
+
+
 def test_slip_and_rate_are_taken_at_the_end_where_the_pressure_never_rises_with_them():
     falls = Law(ERRORS - 4 * sampled_law.slip - sampled_law.rate, (), ())
     ahead = -4 * sampled_law.next_reference - sampled_law.next_reference_rate
