@@ -54,6 +54,9 @@ def asked(monkeypatch):
 
 
 def test_a_sliding_mode_s_certificate_says_which_scale_a_fault_needs(asked):
+    other = load_certificate(CERTIFICATES / "super-twisting_1.5_1.1.json")
+    with pytest.raises(CertificateError, match="acts on derivative 1"):
+        command._covers(uncertain(other, beta=(F(1), F(2))), LAB)
     wide = uncertain(CTA, beta=(F(1), F(3, 2)), d=(F(-1, 5), F(1, 4)))
     assert command._covers(wide, LAB) == [
         "covers cta on lab-fault, box paper",

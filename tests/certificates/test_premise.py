@@ -64,3 +64,11 @@ def test_a_number_beyond_all_floats_is_a_bound_too():
 
 def test_a_witness_is_about_no_sign_conditions_unless_told():
     assert Witness(multiplier={(0,): F(1)}).conditions == 0
+
+
+@pytest.mark.parametrize(("unit", "said"), [("m/s", " m/s"), ("-", "")])
+def test_both_sides_are_said_on_their_outer_sides_and_one_number_once(unit, said):
+    one = Premise(name="x", required=F(1, 3), certified=F(2, 3), unit=unit)
+    assert one.sides == (f"0.3334{said}", f"0.6666{said}")
+    same = Premise(name="x", required=F(1, 3), certified=F(1, 3), unit=unit)
+    assert same.sides == (f"at most 0.3334{said}", "the same number")
