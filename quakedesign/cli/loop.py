@@ -83,6 +83,7 @@ def simulate(
     period = found.sampling_time if step is None else step
     chain, told = actuator.build(period), sensors.build(period, seed)
     with progress() as tell:
+        tell("compiling", 0.0)
         trajectory, premises = run_single(
             found,
             chosen,

@@ -92,7 +92,7 @@ class ClosedLoop(Metered):
     factors : tuple of float or SX
         True over nominal parameters as in `Variation.values`; empty for the nominal fault.
     meter : list of SX or None
-        Where `advance` puts the works (`quakedesign.simulation.energy.WORKS`) of every piece of a step.
+        Sum of the works (`quakedesign.simulation.energy.WORKS`) so far, to which `advance` adds those of its step.
     """
 
     plant_name: ClassVar[str] = "smooth"
@@ -138,8 +138,40 @@ class ClosedLoop(Metered):
             return ca.vertcat(motion(watched, passed, now[:size]), seen[0])
 
         end = self._advance(method, with_powers, ca.vertcat(state, ca.SX.zeros(len(WORKS))), step)
-        self.meter.append(end[size:])
+        self.meter[0] += end[size:]
         return end[:size]
+
+    def advance_often(
+        self, method: type[Integrator], motion: Any, given: Any, state: Any, step: float, times: int
+    ) -> Any:
+        """State (SX) after a number of steps; what happens in one is a function in generated C, called in a loop.
+
+        Parameters
+        ----------
+        method, state, step
+            See `advance`.
+        motion : callable
+            As there, with `passed` counting steps, and with `given`.
+        given : SX
+            What else the motion depends on.
+        times : int
+        """
+        import casadi as ca
+
+        if times == 1:
+            return self.advance(method, lambda plant, passed, now: motion(plant, passed, now, given), state, step)
+        works = self.meter[0] if self.meter else ca.SX(0, 1)
+        carried = state, works, ca.SX(0), given, _column(self.factors)
+        before, so_far, number, told, factors = (ca.SX.sym("z", part.shape[0]) for part in carried)
+        meter = [so_far] if self.meter else None
+        loop = replace(self.with_factors(tuple(ca.vertsplit(factors))), meter=meter)
+        moved = loop.advance(method, lambda plant, passed, now: motion(plant, number + passed, now, told), before, step)
+        after = ca.vertcat(moved, meter[0] if meter else so_far, number + 1, told, factors)
+        once = ca.Function("substep", [ca.vertcat(before, so_far, number, told, factors)], ca.cse([after]))
+        end = once.fold(times, {"never_inline": True})(ca.vertcat(*carried))
+        if self.meter:
+            self.meter[0] = end[before.shape[0] : before.shape[0] + so_far.shape[0]]
+        return end[: before.shape[0]]
 
     def _advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
         return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)

@@ -113,12 +113,11 @@ class Recorder:
         """Vector (SX) after its own instant has been watched and one step has been taken."""
         import casadi as ca
 
-        meter: list[Any] = []
+        first = self.index(WORKS[0])
+        meter = [vector[first : first + len(WORKS)]]
         loop = replace(self.loop_of(vector), meter=meter)
         moved = self.scheme.advance(loop, method, vector[0], vector[2 : 2 + self.state_size], self.step)
-        first = self.index(WORKS[0])
-        done = sum(meter, start=vector[first : first + len(WORKS)])
-        return ca.cse([self.moved(vector, moved, done)])[0]
+        return ca.cse([self.moved(vector, moved, meter[0])])[0]
 
     def moved(self, vector: Any, state: Any, done: Any) -> Any:
         """Vector (SX) after its own instant has been watched, with the state and works of the next instant."""

@@ -82,7 +82,7 @@ def run(
     """Trajectory of a recorder's loop with a fixed step; see `simulate`."""
     began = perf_counter()
     step, start = _step(recorder, method), recorder.start(setting.settled_from)
-    backend = prepare(step, compiled, setting.steps)
+    backend = prepare(step, compiled, setting.steps * recorder.scheme.settings.get("substeps", 1))
     ready = perf_counter()
     wanted = instants(setting.steps, setting.samples)
     file = Checkpoint.of(checkpoint, step, start, wanted) if checkpoint else None

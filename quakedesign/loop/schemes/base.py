@@ -52,6 +52,10 @@ class Stepped(ABC):
     def advance(self, method: Any, motion: Any, state: Any, step: float) -> Any:
         """State after one step of an integrator on a motion, given the plant, how much has passed [-] and the state."""
 
+    @abstractmethod
+    def advance_often(self, method: Any, motion: Any, given: Any, state: Any, step: float, times: int) -> Any:
+        """State after a number of steps; the motion is given numbers too, and `passed` counts steps."""
+
 
 class Scheme(ABC):
     """One step of length T_s of a closed loop, written in CasADi SX.

@@ -110,20 +110,26 @@ class Sampled(Scheme, Decided):
         import casadi as ca
 
         sample = self._sample(loop, counter, state, step)
-        moving = ca.vertcat(state[:2], *sample.flow)
-        for number in range(self.substeps):
-
-            def motion(plant: Any, passed: Any, now: Any, before: int = number) -> Any:
-                time = (counter + (before + passed) / self.substeps) * step
-                rates, pressure, _ = self.actuator.flow(sample.numbers, ca.vertsplit(now[2:]), sample.held)
-                return ca.vertcat(plant(time, now[:2], pressure), *rates)
-
-            moving = loop.advance(method, motion, moving, step / self.substeps)
+        given = ca.vertcat(counter, sample.held, *sample.numbers)
+        start, period = ca.vertcat(state[:2], *sample.flow), step / self.substeps
+        moving = loop.advance_often(method, self._motion(step), given, start, period, self.substeps)
         rest = ca.vertcat(*sample.own, sample.held, *sample.kept, *sample.noise)
         first = 2 + len(sample.integrals)
         count = state.shape[0] - first - rest.shape[0] - len(sample.flow)
         constants = state[first : first + count]
         return ca.vertcat(moving[:2], *sample.integrals, constants, rest, moving[2:])
+
+    def _motion(self, step: float) -> Any:
+        """Rates of plant and actuator under a pressure held, as `Stepped.advance_often` takes them."""
+        import casadi as ca
+
+        def motion(plant: Any, passed: Any, now: Any, given: Any) -> Any:
+            counter, held, *numbers = ca.vertsplit(given)
+            time = (counter + passed / self.substeps) * step
+            rates, pressure, _ = self.actuator.flow(numbers, ca.vertsplit(now[2:]), held)
+            return ca.vertcat(plant(time, now[:2], pressure), *rates)
+
+        return motion
 
     def _parts(self, loop: Stepped) -> dict[str, tuple[float, ...]]:
         """Values of the memory at the start."""
