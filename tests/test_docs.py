@@ -1,0 +1,97 @@
+"""The documentation is built without a warning, and what is built needs no network."""
+
+import os
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+import quakedesign
+
+ROOT = Path(__file__).parents[1]
+PAGES = ("index.html", "reference/commands.html", "reference/fault_file.html", "explanation/glossary.html")
+
+
+def built(target, execute="off"):
+    """Folder of pages; what Sphinx said if it had something to say."""
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "sphinx", "-b", "html", "-W", "--keep-going", "-q", "-E"),
+            *("-d", target / "trees", ROOT / "docs", target / "html"),
+        ],
+        env=os.environ | {"QUAKEDESIGN_DOCS_EXECUTE": execute, "PYTHONWARNINGS": "ignore"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return target / "html", done.stderr + ("" if done.returncode == 0 else f"exit {done.returncode}")
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    folder, said = built(tmp_path_factory.mktemp("docs"))
+    assert said == ""
+    return folder
+
+
+class Addresses(HTMLParser):
+    """What a page links to, what it loads, and the anchors that it has."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.links, self.loaded, self.anchors = [], [], set()
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.anchors.add(given.get("id"))
+        if tag == "a" and given.get("href"):
+            self.links.append(given["href"])
+        if tag in ("script", "img", "iframe", "source") and given.get("src"):
+            self.loaded.append(given["src"])
+        if tag == "link" and given.get("rel") in ("stylesheet", "icon", "preload"):
+            self.loaded.append(given["href"])
+
+
+def test_every_link_inside_resolves_and_nothing_is_loaded_from_elsewhere(pages):
+    found = {page: Addresses(page) for page in pages.rglob("*.html")}
+    assert {pages / name for name in PAGES} <= set(found)
+    broken = []
+    for page, addresses in found.items():
+        for address in [*addresses.links, *addresses.loaded]:
+            parts = urlsplit(address)
+            if parts.scheme or parts.netloc:
+                if address in addresses.loaded:
+                    broken.append((page.name, address))
+                continue
+            target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
+            known = found.get(target)
+            if not target.exists() or (parts.fragment and known and unquote(parts.fragment) not in known.anchors):
+                broken.append((page.name, address))
+    assert broken == []
+
+
+def test_every_public_name_and_command_is_told(pages):
+    from quakedesign.cli import app
+
+    names = (pages / "reference" / "api.html").read_text(encoding="utf-8")
+    assert [name for name in quakedesign.__all__ if f"quakedesign.{name}" not in names] == []
+    commands = (pages / "reference" / "commands.html").read_text(encoding="utf-8")
+    told = [name for name in app if not name.startswith("-")]
+    assert len(told) > 15
+    assert [name for name in told if f"quakedesign {name}" not in commands] == []
+
+
+def test_equations_are_drawn_without_a_script(pages):
+    model = (pages / "explanation" / "model.html").read_text(encoding="utf-8")
+    assert model.count("<math") > 15
+
+
+@pytest.mark.slow
+def test_every_example_runs(tmp_path):
+    folder, said = built(tmp_path, execute="force")
+    assert said == ""
+    assert "T_s = 0.184 s" in (folder / "howto" / "bode_and_margins.html").read_text(encoding="utf-8")
