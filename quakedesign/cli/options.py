@@ -64,7 +64,8 @@ class LawOptions:
     controller
         cta, dia or elqr, or module:Class of your own; none where a command can do without.
     gains
-        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min).
+        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min);
+        for friction with a state designed.
     scale
         λ of a sliding mode in place of that of the gains, decimal or p/q.
     feedforward

@@ -1,4 +1,4 @@
-"""Options of runs without control of faults whose friction has a state."""
+"""Options of runs of faults whose friction has a state."""
 
 from dataclasses import asdict, dataclass, is_dataclass
 from inspect import signature
@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
-from quakedesign.cli.shared import Seconds
+from quakedesign.cli.shared import Pascals, Seconds
 from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
+    from quakedesign.simulation.recording import Recording
 
-_GROUP = Group("Friction with a state (rate-and-state), without a controller")
-_TAKEN = {"drift": "loading_rate", "duration": "duration", "plant": "plant", "method": "method"}
-_AROUND = ("fault", "state", "out", "force", "json")
+_GROUP = Group("Friction with a state (rate-and-state)")
+_BOTH = {"duration": "duration", "plant": "plant", "method": "method"}
+_FREE = {"drift": "loading_rate", **_BOTH}
+_HELD = {"step": "step", "diffusion": "diffusion", **_BOTH}
+_AROUND = ("fault", "controller", "gains", "state", "out", "force", "json")
 
 
 @Parameter(name="*", group=_GROUP)
@@ -34,17 +37,35 @@ class StateOptions:
         Time for which the far end has been at rest before the run, such as '100 year'.
     share
         Of the time between two events that has passed at the start; 0.9 unless given.
+    stress
+        With --controller elqr: amplitude of a shear stress on the fault that swings as a sine, such as '20 kPa'.
+    stress_period
+        Its period; that of the tide, 12.42 hours, unless given.
     """
 
     pressure: str | None = None
     start: str | None = None
     hold: Seconds | None = None
     share: float | None = None
+    stress: Pascals | None = None
+    stress_period: Seconds | None = None
+
+    def of_control(self) -> dict[str, Any]:
+        """Those of a controlled run that are given."""
+        if any(value is not None for value in (self.pressure, self.start, self.hold, self.share)):
+            raise ParameterError(
+                "a controlled run starts in steady sliding, and its law sets the pressure. Received pressure, start, "
+                "hold or share. Leave them out."
+            )
+        told = {"stress": self.stress, "stress_period": self.stress_period}
+        return {name: value for name, value in told.items() if value is not None}
 
     def given(self) -> dict[str, Any]:
-        """Those that are given."""
+        """Those of a run without control that are given."""
         from quakedesign.simulation import pressure_course
 
+        if self.stress is not None or self.stress_period is not None:
+            raise ParameterError("a stress disturbance needs a controller. Received none. Give --controller elqr.")
         told = {name: value for name in ("start", "hold", "share") if (value := getattr(self, name)) is not None}
         return told | ({} if self.pressure is None else {"pressure": pressure_course(self.pressure)})
 
@@ -56,30 +77,50 @@ def require_no_state_options(state: StateOptions, fault: "Fault") -> None:
     """Refuse options that friction without a state has no use for."""
     if state != NO_STATE:
         raise ParameterError(
-            "pressure, start, hold and share need friction with a state, without a controller. "
+            "pressure, start, hold, share and stress need friction with a state. "
             f"Received {fault.friction.name}. Leave them out."
         )
 
 
 def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int:
     """Run a fault whose friction has a state as `simulate` was asked to, and print what it comes to."""
-    from quakedesign.report.state_runs import state_run_lines
-    from quakedesign.studies.state_runs import run_state
+    from quakedesign.report.state_runs import sliding_run_lines, state_run_lines
+    from quakedesign.studies.state_runs import run_held, run_state
 
     usual = _single({name: option.default for name, option in signature(command).parameters.items()})
-    changed = {name: value for name, value in _single(options).items() if value != usual[name]}
-    if foreign := [name for name in changed if name not in (*_TAKEN, *_AROUND)]:
-        raise ParameterError(
-            f"{', '.join(foreign)}: not for friction with a state, which runs without control. Received "
-            f"{fault.friction.name}. Leave out what is not among drift, duration, plant, method, pressure and start."
-        )
-    told = {_TAKEN[name]: value for name, value in changed.items() if name in _TAKEN}
-    found = run_state(fault, **told, **options["state"].given())
+    given = _single(options)
+    changed = {name: value for name, value in given.items() if value != usual[name]}
+    trajectory: Recording
+    if "controller" in changed:
+        _require_designed(given)
+        held = run_held(fault, **_told(fault, changed, _HELD), **options["state"].of_control())
+        trajectory, answer, lines = held.trajectory, held.to_dict(), sliding_run_lines
+    else:
+        free = run_state(fault, **_told(fault, changed, _FREE), **options["state"].given())
+        trajectory, answer, lines = free.trajectory, free.to_dict(), state_run_lines
     if options["out"] is not None:
-        found.trajectory.save(Path(options["out"]))
-    said = [found.trajectory.name, *(f"  {line}" for line in state_run_lines(found.to_dict()))]
-    options["output"].show(found.to_dict(), said)
+        trajectory.save(Path(options["out"]))
+    options["output"].show(answer, [trajectory.name, *(f"  {line}" for line in lines(answer))])
     return 0
+
+
+def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str]) -> dict[str, Any]:
+    """What was asked for, by the name that a run has for it; refuses what does not apply."""
+    if foreign := [name for name in changed if name not in (*taken, *_AROUND)]:
+        kind = f"friction with a state {'with' if taken is _HELD else 'without'} control"
+        raise ParameterError(
+            f"{', '.join(foreign)}: not for {kind}. Received {fault.friction.name}. "
+            f"Leave out what is not among {', '.join(taken)} and the options of friction with a state."
+        )
+    return {taken[name]: value for name, value in changed.items() if name in taken}
+
+
+def _require_designed(options: dict[str, Any]) -> None:
+    if options["controller"] != "elqr" or tuple(options["gains"]) not in (("published",), ("designed",)):
+        raise ParameterError(
+            "friction with a state is controlled by elqr with designed gains; no sliding mode, as the slip rate "
+            f"follows the pressure at once. Received {options['controller']}. Give --controller elqr."
+        )
 
 
 def _single(options: dict[str, Any]) -> dict[str, Any]:

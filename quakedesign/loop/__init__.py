@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.observer import ErrorPrediction, slip_observer
     from quakedesign.loop.periodic import Fading, PeriodicLoop, Segment
     from quakedesign.loop.running import SampledController
+from quakedesign.loop.sliding import SlidingModel, sliding_loop
 
 __all__ = [
     "NOISES",
@@ -39,12 +40,14 @@ __all__ = [
     "Prediction",
     "SampledController",
     "Segment",
+    "SlidingModel",
     "compensated",
     "continuous_loop",
     "disturbance_estimate",
     "estimate_through_path",
     "exact_integrals",
     "held_loop",
+    "sliding_loop",
     "slip_observer",
     "summed_integrals",
 ]

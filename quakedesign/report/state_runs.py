@@ -1,4 +1,4 @@
-"""What is said of a run without control of a fault whose friction has a state."""
+"""What is said of a run of a fault whose friction has a state, free or held in slow sliding."""
 
 from typing import Any
 
@@ -29,6 +29,24 @@ def state_run_lines(answer: dict[str, Any]) -> list[str]:
         lines.append(f"and {len(events) - _MOST_EVENTS} events more (--json has them all)")
     lines.append(f"energy that the integration loses: {answer['energy']['relative_residual']:.2g} of the largest share")
     return lines
+
+
+def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
+    """Lines for people, from `HeldRun.to_dict`: outcome, errors, pressure; no guarantee."""
+    outcome, found = answer["outcome"], answer["metrics"]
+    least, largest = (p / 1e6 for p in answer["pressure"])
+    path = f", through rock of L^2/D = {answer['diffusion']:.4g} s" if answer["diffusion"] else ""
+    shaken = f", under a shear stress of up to {answer['stress'] / 1e3:.4g} kPa" if answer["stress"] else ""
+    return [
+        f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.4g} m/s, the reference's is "
+        f"{answer['reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
+        f"held over {answer['step']:.4g} s{path}{shaken}, for {_time(answer['duration'])}; without control errors grow "
+        f"by {answer['growth_rate']:.3g} 1/s",
+        f"|ln(V/V_r)| at most {found['max_log_rate']:.3g}, slip error at most {found['max_slip_error']:.3g} m",
+        f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law asks for at most "
+        f"{found['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
+        "no guarantee: what is said was seen in this run",
+    ]
 
 
 def _event_line(number: int, event: dict[str, Any]) -> str:

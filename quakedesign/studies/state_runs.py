@@ -1,6 +1,7 @@
-"""One run without control of a fault whose friction has a state, as the command line asks for it."""
+"""One run of a fault whose friction has a state, as the command line asks for it: free, or held in slow sliding."""
 
 from dataclasses import asdict, dataclass
+from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
@@ -9,14 +10,19 @@ import numpy as np
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Disturbance, Fault
 from quakedesign.fault.checks import require_positive
+from quakedesign.loop import SlidingModel
+from quakedesign.rationals import rational
 from quakedesign.simulation import PressureCourse, StateTrajectory, simulate_state
 from quakedesign.simulation.outcome import Outcome
 from quakedesign.simulation.slip_events import SlipEvent, cycle_outcome, dynamic_rate, slip_events
+from quakedesign.simulation.slow_sliding import SlidingRun, Tide, simulate_sliding
 from quakedesign.simulation.starting_state import StartingState, late_in_cycle, locked, sliding
 from quakedesign.symbolic import derive
+from quakedesign.synthesis.linear.sampled.slow_sliding import growth_rate, sliding_law, sliding_model
 
 PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 _RTOL = 1e-8
+TIDE = 12.42 * 3600.0  # s, of the largest tide, M2
 _UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
 
 
@@ -121,13 +127,7 @@ def run_state(
     ------
     ParameterError, UnknownNameError, SimulationError
     """
-    if plant not in PLANTS:
-        raise UnknownNameError(f"plant of a fault with a state must be {' or '.join(PLANTS)}. Received {plant!r}.")
-    if fault.disturbance != Disturbance():
-        raise ParameterError(
-            "a run of friction with a state has no disturbance but a pressure. Received a fault with a table "
-            "disturbance. Remove it, and give --pressure: p changes the strength by as much as a shear stress of mu*p."
-        )
+    _require_runnable(fault, plant)
     rate = fault.friction.operating_rate if loading_rate is None else loading_rate
     require_positive("Steady sliding at this rate is where the run begins.", loading_rate=rate)
     settings: dict[str, Any] = {"inertia": PLANTS[plant], "method": method, "rtol": _RTOL}
@@ -142,6 +142,105 @@ def run_state(
         **settings,
     )
     return StateRun(fault=fault, loading_rate=rate, start=begun, trajectory=run)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldRun:
+    """A controlled run, and what it comes to.
+
+    Attributes
+    ----------
+    fault : Fault
+    model : SlidingModel
+    step, diffusion : Fraction
+        [s].
+    trajectory : SlidingRun
+    """
+
+    fault: Fault
+    model: SlidingModel
+    step: Fraction
+    diffusion: Fraction
+    trajectory: SlidingRun
+
+    def to_dict(self) -> dict[str, Any]:
+        """Answer of ``simulate`` with a controller, SI units."""
+        run, rate = self.trajectory, float(self.model.rate)
+        return {
+            "outcome": run.outcome.to_dict() | {"earthquake_from": rate + 0.1 * dynamic_rate(self.fault)},
+            "reference_rate": rate,
+            "growth_rate": growth_rate(self.model),
+            "step": float(self.step),
+            "diffusion": float(self.diffusion),
+            "metrics": {
+                "max_log_rate": float(np.max(np.abs(np.log(run.slip_rate / rate)))),
+                "max_slip_error": float(np.max(np.abs(run.slip_error))),
+                "max_asked": float(np.max(np.abs(run.asked))),
+            },
+            "pressure": [float(run.pressure.min()), float(run.pressure.max())],
+            "stress": float(np.max(np.abs(run.stress))),
+            "slip": float(run.slip[-1]),
+            "duration": float(run.time[-1]),
+            "steps": len(run.time),
+            "run": dict(run.provenance),
+        }
+
+
+def run_held(
+    fault: Fault,
+    *,
+    step: float | None = None,
+    diffusion: float = 0.0,
+    stress: float = 0.0,
+    stress_period: float = TIDE,
+    duration: float | None = None,
+    plant: str = "smooth",
+    method: str = "cvodes",
+) -> HeldRun:
+    """Let the e-LQR of `sliding_law` hold a fault at the mean rate of its task, from steady sliding.
+
+    Parameters
+    ----------
+    fault : Fault
+        Its friction has one state.
+    step : float, optional
+        [s]; the sampling time of the fault unless given.
+    diffusion : float
+        L²/D of the rock between well and fault [s].
+    stress, stress_period : float
+        Of a sine of shear stress [Pa], [s].
+    duration, plant, method
+        As of `run_state`.
+
+    Raises
+    ------
+    ParameterError, UnknownNameError, SimulationError
+    """
+    _require_runnable(fault, plant)
+    held, path = rational(fault.sampling_time if step is None else step), rational(diffusion)
+    model = sliding_model(fault)
+    law = sliding_law(model, held, diffusion=path)
+    run = simulate_sliding(
+        fault,
+        law,
+        held,
+        diffusion=path,
+        tide=Tide(amplitude=stress, period=stress_period),
+        duration=duration,
+        inertia=PLANTS[plant],
+        method=method,
+    )
+    return HeldRun(fault=fault, model=model, step=held, diffusion=path, trajectory=run)
+
+
+def _require_runnable(fault: Fault, plant: str) -> None:
+    if plant not in PLANTS:
+        raise UnknownNameError(f"plant of a fault with a state must be {' or '.join(PLANTS)}. Received {plant!r}.")
+    if fault.disturbance != Disturbance():
+        raise ParameterError(
+            "a run of friction with a state has no disturbance but a pressure or a stress. Received a fault with a "
+            "table disturbance. Remove it, and give --pressure, or --stress with a controller."
+        )
 
 
 def _start(

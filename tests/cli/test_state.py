@@ -82,7 +82,14 @@ def test_a_locked_fault_starts_with_an_aged_state(capsys, patch):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (("--controller", "elqr"), "controller: not for friction with a state"),
+        (("--controller", "cta"), "no sliding mode"),
+        (("--controller", "elqr", "--gains", "1", "2"), "designed gains"),
+        (("--controller", "elqr", "--lag", "1 s"), "lag: not for friction with a state with control"),
+        (("--controller", "elqr", "--start", "late"), "starts in steady sliding"),
+        (("--controller", "elqr", "--drift", "1e-9"), "drift: not for friction with a state with control"),
+        (("--controller", "elqr", "--method", "radau"), "method must be one of"),
+        (("--diffusion", "10 s"), "diffusion: not for friction with a state without control"),
+        (("--stress", "1 kPa"), "needs a controller"),
         (("--saturation", "1 MPa"), "saturation: not for friction with a state"),
         (("--plant", "coulomb"), "smooth or quasi-dynamic"),
         (("--start", "early"), "steady, locked or late"),
@@ -98,6 +105,24 @@ def test_what_does_not_apply_is_refused_in_one_line(capsys, patch, given, said):
     assert (code, out) == (2, "")
     assert said in err
     assert len(err.strip().splitlines()) == 1
+
+
+def test_a_controlled_run_says_that_it_tracks(capsys, patch, tmp_path):
+    out = tmp_path / "run.nc"
+    given = ("--controller", "elqr", "--plant", "quasi-dynamic", "--duration", "1 hour", "--step", "100 s")
+    more = ("--diffusion", "500 s", "--stress", "10 kPa", "--stress-period", "1 hour")
+    code, said, _ = run(capsys, "simulate", patch, *given, *more, "--out", str(out))
+    assert code == 0
+    assert said.splitlines()[1].strip().startswith("tracked: peak slip rate")
+    assert "through rock of L^2/D = 500 s" in said
+    assert "no guarantee" in said
+    assert out.exists()
+    found = json.loads(run(capsys, "simulate", patch, *given, *more, "--json")[1])
+    assert found["outcome"]["kind"] == "tracked"
+    assert found["outcome"]["peak_slip_rate"] < found["outcome"]["earthquake_from"]
+    assert found["reference_rate"] == pytest.approx(0.785 / (184 * 3600), rel=1e-12)
+    assert found["stress"] == pytest.approx(1e4, rel=1e-3)
+    assert 0 < found["metrics"]["max_log_rate"] < 0.1
 
 
 def test_a_disturbance_of_acceleration_is_not_ignored(capsys, patch, tmp_path):

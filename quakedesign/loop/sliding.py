@@ -1,0 +1,110 @@
+"""A linear law of samples around slow sliding of a fault with rate-and-state friction, without inertia."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from quakedesign.loop.held import held_loop
+from quakedesign.loop.laws import LinearLaw, Model, Row
+from quakedesign.loop.periodic import PeriodicLoop
+
+_ONE = Fraction(1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingModel:
+    """Middle of what may be about sliding at V, with v = Ve^y, θ = (D/V)e^z, slip error x, pressure error q = p − p*.
+
+    strength·y + weakening·z = −stiffness·x + coefficient·q + e, x′ = V·c·y, z′ = −ρc(y + z), ρ = V/D.
+
+    Attributes
+    ----------
+    rate : Fraction
+        V [m/s].
+    state_rate : Fraction
+        ρ [1/s].
+    slope : Fraction
+        c [-], in place of e^y − 1 over y.
+    strength : Fraction
+        What a change of y takes, N·a and damping [Pa].
+    weakening : Fraction
+        N·b [Pa].
+    direct, evolution : Fraction
+        a and b [-].
+    stiffness : Fraction
+        [Pa/m].
+    coefficient : Fraction
+        Friction coefficient [-] of sliding at V.
+    """
+
+    rate: Fraction
+    state_rate: Fraction
+    slope: Fraction
+    strength: Fraction
+    weakening: Fraction
+    direct: Fraction
+    evolution: Fraction
+    stiffness: Fraction
+    coefficient: Fraction
+
+
+def sliding_loop(
+    law: LinearLaw,
+    model: SlidingModel,
+    step: Fraction,
+    *,
+    delay: Fraction = Fraction(0),
+    lag: Fraction = Fraction(0),
+    diffusion: Fraction = Fraction(0),
+    noisy: Collection[str] = (),
+) -> PeriodicLoop:
+    """The error loop about sliding at V, with the order of events and the path of the pressure of `held_loop`.
+
+    States: the slip error x [m] and z [-] in place of e1 and e2; pressures in Pa. Inputs: ``stress`` e [Pa], ``rate`` f
+    [-] in x′ = V(cy + f) and z′ = −ρ(c(y + z) + f), ``state`` h [1/s] in z′, and the ``drift`` dp*/dt [Pa/s]. Outputs:
+    ``slip_error`` x [m], ``log_rate`` y, ``log_state`` z, ``both`` y + z, ``strength`` a·y + b·z, ``push`` q [Pa], and
+    with a layer ``left_out`` [Pa]; those of y and q without what e and what the layer leaves out add to them at once.
+
+    Raises
+    ------
+    ParameterError
+        As `held_loop`.
+    """
+    plain = Model(slip=Fraction(0), rate=Fraction(0), gain=_ONE)
+    loop = held_loop(law, plain, _ONE, step, delay=delay, lag=lag, diffusion=diffusion, noisy=noisy)
+    size = len(loop.states)
+    push = loop.outputs["push"]
+    y = [model.coefficient * v / model.strength for v in push]
+    y[0] -= model.stiffness / model.strength
+    y[1] -= model.weakening / model.strength
+    z = _row(size, {1: _ONE})
+    both = tuple(a + b for a, b in zip(y, z, strict=True))
+    moving, ageing = model.rate * model.slope, model.state_rate * model.slope
+    flow = (tuple(moving * v for v in y), tuple(-ageing * v for v in both), *loop.flow[2:])
+    by_stress = _row(size, {0: moving / model.strength, 1: -ageing / model.strength})
+    by_pressure = tuple(model.coefficient * v for v in by_stress)
+    left_out = {"left_out": row} if (row := loop.outputs.get("left_out")) else {}
+    return replace(
+        loop,
+        flow=flow,
+        inputs={
+            "stress": by_stress,
+            "rate": _row(size, {0: model.rate, 1: -model.state_rate}),
+            "state": z,
+            "drift": loop.inputs["drift"],
+        },
+        outputs={
+            "slip_error": _row(size, {0: _ONE}),
+            "log_rate": tuple(y),
+            "log_state": z,
+            "both": both,
+            "strength": tuple(model.direct * a + model.evolution * b for a, b in zip(y, z, strict=True)),
+            "push": push,
+            **left_out,
+        },
+        fading={name: replace(fading, entry=by_pressure) for name, fading in loop.fading.items()},
+    )
+
+
+def _row(size: int, entries: dict[int, Fraction]) -> Row:
+    return tuple(entries.get(i, Fraction(0)) for i in range(size))
