@@ -286,8 +286,9 @@ def stop(*_: object) -> None:
 class Reached:
     """Lines of some files that every test reaches, with the seconds that it takes."""
 
-    def __init__(self, paths: set[str]) -> None:
+    def __init__(self, paths: set[str], caches: list[functools._lru_cache_wrapper]) -> None:
         self.paths, self.calls, self.lines = paths, Counter(), defaultdict(set)
+        self.caches = [cache for cache in caches if inspect.unwrap(cache).__code__.co_filename in paths]
 
     def __call__(self, frame, event, _):
         """Follow the first calls of every function, as the interpreter's trace function."""
@@ -311,6 +312,8 @@ class Reached:
         result = {}
         signal.signal(signal.SIGVTALRM, stop)
         for item in items:
+            for cache in self.caches:  # else the first test alone would reach what it keeps
+                cache.cache_clear()
             signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
             self.calls, self.lines, start = Counter(), defaultdict(set), time.process_time()
             sys.settrace(self)
@@ -394,7 +397,7 @@ class Mutation:
             result = pickle.loads(stored.read_bytes())
             if result.keys() == {item.nodeid for item in items}:
                 return result
-        _, answer = in_child(lambda: Reached(set(map(str, self.paths))).run(items), 0)
+        _, answer = in_child(lambda: Reached(set(map(str, self.paths)), self.caches).run(items), 0)
         stored.write_bytes(answer)
         return pickle.loads(answer)
 

@@ -226,6 +226,7 @@ def test_units_are_those_of_the_model_or_of_the_law_by_its_name():
 def test_a_loop_is_shown_in_one_short_line_whatever_its_numbers():
     huge = replace(CTA, gains=dict(CTA.gains) | {"k1": F(10) ** 400}, uncertain={"beta": (F(1, 3), F(1))})
     assert repr(huge).startswith("Loop(cta; k1 ≈ 1.00000e+400, k2 ≈ 5, k3 ≈ 2.3, k4 ≈ 1.1; beta in [0.333333, 1]")
+    assert repr(replace(CTA, gains={}, uncertain={})) == "Loop(cta)"
     proved = load_certificate(FILES / "cta_7_5_2.3_1.1.json")
     assert "claims positive, decrease" in repr(proved)
     assert len(repr(proved)) < 250
