@@ -23,6 +23,7 @@ _HOME = {
     "derive": "symbolic",
     "design": "synthesis",
     "export_controller": "simulation",
+    "identify": "identification",
     "limits": "studies",
     "load_certificate": "certificates",
     "load_fault": "fault",

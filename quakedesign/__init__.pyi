@@ -11,6 +11,7 @@ from quakedesign.fault import UncertaintyBox as UncertaintyBox
 from quakedesign.fault import load_fault as load_fault
 from quakedesign.fault.scales import Scales as Scales
 from quakedesign.fault.scaling import scaled_fault as scaled_fault
+from quakedesign.identification import identify as identify
 from quakedesign.report import compare as compare
 from quakedesign.simulation import Trajectory as Trajectory
 from quakedesign.simulation import export_controller as export_controller

@@ -30,6 +30,10 @@ class ScenarioError(QuakedesignError, ValueError):
     """A fault description that cannot be read or is incomplete."""
 
 
+class RecordError(QuakedesignError, ValueError):
+    """A record of an experiment that cannot be read, is incomplete, or does not fit what is asked of it."""
+
+
 class UnknownNameError(QuakedesignError, KeyError):
     """A preset, law or controller that does not exist."""
 

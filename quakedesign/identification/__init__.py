@@ -1,0 +1,20 @@
+"""From a laboratory record to friction parameters: fits of the simulated experiment, with confidence regions."""
+
+from quakedesign.arguments import check_arguments
+from quakedesign.identification.fault_file import cover, identified_fault, save_fault
+from quakedesign.identification.identify import identify
+from quakedesign.identification.record import Record, read_record
+from quakedesign.identification.result import Estimate, Identification
+
+__all__ = [
+    "Estimate",
+    "Identification",
+    "Record",
+    "cover",
+    "identified_fault",
+    "identify",
+    "read_record",
+    "save_fault",
+]
+
+check_arguments(__name__)

@@ -1,0 +1,156 @@
+"""Fault files whose friction and box hold every law that a record allows.
+
+The plant is x″ = −N̂[μ(x)(σ′ − p) − μ(0)σ′] − k̂x − …, so multiplying μ by a number and dividing N̂ by it changes
+nothing. A law of the record's box with the static friction s is therefore, on a fault with N̂, the same as s₀/s times
+it on a fault with N̂s/s₀: with s₀ between the smallest and the largest s, all laws of the box have one static
+friction, as a fault has, and its box another half-width of N̂.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from fractions import Fraction
+from itertools import product
+from pathlib import Path
+
+from quakedesign.errors import RecordError
+from quakedesign.fault import Fault, FrictionLaw, UncertaintyBox
+from quakedesign.fault.template import fault_toml
+from quakedesign.identification.result import Estimate, Identification
+from quakedesign.output import write_whole
+from quakedesign.rationals import rational
+
+_DIGITS = 6
+_WEAKENING = {"residual", "drop", "critical_slip"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cover:
+    """A law and a box that hold all laws of ranges.
+
+    Attributes
+    ----------
+    law : FrictionLaw
+    box : UncertaintyBox
+    """
+
+    law: FrictionLaw
+    box: UncertaintyBox
+
+
+def cover(law: FrictionLaw, ranges: Mapping[str, tuple[float, float]], box: UncertaintyBox) -> Cover:
+    """Law that weakens with slip, and box, that cover every law of ranges of residual, drop and critical slip.
+
+    The bounds and the slope of the scaled laws are monotone in each of the three, so corners are enough; numbers are
+    rounded to the safe side.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+        Of the family.
+    ranges : mapping
+        Ends by name of quantity.
+    box : UncertaintyBox
+        Of everything else.
+    """
+    ends = {name: [rational(end) for end in ranges[name]] for name in sorted(_WEAKENING)}
+    corners = [dict(zip(ends, corner, strict=True)) for corner in product(*ends.values())]
+    statics = [corner["residual"] + corner["drop"] for corner in corners]
+    static = _decimal((min(statics) + max(statics)) / 2, up=True)
+    scaled = [
+        (c["residual"] * static / s, c["drop"] / c["critical_slip"] * static / s)
+        for c, s in zip(corners, statics, strict=True)
+    ]
+    residual = _decimal(min(least for least, _ in scaled), up=False)
+    drop = static - residual
+    critical_slip = _decimal(drop / max(slope for _, slope in scaled), up=False)
+    values = {"residual": residual, "drop": drop, "critical_slip": critical_slip}
+    width = _decimal(max(abs(s / static - 1) for s in statics), up=True)
+    authority = box.authority + width + box.authority * width
+    held = replace(law, **{name: float(value) for name, value in values.items()})  # type: ignore[type-var]
+    return Cover(law=held, box=replace(box, name="own", authority=authority))
+
+
+def _decimal(value: Fraction, *, up: bool) -> Fraction:
+    """Decimal of a few digits that is not below (`up`) or not above a rational."""
+    context = Context(prec=_DIGITS, rounding=ROUND_CEILING if up else ROUND_FLOOR)
+    return Fraction(context.divide(Decimal(value.numerator), Decimal(value.denominator)))
+
+
+def identified_fault(found: Identification, fault: Fault) -> Fault:
+    """A fault with the friction of a record in place of its own.
+
+    For a law that weakens with slip, friction and box together hold every law of the record's box, so that `guarantee`
+    and `design` cover all of them. For a law with state friction is the best fit.
+
+    Parameters
+    ----------
+    found : Identification
+        Of a record that tells every parameter.
+    fault : Fault
+        That gives everything but friction.
+
+    Returns
+    -------
+    Fault
+
+    Raises
+    ------
+    RecordError
+        When the record does not tell every parameter.
+    """
+    if not found.identified:
+        raise RecordError(f"a fault file needs every parameter. Received {found.record.name}: {found.untold()[0]}.")
+    held = cover(found.law, found.box, fault.box) if covers(found.law) else Cover(law=found.law, box=fault.box)
+    return replace(
+        fault,
+        name=f"{fault.name[:40].rstrip()} identified",
+        source=f"friction identified from {found.record.name}; everything else: {fault.source}",
+        friction=held.law,
+        box=held.box,
+        assumed=(),
+    )
+
+
+def covers(law: FrictionLaw) -> bool:
+    """Whether a fault can hold ranges of a law's parameters, not only their best values."""
+    return set(law.quantities()) == _WEAKENING
+
+
+def save_fault(found: Identification, fault: Fault, path: str | Path) -> None:
+    """Write `identified_fault` to a TOML file, best fit and ranges as remarks at its head; whole or not at all.
+
+    Parameters
+    ----------
+    found : Identification
+    fault : Fault
+    path : str or Path
+
+    Raises
+    ------
+    RecordError
+        As `identified_fault`.
+    OutputError
+        When it cannot be written.
+    """
+    whole = identified_fault(found, fault)
+    remarks = "".join(f"# {line}\n" for line in _remarks(found, fault))
+    write_whole(Path(path), remarks + fault_toml(whole))
+
+
+def _remarks(found: Identification, fault: Fault) -> list[str]:
+    said = (
+        "friction and uncertainty below hold every law of the boxes"
+        if covers(found.law)
+        else "friction below is the best fit: a fault file holds no ranges of this law"
+    )
+    return [
+        f"Friction identified from {found.record.name!r} as {found.law.name}; everything else is {fault.name}'s.",
+        f"Best fit (95 % alone; box of all together); {said}.",
+        *(_remark(estimate) for estimate in found.estimates.values()),
+    ]
+
+
+def _remark(estimate: Estimate) -> str:
+    ends = f"{estimate.low:.6g} to {estimate.high:.6g}; {estimate.least:.6g} to {estimate.most:.6g}"
+    return f"  {estimate.name} = {estimate.value:.6g} ({ends}) {estimate.unit}".rstrip()

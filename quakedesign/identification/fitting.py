@@ -1,0 +1,265 @@
+"""Least squares on a simulated experiment: several starts, outliers left out, noise estimated from what remains."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from quakedesign.errors import RecordError
+from quakedesign.identification.experiment import Experiment
+
+CONFIDENCE = 0.95
+_SHARE_OF_NOISE = 3e-3
+_SHARE_OF_EXCESS = 2e-3  # by which a search may still get better when it ends
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """How the best fit is sought.
+
+    Attributes
+    ----------
+    candidates : int
+        Drawn between the ends of every coordinate and simulated once.
+    least, most : int
+        Searches, from the best of them on: until two end in the best fit.
+    coarse : int
+        Steps of a search before it is compared with the others.
+    agreement : float
+        Two searches agree when their sums of squares differ by less than this share.
+    rounds : int
+        In which outliers are left out and steps are made finer.
+    longest_outlier : int
+        Samples in a row; more are no accident, and stay.
+    """
+
+    candidates: int = 64
+    least: int = 4
+    most: int = 16
+    coarse: int = 40
+    agreement: float = 1e-3
+    rounds: int = 6
+    longest_outlier: int = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """The best fit of an experiment to measured friction.
+
+    Attributes
+    ----------
+    experiment : Experiment
+    fitted : ndarray
+        Coordinates as they are fitted.
+    measured : ndarray
+        Friction [-].
+    kept : ndarray of bool
+        Samples that count.
+    agreeing, starts : int
+        Searches that end in the best fit, of how many.
+    """
+
+    experiment: Experiment
+    fitted: "np.ndarray"
+    measured: "np.ndarray"
+    kept: "np.ndarray"
+    agreeing: int
+    starts: int
+
+    @cached_property
+    def residuals(self) -> "np.ndarray":
+        """Measured less simulated friction [-] at every sample."""
+        found: np.ndarray = self.measured - self.experiment.friction(self.fitted)
+        return found
+
+    @property
+    def squares(self) -> float:
+        """Sum of squares of the residuals that count."""
+        return float(np.sum(self.residuals[self.kept] ** 2))
+
+    @property
+    def freedom(self) -> int:
+        """Samples that count, less the coordinates."""
+        return int(self.kept.sum()) - len(self.fitted)
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of one sample [-]."""
+        return float(np.sqrt(self.squares / self.freedom))
+
+    @property
+    def accuracy(self) -> float:
+        """Of the simulated friction [-]: a small share of the noise."""
+        return _SHARE_OF_NOISE * self.noise
+
+    @cached_property
+    def correlation(self) -> float:
+        """Samples per independent one, at least 1: the integrated autocorrelation of the residuals.
+
+        Summed over lags up to five times itself (Sokal 1997, in Functional Integration, NATO ASI B361, 131).
+        """
+        kept = self.residuals[self.kept]
+        size = 1 << (2 * len(kept) - 1).bit_length()
+        spectrum = np.abs(np.fft.rfft(kept, size)) ** 2
+        covariance = np.fft.irfft(spectrum, size)[: len(kept) // 2]
+        sums = 2 * np.cumsum(covariance / covariance[0]) - 1
+        window = np.flatnonzero(np.arange(len(sums)) >= 5 * sums)
+        return float(max(sums[window[0] if len(window) else -1], 1.0))
+
+    def excess(self, squares: float) -> float:
+        """How far a sum of squares is above the smallest, in variances of the noise of independent samples."""
+        return (squares - self.squares) / (self.noise**2 * self.correlation)
+
+    def threshold(self, count: int) -> float:
+        """`excess` that so many parameters jointly stay below with the confidence of `CONFIDENCE` (Fisher's F)."""
+        from scipy.stats import f
+
+        return float(count * f.ppf(CONFIDENCE, count, self.freedom))
+
+    def distance(self, fitted: "np.ndarray") -> float:
+        """`excess` of given coordinates, infinite where there is no such experiment."""
+        squares = float(np.sum((self.measured - self.experiment.friction(fitted))[self.kept] ** 2))
+        return self.excess(squares) if np.isfinite(squares) else np.inf
+
+    @cached_property
+    def deviations(self) -> "np.ndarray":
+        """Standard deviations of what is fitted, from the slopes; infinite where these say nothing."""
+        slopes = self.experiment.slopes(self.fitted)[self.kept]
+        scale = np.linalg.norm(slopes, axis=0)
+        scale[scale == 0] = 1
+        values, turn = np.linalg.svd(slopes / scale, full_matrices=False)[1:]
+        with np.errstate(divide="ignore"):
+            inverse = np.where(values > 1e-12 * values[0], 1 / values, np.inf)
+        weights = np.where(np.abs(turn) > 1e-9, np.abs(turn), 0)
+        with np.errstate(invalid="ignore"):
+            spread = np.where(weights > 0, weights * inverse[:, None], 0)
+        found: np.ndarray = np.sqrt(np.sum(spread**2, axis=0)) / scale * self.noise * np.sqrt(self.correlation)
+        return found
+
+
+def fit(experiment: Experiment, measured: "np.ndarray", *, seed: int, search: Search | None = None) -> Fit:
+    """Best fit of all starts, without outliers, on an experiment that is simulated accurately enough for the noise.
+
+    Raises
+    ------
+    RecordError
+        When no start can be simulated, or there are too few samples.
+    """
+    how = search or Search()
+    if len(measured) < 3 * len(experiment.coordinates):
+        raise RecordError(
+            f"a record must have at least {3 * len(experiment.coordinates)} samples for what is fitted. "
+            f"Received {len(measured)}. Give a longer record."
+        )
+    everything = np.ones(len(measured), dtype=bool)
+    experiment, starts = _starts(experiment, measured, seed, how)
+    found: list[tuple[np.ndarray, float]] = []
+    for start in starts:
+        found.append(minimised(experiment, measured, everything, start, steps=how.coarse))
+        best_q, best = min(found, key=lambda pair: pair[1])
+        agreeing = sum(squares <= best * (1 + how.agreement) for _, squares in found)
+        if len(found) >= how.least and agreeing > 1:
+            break
+    fit = Fit(
+        experiment=experiment,
+        fitted=best_q,
+        measured=measured,
+        kept=everything,
+        agreeing=agreeing,
+        starts=len(found),
+    )
+    return settled(fit, how)
+
+
+def _starts(
+    experiment: Experiment, measured: "np.ndarray", seed: int, how: Search
+) -> "tuple[Experiment, list[np.ndarray]]":
+    """The candidates that come nearest, and the experiment with steps for the best of them."""
+    draw = np.random.default_rng(seed)
+    ends = np.array([[c.inward(end) for end in c.start] for c in experiment.coordinates])
+    candidates = draw.uniform(ends[:, 0], ends[:, 1], (how.candidates, len(ends)))
+    scatter = max(float(np.std(np.diff(measured, 2))) / 6**0.5, 1e-9)
+    experiment = experiment.resolved(ends.mean(axis=1), scatter)
+    costs = np.array([np.sum(np.abs(measured - experiment.friction(q))) for q in candidates])
+    costs[~np.isfinite(costs)] = np.inf
+    order = np.argsort(costs, kind="stable")[: how.most]
+    usable = [candidates[i] for i in order if np.isfinite(costs[i])]
+    if not usable:
+        raise RecordError(
+            "an experiment must be one that a spring can hold without a jump. No set of parameters gives one for this "
+            "record. Check the stiffness, or give a record with measured slip."
+        )
+    return experiment.resolved(usable[0], scatter), usable
+
+
+def minimised(
+    experiment: Experiment,
+    measured: "np.ndarray",
+    kept: "np.ndarray",
+    start: "np.ndarray",
+    *,
+    fixed: "np.ndarray | None" = None,
+    steps: int = 100,
+) -> "tuple[np.ndarray, float]":
+    """Coordinates with the least sum of squares near a start, and that sum; `fixed` ones stay as they are."""
+    from scipy.optimize import least_squares
+
+    free = np.ones(len(start), dtype=bool) if fixed is None else ~fixed
+    low, high = experiment.bounds
+    whole = np.clip(np.array(start, dtype=float), low, high)
+
+    def at(part: "np.ndarray") -> "np.ndarray":
+        full: np.ndarray = whole.copy()
+        full[free] = part
+        return full
+
+    def residuals(part: "np.ndarray") -> "np.ndarray":
+        found: np.ndarray = (experiment.friction(at(part)) - measured)[kept]
+        return found
+
+    first = residuals(whole[free])
+    if not np.all(np.isfinite(first)):
+        return whole, np.inf
+    size = max(float(np.sqrt(np.mean(first**2))), 1e-300)
+    found = least_squares(
+        lambda part: residuals(part) / size,
+        np.clip(whole[free], np.nextafter(low, high)[free], np.nextafter(high, low)[free]),
+        jac=lambda part: experiment.slopes(at(part))[kept][:, free] / size,
+        bounds=(low[free], high[free]),
+        x_scale="jac",
+        ftol=_SHARE_OF_EXCESS / len(first),
+        xtol=1e-7,
+        gtol=1e-12,
+        max_nfev=steps,
+    )
+    return at(found.x), float(2 * found.cost * size**2)
+
+
+def settled(fit: Fit, how: Search) -> Fit:
+    """A fit on a finer simulation and without outliers, until neither changes."""
+    for _ in range(how.rounds):
+        kept = ~outliers(fit.residuals, how.longest_outlier)
+        finer = fit.experiment.resolved(fit.fitted, fit.accuracy)
+        fitted, _ = minimised(finer, fit.measured, kept, fit.fitted)
+        unchanged = finer is fit.experiment and np.array_equal(kept, fit.kept)
+        fit = replace(fit, experiment=finer, fitted=fitted, kept=kept)
+        if unchanged:
+            break
+    return fit
+
+
+def outliers(residuals: "np.ndarray", longest: int) -> "np.ndarray":
+    """Samples so far off that noise alone has one such among all with a chance of 5 %, in runs of at most `longest`.
+
+    The size of the noise is that of the median residual.
+    """
+    from scipy.stats import norm
+
+    middle = np.median(residuals)
+    size = np.median(np.abs(residuals - middle)) / norm.ppf(0.75)
+    far = np.abs(residuals - middle) > size * norm.isf((1 - CONFIDENCE) / 2 / len(residuals))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], far.astype(int), [0]])))
+    found = np.zeros(len(residuals), dtype=bool)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        found[begin:end] = end - begin <= longest
+    return found

@@ -1,0 +1,136 @@
+"""The main call: from a record to friction parameters with their confidence regions."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from quakedesign.errors import RecordError
+from quakedesign.fault import friction_law
+from quakedesign.fault.checks import require_positive
+from quakedesign.identification.experiment import Difference
+from quakedesign.identification.fitting import Fit, Search, fit, settled
+from quakedesign.identification.profiles import BetterFit, interval
+from quakedesign.identification.record import Record, read_record
+from quakedesign.identification.result import Estimate, Identification, estimate
+from quakedesign.identification.setup import Setup, set_up
+
+DEFAULT_LAW = "rate-and-state-aging"
+_PAIR = ("direct_effect", "evolution_effect")
+_MOST_BETTER = 10
+
+
+def identify(
+    record: Record | str | Path,
+    law: str = DEFAULT_LAW,
+    *,
+    stiffness: float | None = None,
+    normal_stress: float | None = None,
+    seed: int = 0,
+) -> Identification:
+    """Friction parameters of a laboratory record, each with its profile likelihood at 95 %.
+
+    A law with state is fitted to the simulated experiment: a block without inertia that a spring draws after the
+    recorded load point, from steady sliding on. A law that weakens with slip is fitted at the measured slip, or
+    without one to a block that sticks at first and then slips as the stiff spring lets it. Noise is taken for
+    independent from sample to sample and equally large; where residuals are correlated, regions are widened by it.
+
+    Parameters
+    ----------
+    record : Record, str or Path
+        Or a CSV file of one, see `read_record`.
+    law : str
+        Name of a friction law with state, or of one that depends on slip.
+    stiffness : float, optional
+        Of the machine, known exactly [Pa/m; N/m for a record of forces, 1/m for one of friction alone]; fitted unless
+        given.
+    normal_stress : float, optional
+        Constant [Pa], where a file has no such column.
+    seed : int
+        Of the draw of the starts.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    RecordError
+        When the record cannot be read, or does not suit the law.
+    UnknownNameError
+        For a law that does not exist.
+    """
+    if stiffness is not None:
+        require_positive(stiffness=stiffness)
+    if normal_stress is not None:
+        require_positive(normal_stress=normal_stress)
+    if isinstance(record, Record):
+        if normal_stress is not None:
+            raise RecordError("normal_stress goes with a file. Received it beside a Record. Put it into the record.")
+        found = record
+    else:
+        found = read_record(record, normal_stress=normal_stress)
+    if len(found.time) < 2 or not np.ptp(found.friction) > 0:
+        raise RecordError("a record must have samples in which friction changes. Received none. Give a longer one.")
+    setup = set_up(found, friction_law(law), stiffness)
+    best = fit(setup.experiment, found.friction[setup.used], seed=seed)
+    return _profiled(found, setup, best, seed)
+
+
+def _profiled(record: Record, setup: Setup, best: Fit, seed: int) -> Identification:
+    """Profiles about the best fit; about a better one if a profile comes upon it."""
+    for _ in range(_MOST_BETTER):
+        try:
+            estimates = _estimates(best)
+            difference = _difference(best)
+            break
+        except BetterFit as better:
+            best = settled(replace(best, fitted=better.fitted, agreeing=1), Search())
+    else:
+        raise RecordError(
+            "a record must have one best fit. Received one whose fit gets better wherever it is followed. Give the "
+            "stiffness, or a record with more steps."
+        )
+    if difference is not None and difference.identified and not any(estimates[name].identified for name in _PAIR):
+        estimates |= {name: _open(estimates[name]) for name in _PAIR}
+    return Identification(
+        record=record,
+        fit=best,
+        used=setup.used,
+        estimates=estimates,
+        difference=difference,
+        law=best.experiment.best_law(best.fitted),
+        notes=setup.notes,
+        seed=seed,
+    )
+
+
+def _estimates(best: Fit) -> dict[str, Estimate]:
+    """Estimates of all coordinates, those of the law first."""
+    places = range(len(best.fitted))
+    return {best.experiment.coordinates[i].name: _estimate(best, i) for i in places}
+
+
+def _open(told: Estimate) -> Estimate:
+    """The same without ends: along a valley of equal fits those that a search comes upon mean nothing."""
+    return replace(told, low=-math.inf, high=math.inf, least=-math.inf, most=math.inf)
+
+
+def _estimate(best: Fit, place: int) -> Estimate:
+    alone = interval(best, place, best.threshold(1))
+    jointly = interval(best, place, best.threshold(len(best.fitted)), inside=alone)
+    return estimate(best, place, (alone.low, alone.high), (jointly.low, jointly.high))
+
+
+def _difference(best: Fit) -> Estimate | None:
+    """Estimate of the difference of both effects."""
+    names = [c.name for c in best.experiment.coordinates]
+    if not set(_PAIR) <= set(names):
+        return None
+    first, second = map(names.index, _PAIR)
+    turned = Difference(whole=best.experiment, first=first, second=second)
+    try:
+        return _estimate(replace(best, experiment=turned, fitted=turned.difference(best.fitted)), first)
+    except BetterFit as better:
+        raise BetterFit(turned.whole_of(better.fitted)) from None

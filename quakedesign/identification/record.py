@@ -1,0 +1,206 @@
+"""Records of laboratory experiments: columns with units, read at the boundary into SI."""
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from quakedesign.errors import RecordError
+from quakedesign.fault.units import si_value
+from quakedesign.input import read_text
+from quakedesign.text import nearest_name, shown
+
+COLUMNS = {
+    "time": "s",
+    "load_point_displacement": "m",
+    "load_point_rate": "m/s",
+    "shear_stress": "Pa",
+    "shear_force": "N",
+    "friction": "",
+    "normal_stress": "Pa",
+    "normal_force": "N",
+    "slip": "m",
+}
+"""Every known column and its SI unit."""
+
+_SHEAR = {"shear_stress": "normal_stress", "shear_force": "normal_force"}
+_LARGEST_FILE = 1 << 24
+MOST_SAMPLES = 10000
+_HEADING = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?\s*")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """What was measured, in SI, one value a sample.
+
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    time : ndarray
+        [s], ascending.
+    friction : ndarray
+        Shear over normal stress [-].
+    load_point : ndarray or None
+        Displacement of the load point [m].
+    slip : ndarray or None
+        [m].
+    normal : ndarray
+        Effective normal stress [Pa] or force [N]; 1 where only friction is known.
+    normal_unit : str
+        ``"Pa"``, ``"N"`` or nothing.
+    """
+
+    name: str
+    time: "np.ndarray"
+    friction: "np.ndarray"
+    load_point: "np.ndarray | None"
+    slip: "np.ndarray | None"
+    normal: "np.ndarray"
+    normal_unit: str
+
+    @property
+    def stiffness_unit(self) -> str:
+        """Unit of a stiffness that goes with the normal stress or force."""
+        return f"{self.normal_unit or '1'}/m"
+
+
+def read_record(path: str | Path, *, normal_stress: float | None = None) -> Record:
+    """Record from a CSV file whose first line names columns with units, as ``time [s], shear_stress [MPa]``.
+
+    Lines that begin with ``#`` are remarks.
+
+    Parameters
+    ----------
+    path : str or Path
+    normal_stress : float, optional
+        Constant effective normal stress [Pa] where there is no such column.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RecordError
+        When the file cannot be read, or a column is missing, unknown, or holds something else than numbers.
+    UnitError
+        For a column whose unit is unknown or of another dimension.
+    """
+    text = read_text(path, "record", largest=_LARGEST_FILE, refusal=RecordError)
+    lines = [(n, line) for n, line in enumerate(text.splitlines(), start=1) if line.strip() and line.strip()[0] != "#"]
+    if not lines:
+        raise RecordError(f"a record must have a line of headings. Received {path}, which is empty.")
+    factors = _headings(next(csv.reader([lines[0][1]])))
+    if len(lines) - 1 > MOST_SAMPLES:
+        raise RecordError(
+            f"a record must have at most {MOST_SAMPLES} samples. Received {len(lines) - 1}. Average neighbouring ones, "
+            "or cut out the part that counts."
+        )
+    values = _values(lines[1:], list(factors))
+    given = {name: column * factor for (name, factor), column in zip(factors.items(), values.T, strict=True)}
+    return _record(Path(path).stem, given, normal_stress)
+
+
+def _headings(cells: Sequence[str]) -> dict[str, float]:
+    """SI value of one unit of every column, by name."""
+    found: dict[str, float] = {}
+    for cell in cells:
+        match = _HEADING.fullmatch(cell)
+        name, unit = match.groups() if match else (cell.strip(), None)
+        if name not in COLUMNS:
+            raise RecordError(
+                f"a column must be one of {', '.join(COLUMNS)}. Received {shown(name)}."
+                f"{nearest_name(name, COLUMNS) or ' Remove it, or rename it.'}"
+            )
+        if name in found:
+            raise RecordError(f"a column must be there once. Received {name} twice. Remove one.")
+        if unit is None and COLUMNS[name]:
+            raise RecordError(
+                f"column {name} must have its unit in brackets. Received {shown(cell.strip())}. "
+                f"Write {name} [{COLUMNS[name]}], say."
+            )
+        plain = not unit or unit.strip() in ("-", "1")
+        found[name] = 1.0 if plain and not COLUMNS[name] else si_value(f"1 {unit}", COLUMNS[name], f"column {name}")
+    return found
+
+
+def _values(lines: Sequence[tuple[int, str]], names: Sequence[str]) -> "np.ndarray":
+    """Numbers of all lines, shape (samples, columns)."""
+    rows = []
+    for number, line in lines:
+        cells = line.split(",")
+        if len(cells) != len(names):
+            raise RecordError(f"line {number} must hold {len(names)} values. Received {len(cells)}.")
+        try:
+            rows.append([float(cell) for cell in cells])
+        except ValueError:
+            raise RecordError(f"line {number} must hold numbers. Received {shown(line.strip())}.") from None
+    values = np.array(rows, dtype=float).reshape(len(rows), len(names))
+    if wrong := np.flatnonzero(~np.all(np.isfinite(values), axis=1)).tolist():
+        raise RecordError(f"line {lines[wrong[0]][0]} must hold finite numbers. Remove lines without measurement.")
+    return values
+
+
+def _record(name: str, given: dict[str, "np.ndarray"], normal_stress: float | None) -> Record:
+    if "time" not in given:
+        raise RecordError(f"a record must have the column time. Received {', '.join(given)}. Add time [s].")
+    time = given["time"]
+    if late := np.flatnonzero(np.diff(time) <= 0).tolist():
+        raise RecordError(
+            f"time must ascend. Received {time[late[0] + 1]:.9g} s after {time[late[0]]:.9g} s. Sort the record."
+        )
+    friction, normal, unit = _friction(given, normal_stress)
+    return Record(
+        name=name,
+        time=time - time[0] if len(time) else time,
+        friction=friction,
+        load_point=_load_point(given),
+        slip=given.get("slip"),
+        normal=normal,
+        normal_unit=unit,
+    )
+
+
+def _friction(given: dict[str, "np.ndarray"], stress: float | None) -> "tuple[np.ndarray, np.ndarray, str]":
+    """Friction coefficient, what is normal to it, and the unit of that."""
+    measured = _one_of(given, ("friction", *_SHEAR), "friction, shear_stress or shear_force")
+    across = _SHEAR.get(measured) or next((n for n in _SHEAR.values() if n in given), "normal_stress")
+    if across in given and stress is not None:
+        raise RecordError(f"the normal stress must be given once. Received it beside the column {across}.")
+    if across in given:
+        normal, unit = given[across], COLUMNS[across]
+    elif stress is not None and across == "normal_stress":
+        normal, unit = np.full_like(given[measured], stress), "Pa"
+    elif measured == "friction":
+        normal, unit = np.ones_like(given[measured]), ""
+    else:
+        remedy = " or a constant normal stress" if across == "normal_stress" else ""
+        raise RecordError(f"{measured} needs the column {across}{remedy}. Received {', '.join(given)}. Add it.")
+    if np.any(normal <= 0):
+        raise RecordError(f"{across} must be positive. Received {np.min(normal):.6g} {unit}. Compression is positive.")
+    return given[measured] / (1 if measured == "friction" else normal), normal, unit
+
+
+def _load_point(given: dict[str, "np.ndarray"]) -> "np.ndarray | None":
+    """Displacement [m] since the first sample, of a rate by the rule of trapezoids."""
+    names = [name for name in ("load_point_displacement", "load_point_rate") if name in given]
+    if not names:
+        return None
+    column = given[_one_of(given, ("load_point_displacement", "load_point_rate"), "load_point_displacement or _rate")]
+    if names == ["load_point_displacement"]:
+        since_first: np.ndarray = column - column[0]
+        return since_first
+    moved = np.diff(given["time"]) * (column[1:] + column[:-1]) / 2
+    whole: np.ndarray = np.concatenate([[0.0], np.cumsum(moved)])
+    return whole
+
+
+def _one_of(given: dict[str, "np.ndarray"], names: Sequence[str], what: str) -> str:
+    found = [name for name in names if name in given]
+    if len(found) != 1:
+        raise RecordError(f"a record must have exactly one column {what}. Received {', '.join(found) or 'none'}.")
+    return found[0]

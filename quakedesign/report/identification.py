@@ -1,0 +1,114 @@
+"""An identified law on a terminal and as a figure of the residuals."""
+
+import io
+import math
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+import numpy as np
+
+from quakedesign.errors import OutputError
+from quakedesign.identification import Estimate, Identification
+from quakedesign.output import write_whole
+from quakedesign.report.drawing import NATURAL, SMALL, clock, figure, finish
+
+FORMATS = (".svg", ".png", ".pdf")
+_MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
+_MOST_OUTLIERS = 8
+
+
+def identification_lines(found: Identification) -> list[str]:
+    """For people, within 80 columns: what was not told first."""
+    fit = found.fit
+    verdict = "every parameter identified" if found.identified else "not every parameter is identifiable"
+    head = [f"{found.record.name}: {found.law.name}, {verdict}", *found.untold(), ""]
+    columns = f"{'parameter':24}{'value':>12}{'95 %: from':>14}{'to':>12}  unit"
+    shown = [*found.estimates.values(), *([found.difference] if found.difference else [])]
+    tail = [
+        f"noise {fit.noise:.3g} of friction in {int(fit.kept.sum())} samples; {fit.agreeing} of {fit.starts} searches "
+        f"end in this fit (seed {found.seed})",
+        *_warnings(found),
+        *_outliers(found),
+        f"assumed: {'; '.join(found.notes)}",
+    ]
+    return [*_wrapped(head), columns, *map(_row, shown), "", *_wrapped(tail)]
+
+
+def _wrapped(told: list[str]) -> list[str]:
+    return [line for said in told for line in (wrap(said, 80, subsequent_indent="  ") or [""])]
+
+
+def _row(estimate: Estimate) -> str:
+    name = "difference a - b" if " - " in estimate.name else estimate.name
+    low, high = (f"{end:.5g}" if math.isfinite(end) else "?" for end in (estimate.low, estimate.high))
+    return f"{name:24}{estimate.value:>12.5g}{low:>14}{high:>12}  {estimate.unit or '-'}"
+
+
+def _warnings(found: Identification) -> list[str]:
+    told = []
+    if found.fit.correlation > 2:
+        told.append(
+            f"residuals are correlated over {found.fit.correlation:.1f} samples: law or machine explain the record "
+            "only in part; regions are widened by that, as if there were fewer samples"
+        )
+    return told
+
+
+def _outliers(found: Identification) -> list[str]:
+    if not found.outliers:
+        return []
+    told = ", ".join(f"{o.size:+.3g} at {o.time:.6g} s" for o in found.outliers[:_MOST_OUTLIERS])
+    more = len(found.outliers) - _MOST_OUTLIERS
+    return [f"outliers left out: {told}{f', and {more} smaller' if more > 0 else ''}"]
+
+
+def identification_figure(found: Identification) -> Any:
+    """Measured and simulated friction, and what is left of the noise, over time.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    drawing, ((above,), (below,)) = figure(2, 4.6, gridspec_kw={"height_ratios": (2, 1)})
+    size, unit = clock(float(found.record.time[-1]))
+    time, fit = found.record.time[found.used] / size, found.fit
+    above.plot(time, fit.measured, ".", color=_MEASURED, markersize=2, label="measured")
+    above.plot(time, fit.measured - fit.residuals, color=_FITTED, linewidth=1.2, label=f"fitted: {found.law.name}")
+    above.set_ylabel("friction [-]", fontsize=SMALL)
+    below.plot(time[fit.kept], fit.residuals[fit.kept], ".", color=_MEASURED, markersize=2)
+    for level in (-2 * fit.noise, 0.0, 2 * fit.noise):
+        below.axhline(level, color=NATURAL, linewidth=0.6, linestyle="solid" if level == 0 else (0, (4, 2)))
+    if found.outliers:
+        places = np.flatnonzero(~fit.kept)
+        above.plot(time[places], fit.measured[places], "x", color=_OUTLIER, markersize=5, label="left out")
+        inside = 8 * fit.noise
+        below.plot(time[places], np.clip(fit.residuals[places], -inside, inside), "x", color=_OUTLIER, markersize=5)
+    below.set_ylabel("residual [-]", fontsize=SMALL)
+    below.set_xlabel(f"time [{unit}]", fontsize=SMALL)
+    note = f"dashed: twice the noise, {fit.noise:.3g}; crosses beyond eight times it stand at its edge"
+    return finish(drawing, f"{found.record.name}: friction and residuals", [], note, legend=above)
+
+
+def require_format(path: Path) -> None:
+    """Refuse a figure of another format than SVG, PNG or PDF.
+
+    Raises
+    ------
+    OutputError
+    """
+    if path.suffix not in FORMATS:
+        raise OutputError(f"a figure must end in {', '.join(FORMATS)}. Received {path}. Write {path.stem}.svg, say.")
+
+
+def save_figure(found: Identification, path: Path) -> None:
+    """Write the figure, whole or not at all, without a date so that the same figure is the same file.
+
+    Raises
+    ------
+    OutputError
+    """
+    require_format(path)
+    drawn, undated = io.BytesIO(), {".svg": {"Date": None}, ".png": {"Software": None}, ".pdf": {"CreationDate": None}}
+    identification_figure(found).savefig(drawn, format=path.suffix[1:], metadata=undated[path.suffix])
+    write_whole(path, drawn.getvalue())

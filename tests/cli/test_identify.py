@@ -1,0 +1,80 @@
+"""The command from a record to a fault file."""
+
+import json
+
+import numpy as np
+import pytest
+
+from quakedesign.cli import main
+from quakedesign.fault import load_fault
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(["identify", *map(str, arguments)])
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+@pytest.fixture
+def record(tmp_path):
+    slip = np.linspace(0, 20, 300)
+    noise = 2e-3 * np.random.default_rng(0).standard_normal(300)
+    shear = (0.4 + 0.17 * np.exp(-slip / 2.5) + noise) * 5
+    rows = [f"{0.1 * i:.6f},{s:.6f},{t:.6f}" for i, (s, t) in enumerate(zip(slip, shear, strict=True))]
+    path = tmp_path / "weakening.csv"
+    path.write_text("\n".join(["time [s], slip [mm], shear_stress [MPa]", *rows]) + "\n")
+    return path
+
+
+def test_json_holds_what_is_promised(record, tmp_path, capsys):
+    toml, figure = tmp_path / "found.toml", tmp_path / "found.svg"
+    options = ("--law", "exponential-slip-weakening", "--normal-stress", "5 MPa")
+    code, out, _ = run(capsys, record, *options, "--out", toml, "--figure", figure, "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert {"law", "parameters", "residual", "box", "outliers", "figure", "file"} <= set(answer)
+    drop = answer["parameters"]["drop"]
+    assert drop["low"] < 0.17 < drop["high"]
+    assert drop["unit"] == ""
+    assert answer["box"]["drop"][0] < drop["low"] < drop["value"] < drop["high"] < answer["box"]["drop"][1]
+    assert load_fault(toml).name == "lab-fault identified"
+    assert "<svg" in figure.read_text()[:2000]
+
+
+def test_text_keeps_within_80_columns(record, capsys):
+    code, out, _ = run(capsys, record, "--law", "linear-slip-weakening", "--normal-stress", "5 MPa")
+    assert code == 0
+    assert "every parameter identified" in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_what_cannot_be_told_is_said_and_no_file_written(tmp_path, capsys):
+    """Slip so long that only the residual is left."""
+    path, toml = tmp_path / "late.csv", tmp_path / "found.toml"
+    noise = 2e-3 * np.random.default_rng(0).standard_normal(100)
+    rows = [f"{i},{50 + i},{0.4 + noise[i]}" for i in range(100)]
+    path.write_text("\n".join(["time [s],slip [mm],friction", *rows]) + "\n")
+    code, out, _ = run(capsys, path, "--law", "exponential-slip-weakening", "--out", toml)
+    assert code == 1
+    assert "critical_slip is not identifiable from this record" in " ".join(out.split())
+    assert "not written" in out
+    assert not toml.exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--law", "rate-and-state-agin"), "friction law must be one of"),
+        (("--stiffness", "5 GPa"), "stiffness must be"),
+        (("--figure", "x.bmp"), "must end in .svg, .png, .pdf"),
+        (("--fault", "nowhere"), "fault must be a preset"),
+        (("--out", "nowhere/found.toml"), "must be in a folder that can be written"),
+        ((), "needs the motion of the load point"),
+    ],
+)
+def test_nonsense_is_refused_in_one_line(record, monkeypatch, tmp_path, capsys, more, said):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, record, "--normal-stress", "5 MPa", *more)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert said in err

@@ -1,0 +1,52 @@
+"""Confidence regions hold the truth as often as they say, on records of an independent integrator."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quakedesign.fault import friction_law
+from quakedesign.identification.fitting import fit
+from quakedesign.identification.setup import set_up
+
+SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
+synthetic = importlib.util.module_from_spec(SPECIFICATION)
+sys.modules[SPECIFICATION.name] = synthetic
+SPECIFICATION.loader.exec_module(synthetic)
+KINDS = synthetic.KINDS
+
+REPEATS = 100
+
+
+def fitted(made, seed):
+    record = made.noisy(seed)
+    setup = set_up(record, friction_law(made.law), made.stiffness)
+    return fit(setup.experiment, record.friction[setup.used], seed=seed)
+
+
+def truth_of(made, best):
+    rate = getattr(best.experiment.law, "reference_rate", None)
+    values = made.true_at(rate)
+    return best.experiment.inward([values[c.name] for c in best.experiment.coordinates])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_estimates_are_within_four_of_their_deviations(kind):
+    """Which one of 40 standardised errors exceeds by chance once in 400 times."""
+    made = KINDS[kind]()
+    for seed in range(1 if "stiffness" in kind or "steps" in kind else 5):
+        best = fitted(made, seed)
+        assert np.max(np.abs(best.fitted - truth_of(made, best)) / best.deviations) < 4
+        assert best.noise == pytest.approx(made.noise * (1 + 1 / 9 / 12) ** 0.5, rel=5 / (2 * best.freedom) ** 0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_joint_region_holds_the_truth_in_90_to_99_of_100_records(kind):
+    made, inside = KINDS[kind](), 0
+    for seed in range(REPEATS):
+        best = fitted(made, 1000 + seed)
+        inside += best.distance(truth_of(made, best)) <= best.threshold(len(best.fitted))
+    assert 90 <= inside <= 99

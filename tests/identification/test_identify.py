@@ -1,0 +1,155 @@
+"""What is said of records: parameters, ends, outliers, what cannot be told, and the fault that covers all of it."""
+
+import importlib.util
+import itertools
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quakedesign.errors import ParameterError, RecordError
+from quakedesign.fault import friction_law, load_fault
+from quakedesign.identification import Record, cover, identified_fault, identify, save_fault
+from quakedesign.rationals import rational
+
+SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
+synthetic = importlib.util.module_from_spec(SPECIFICATION)
+sys.modules[SPECIFICATION.name] = synthetic
+SPECIFICATION.loader.exec_module(synthetic)
+DATA = Path(__file__).parent.parent / "data"
+
+
+@pytest.fixture(scope="module")
+def weak():
+    """Slip weakening with two outliers."""
+    record = synthetic.weakening().noisy(3)
+    friction = record.friction.copy()
+    friction[[50, 300]] += [0.05, -0.03]
+    return identify(replace(record, friction=friction), "exponential-slip-weakening")
+
+
+def test_outliers_are_named_and_left_out(weak):
+    found = [(round(o.time, 6), round(o.size, 2)) for o in weak.outliers]
+    times = np.linspace(0, 100, 400)[[50, 300]]
+    assert found == [(round(times[0], 6), 0.05), (round(times[1], 6), -0.03)]
+    assert weak.fit.noise == pytest.approx(2e-3, rel=0.2)
+    assert weak.allows({"residual": 0.4, "drop": 0.17, "critical_slip": 2.5e-3})
+    assert not weak.allows({"residual": 0.41, "drop": 0.17, "critical_slip": 2.5e-3})
+    with pytest.raises(ParameterError, match="drop"):
+        weak.allows({"residual": 0.4, "critical_slip": 2.5e-3})
+
+
+def test_ends_are_those_of_linear_least_squares_where_the_law_is_linear():
+    """With a critical slip that is known, friction is linear in the other two: Fisher's ellipsoid in closed form."""
+    found = identify(synthetic.weakening().noisy(4), "exponential-slip-weakening")
+    assert found.identified
+    fit = found.fit
+    slopes = fit.experiment.slopes(fit.fitted)[fit.kept]
+    covariance = np.linalg.inv(slopes.T @ slopes) * fit.noise**2
+    for i, estimate in enumerate(found.estimates.values()):
+        wide = np.sqrt(covariance[i, i] * np.array([fit.threshold(1), fit.threshold(3)]) * fit.correlation)
+        ends = np.log([estimate.low, estimate.high, estimate.least, estimate.most]) - np.log(estimate.value)
+        np.testing.assert_allclose(ends, [-wide[0], wide[0], -wide[1], wide[1]], rtol=0.05)
+
+
+def test_sparse_velocity_steps_tell_only_the_difference_of_effects():
+    """Every sample is steady: a and b enter by a - b alone."""
+    steps = (1e-6, 1e-5, 1e-6, 3e-6)
+    rates = np.repeat(steps, 8)
+    time = 1e4 * np.arange(len(rates))
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(rates))
+    friction = 0.6 - 0.005 * np.log(rates / 1e-6) + noise
+    moved = np.concatenate([[0.0], np.cumsum(np.diff(time) * rates[:-1])])
+    record = Record(
+        name="sparse",
+        time=time,
+        friction=np.concatenate([friction[:1], friction[:-1]]),
+        load_point=moved,
+        slip=None,
+        normal=np.ones(len(time)),
+        normal_unit="",
+    )
+    found = identify(record, stiffness=1e4)
+    assert not found.identified
+    assert any("only direct_effect - evolution_effect = " in told for told in found.untold())
+    assert found.difference.low < -0.005 < found.difference.high
+    assert found.difference.high - found.difference.low < 2e-4
+    with pytest.raises(RecordError, match="needs every parameter"):
+        identified_fault(found, load_fault("lab-fault"))
+
+
+def test_the_velocity_step_of_rsfmodel_gives_back_its_parameters():
+    """jrleeman/rsfmodel, tests/rsf_tests.py: a = 0.005, b = 0.01, Dc = 10 µm, k = 1e-3 1/µm, printed to 8 decimals."""
+    lines = (DATA / "rsfmodel_velocity_step.csv").read_text().splitlines()
+    head, *rows = (line.split(",") for line in lines if not line.startswith("#"))
+    time, friction = np.array(rows, dtype=float).T
+    record = Record(
+        name="rsfmodel",
+        time=time,
+        friction=friction,
+        load_point=np.where(time < 10, 1e-6 * time, 1e-5 + 1e-5 * (time - 10)),
+        slip=None,
+        normal=np.ones(len(time)),
+        normal_unit="",
+    )
+    found = identify(record)
+    values = {name: estimate.value for name, estimate in found.estimates.items()}
+    assert head == ["time", "friction"]
+    truth = {"reference_coefficient": 0.6, "direct_effect": 0.005, "evolution_effect": 0.01, "critical_slip": 1e-5}
+    assert values == pytest.approx(truth | {"stiffness": 1e3}, rel=1e-4)
+    assert found.fit.noise < 2e-7
+
+
+def test_the_same_seed_gives_the_same_answer(weak):
+    again = identify(weak.record, "exponential-slip-weakening", seed=0)
+    assert again.to_dict() == weak.to_dict()
+
+
+def test_a_cover_holds_every_law_of_its_ranges():
+    """In rationals: each law, scaled to the cover's static friction, keeps its bounds and slope; N̂ is in the box."""
+    law = friction_law("exponential-slip-weakening")(residual=0.4, drop=0.17, critical_slip=2.5e-3)
+    ranges = {"residual": (0.39, 0.41), "drop": (0.16, 0.18), "critical_slip": (2.3e-3, 2.7e-3)}
+    box = load_fault("lab-fault", box="ten-percent").box
+    held = cover(law, ranges, box)
+    static = rational(held.law.residual) + rational(held.law.drop)
+    slope = rational(held.law.drop) / rational(held.law.critical_slip)
+    inner = itertools.product(*(np.linspace(*ends, 4) for ends in ranges.values()))
+    for residual, drop, critical_slip in ([rational(float(value)) for value in corner] for corner in inner):
+        scale = static / (residual + drop)
+        assert residual * scale >= rational(held.law.residual)
+        assert drop / critical_slip * scale <= slope
+        assert (1 - box.authority) / scale >= 1 - held.box.authority
+        assert (1 + box.authority) / scale <= 1 + held.box.authority
+    assert (held.box.stiffness, held.box.damping) == (box.stiffness, box.damping)
+    assert held.box.authority < Fraction(1, 5)
+
+
+def test_the_file_is_a_fault_that_covers_the_truth(weak, tmp_path):
+    path = tmp_path / "found.toml"
+    save_fault(weak, load_fault("lab-fault"), path)
+    fault = load_fault(path)
+    assert fault == identified_fault(weak, load_fault("lab-fault"))
+    assert fault.friction.residual < 0.4 < 0.4 + 0.17 < 1.02 * (fault.friction.residual + fault.friction.drop)
+    assert fault.friction.slip_slope > 0.17 / 2.5e-3
+    assert 0 < fault.box.authority < Fraction(1, 20)
+    assert "drop = 0.17" in path.read_text()
+
+
+@pytest.mark.parametrize(
+    ("law", "changes", "said"),
+    [
+        ("slip-rate-weakening", {}, "depends on the slip rate alone"),
+        ("rate-and-state-aging", {}, "needs the motion of the load point"),
+        ("exponential-slip-weakening", {"slip": None}, "needs the column slip"),
+        ("exponential-slip-weakening", {"slip": np.zeros(400)}, "slip must have grown"),
+        ("exponential-slip-weakening", {"friction": np.ones(400)}, "friction changes"),
+        ("rate-and-state-aging", {"load_point": np.zeros(400)}, "must begin in steady sliding"),
+    ],
+)
+def test_records_that_do_not_suit_a_law_are_refused(law, changes, said):
+    record = replace(synthetic.weakening().noisy(0), **changes)
+    with pytest.raises(RecordError, match=said):
+        identify(record, law)

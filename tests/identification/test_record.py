@@ -1,0 +1,65 @@
+"""Records are read with their units; what is wrong is said in one line."""
+
+import numpy as np
+import pytest
+
+from quakedesign.errors import QuakedesignError
+from quakedesign.identification import read_record
+
+HEAD = "time [ms], load_point_displacement [um], shear_stress [MPa], normal_stress [kPa]"
+ROWS = ["0, 5, 3, 5000", "100, 6, 3.1, 5000", "300, 8, 3.2, 6000"]
+
+
+def written(tmp_path, *lines):
+    path = tmp_path / "record.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_units_become_si(tmp_path):
+    record = read_record(written(tmp_path, "# a remark", HEAD, *ROWS))
+    np.testing.assert_allclose(record.time, [0, 0.1, 0.3])
+    np.testing.assert_allclose(record.load_point, [0, 1e-6, 3e-6])
+    np.testing.assert_allclose(record.friction, [0.6, 0.62, 3.2 / 6])
+    np.testing.assert_allclose(record.normal, [5e6, 5e6, 6e6])
+    assert (record.name, record.normal_unit, record.stiffness_unit, record.slip) == ("record", "Pa", "Pa/m", None)
+
+
+def test_a_rate_is_summed_to_a_displacement(tmp_path):
+    path = written(tmp_path, "time [s], load_point_rate [um/s], friction", "0, 1, 0.6", "1, 3, 0.7", "3, 5, 0.6")
+    record = read_record(path)
+    np.testing.assert_allclose(record.load_point, [0, 2e-6, 10e-6])
+    assert record.stiffness_unit == "1/m"
+
+
+def test_a_constant_normal_stress_stands_in_for_a_column(tmp_path):
+    path = written(tmp_path, "time [s], shear_stress [MPa], slip [mm]", "0, 3, 0", "1, 2, 1")
+    np.testing.assert_allclose(read_record(path, normal_stress=5e6).friction, [0.6, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([], "is empty"),
+        ([HEAD.replace("shear_stress", "shear_stres"), *ROWS], "Did you mean shear_stress"),
+        ([HEAD.replace("time [ms]", "pressure [Pa]"), *ROWS], "Remove it, or rename it"),
+        ([HEAD.replace("time [ms]", "slip [mm]"), *ROWS], "the column time"),
+        ([HEAD.replace(" [MPa]", ""), *ROWS], "must have its unit in brackets"),
+        ([HEAD.replace("[ms]", "[MPa]"), *ROWS], "another dimension"),
+        ([HEAD.replace("[ms]", "[lightyearz]"), *ROWS], "unit is unknown"),
+        ([HEAD + ", normal_stress [Pa]", *ROWS], "twice"),
+        ([HEAD.replace(", normal_stress [kPa]", ""), "0, 5, 3"], "needs the column normal_stress"),
+        ([HEAD.replace("shear_stress [MPa]", "slip [mm]"), *ROWS], "exactly one column friction"),
+        ([HEAD + ", friction", "0, 5, 3, 5000, 1"], "exactly one column friction"),
+        ([HEAD, ROWS[0], ROWS[0]], "time must ascend"),
+        ([HEAD, ROWS[0], "1, 2, 3"], "line 3 must hold 4 values. Received 3"),
+        ([HEAD, ROWS[0], "1, 2, three, 4"], "line 3 must hold numbers"),
+        ([HEAD, ROWS[0], "1, 2, nan, 4"], "line 3 must hold finite numbers"),
+        ([HEAD, ROWS[0], "100, 2, 3, -1"], "normal_stress must be positive"),
+        ([HEAD, *["0, 0, 0, 0"] * 10001], "at most 10000 samples"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(tmp_path, lines, said):
+    with pytest.raises(QuakedesignError, match=said) as refused:
+        read_record(written(tmp_path, *lines))
+    assert "\n" not in str(refused.value)
