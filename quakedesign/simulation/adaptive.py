@@ -159,8 +159,8 @@ class _Piece:
         """Vector after each step, one a column; raises `StoppedError`."""
         recorder, step = self.recorder, self.recorder.step
         factors = [float(factor) for factor in recorder.loop.factors]
-        start = vector[2 : 2 + recorder.state_size]
-        states, works = self.flow.follow(vector[0] * step, self.count * step, start, factors)
+        now = recorder.parts(vector)
+        states, works = self.flow.follow(now.counter * step, self.count * step, now.state, factors)
         first = recorder.index(WORKS[0])
         done = vector[first : first + len(WORKS), None] + works
         return np.asarray(self.watch(vector, states, done).full())

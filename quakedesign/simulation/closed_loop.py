@@ -1,7 +1,7 @@
 """Plant, law and reference of one closed loop, from SymPy to CasADi functions."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
@@ -12,7 +12,7 @@ from quakedesign.controllers.feed_forward import NONE
 from quakedesign.fault import Fault
 from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.rationals import rational
-from quakedesign.simulation.energy import WORKS, Metered
+from quakedesign.simulation.energy import Meter, Metered
 from quakedesign.simulation.integrators import Integrator
 from quakedesign.simulation.loading import NOTHING, Load
 from quakedesign.simulation.variation import (
@@ -91,8 +91,6 @@ class ClosedLoop(Metered):
         What acts on the fault beside its own disturbance.
     factors : tuple of float or SX
         True over nominal parameters as in `Variation.values`; empty for the nominal fault.
-    meter : list of SX or None
-        Sum of the works (`quakedesign.simulation.energy.WORKS`) so far, to which `advance` adds those of its step.
     """
 
     plant_name: ClassVar[str] = "smooth"
@@ -103,7 +101,6 @@ class ClosedLoop(Metered):
     constant_pressure: float = 0.0
     load: Load = NOTHING
     factors: tuple[Any, ...] = ()
-    meter: list[Any] | None = field(default=None, compare=False)
 
     def with_factors(self, factors: tuple[Any, ...]) -> Self:
         """Return the same loop with other true parameters, which may be symbols of CasADi (SX)."""
@@ -122,24 +119,7 @@ class ClosedLoop(Metered):
         step : float
             [s].
         """
-        import casadi as ca
-
-        if self.meter is None:
-            return self._advance(method, motion, state, step)
-        size = state.shape[0]
-
-        def with_powers(plant: Any, passed: Any, now: Any) -> Any:
-            seen: list[Any] = []
-
-            def watched(time: Any, x: Any, pressure: Any) -> Any:
-                seen[:] = [self.powers(time, x, pressure, getattr(plant, "direction", 1))]
-                return plant(time, x, pressure)
-
-            return ca.vertcat(motion(watched, passed, now[:size]), seen[0])
-
-        end = self._advance(method, with_powers, ca.vertcat(state, ca.SX.zeros(len(WORKS))), step)
-        self.meter[0] += end[size:]
-        return end[:size]
+        return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)
 
     def advance_often(
         self, method: type[Integrator], motion: Any, given: Any, state: Any, step: float, times: int
@@ -158,23 +138,31 @@ class ClosedLoop(Metered):
         """
         import casadi as ca
 
-        if times == 1:
-            return self.advance(method, lambda plant, passed, now: motion(plant, passed, now, given), state, step)
-        works = self.meter[0] if self.meter else ca.SX(0, 1)
-        carried = state, works, ca.SX(0), given, _column(self.factors)
-        before, so_far, number, told, factors = (ca.SX.sym("z", part.shape[0]) for part in carried)
-        meter = [so_far] if self.meter else None
-        loop = replace(self.with_factors(tuple(ca.vertsplit(factors))), meter=meter)
-        moved = loop.advance(method, lambda plant, passed, now: motion(plant, number + passed, now, told), before, step)
-        after = ca.vertcat(moved, meter[0] if meter else so_far, number + 1, told, factors)
-        once = ca.Function("substep", [ca.vertcat(before, so_far, number, told, factors)], ca.cse([after]))
-        end = once.fold(times, {"never_inline": True})(ca.vertcat(*carried))
-        if self.meter:
-            self.meter[0] = end[before.shape[0] : before.shape[0] + so_far.shape[0]]
-        return end[: before.shape[0]]
+        return self.metered_often(method, motion, given, (state, ca.SX(0, 1)), step, times)[0]
 
-    def _advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
-        return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)
+    def metered_often(
+        self, method: type[Integrator], motion: Any, given: Any, start: tuple[Any, Any], step: float, times: int
+    ) -> tuple[Any, Any]:
+        """State and works so far (SX) after a number of steps, see `advance_often`; works without entries stay so."""
+        import casadi as ca
+
+        def once(loop: Self, moving: Motion, state: Any, works: Any) -> tuple[Any, Any]:
+            if not works.shape[0]:
+                return loop.advance(method, moving, state, step), works
+            meter = Meter(loop, works)
+            return meter.advance(method, moving, state, step), meter.works
+
+        if times == 1:
+            return once(self, lambda plant, passed, now: motion(plant, passed, now, given), *start)
+        carried = *start, ca.SX(0), given, _column(self.factors)
+        before, so_far, number, told, factors = (ca.SX.sym("z", part.shape[0]) for part in carried)
+        loop = self.with_factors(tuple(ca.vertsplit(factors)))
+        moved = once(loop, lambda plant, passed, now: motion(plant, number + passed, now, told), before, so_far)
+        after = ca.vertcat(*moved, number + 1, told, factors)
+        substep = ca.Function("substep", [ca.vertcat(before, so_far, number, told, factors)], ca.cse([after]))
+        end = substep.fold(times, {"never_inline": True})(ca.vertcat(*carried))
+        first, last = before.shape[0], before.shape[0] + so_far.shape[0]
+        return end[:first], end[first:last]
 
     @property
     def integrals(self) -> tuple[sp.Symbol, ...]:

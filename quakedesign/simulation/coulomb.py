@@ -77,7 +77,7 @@ class CoulombLoop(ClosedLoop):
         carried = ca.fmin(ca.fmax(load, -strength), strength)
         return ca.if_else(state[1] == 0, carried, ca.sign(state[1]) * strength)
 
-    def _advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
+    def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
         """State after one step, with at most one change between slip forward, slip backward and rest."""
         import casadi as ca
 

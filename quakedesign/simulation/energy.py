@@ -86,6 +86,47 @@ class EnergyBudget:
         return "" if name == "relative_residual" else "J"
 
 
+class Meter:
+    """A loop in its own place while steps of it are written down, which adds up the works of its forces.
+
+    Attributes
+    ----------
+    loop : ClosedLoop
+    works : SX
+        So far, in the order of `WORKS`.
+    """
+
+    def __init__(self, loop: Any, works: Any) -> None:
+        self.loop, self.works = loop, works
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.loop, name)
+
+    def advance(self, method: Any, motion: Any, state: Any, step: float) -> Any:
+        """See `Stepped.advance`; the works are integrated along with the motion."""
+        import casadi as ca
+
+        size = state.shape[0]
+
+        def with_powers(plant: Any, passed: Any, now: Any) -> Any:
+            seen: list[Any] = []
+
+            def watched(time: Any, x: Any, pressure: Any) -> Any:
+                seen[:] = [self.loop.powers(time, x, pressure, getattr(plant, "direction", 1))]
+                return plant(time, x, pressure)
+
+            return ca.vertcat(motion(watched, passed, now[:size]), seen[0])
+
+        end = self.loop.advance(method, with_powers, ca.vertcat(state, ca.SX.zeros(len(WORKS))), step)
+        self.works = self.works + end[size:]
+        return end[:size]
+
+    def advance_often(self, method: Any, motion: Any, given: Any, state: Any, step: float, times: int) -> Any:
+        """See `Stepped.advance_often`."""
+        state, self.works = self.loop.metered_often(method, motion, given, (state, self.works), step, times)
+        return state
+
+
 class Metered(Stepped):
     """A loop whose forces do work that can be integrated along with its motion; functions on CasADi SX.
 

@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
-from quakedesign.loop.schemes import Scheme
+from quakedesign.loop.schemes import Scheme, Stepped
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.energy import WORKS, EnergyBudget
+from quakedesign.simulation.energy import WORKS, EnergyBudget, Meter
 from quakedesign.simulation.integrators import Integrator
 
 NEVER = -1.0
@@ -36,6 +36,36 @@ START = {
     "reverse_slip": NEVER,
     "stick": NEVER,
 } | dict.fromkeys(WORKS, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What the vector of a run holds.
+
+    Attributes
+    ----------
+    counter : SX or float
+        Number of the step.
+    settled_from : SX or float
+        Time from which errors count [s].
+    state : SX or ndarray
+        x1 [m], x2 [m/s], ξ, memory of the scheme.
+    watched : dict of str to SX or float
+    factors : tuple of SX or float
+        Numbers of the plant that a run carries along unchanged.
+    """
+
+    counter: Any
+    settled_from: Any
+    state: Any
+    watched: dict[str, Any]
+    factors: tuple[Any, ...]
+
+    def joined(self) -> Any:
+        """The vector (SX)."""
+        import casadi as ca
+
+        return ca.vertcat(self.counter, self.settled_from, self.state, *self.watched.values(), *self.factors)
 
 
 @dataclass(frozen=True)
@@ -67,12 +97,14 @@ class Recorder:
     @property
     def size(self) -> int:
         """Length of the vector."""
-        return self._constants + len(self.loop.factors)
+        return 2 + self.state_size + len(self.watching) + len(self.loop.factors)
 
-    @property
-    def _constants(self) -> int:
-        """Index of the first factor: numbers of the plant that a run carries along unchanged."""
-        return 2 + self.state_size + len(self.watching)
+    def parts(self, vector: Any) -> "Parts":
+        """Vector, of numbers or symbols, by its parts."""
+        first = 2 + self.state_size
+        entries = [vector[i] for i in range(first, self.size)]
+        watched = dict(zip(self.watching, entries, strict=False))
+        return Parts(vector[0], vector[1], vector[2:first], watched, tuple(entries[len(watched) :]))
 
     @cached_property
     def watching(self) -> dict[str, float]:
@@ -82,7 +114,7 @@ class Recorder:
 
     def loop_of(self, vector: Any) -> ClosedLoop:
         """Loop whose plant has the factors that the vector carries."""
-        return self.loop.with_factors(tuple(vector[i] for i in range(self._constants, self.size)))
+        return self.loop.with_factors(self.parts(vector).factors)
 
     def start(self, settled_from: float) -> list[float]:
         """Vector at rest at time zero; `settled_from` is a time [s]."""
@@ -91,41 +123,34 @@ class Recorder:
 
     def watched(self, vector: Any) -> dict[str, float]:
         """Accumulated values by name."""
-        values = (float(v) for v in vector[2 + self.state_size : self._constants])
-        return dict(zip(self.watching, values, strict=True))
+        return {name: float(value) for name, value in self.parts(vector).watched.items()}
 
     def observe(self, vector: Any) -> Any:
         """Vector (SX) after its own instant has been watched."""
-        import casadi as ca
-
-        parts = [vector[2 + self.state_size + i] for i in range(len(self.watching))]
-        before = dict(zip(self.watching, parts, strict=True))
-        after = self._after(before, vector)
-        return ca.vertcat(
-            vector[: 2 + self.state_size], *(after[name] for name in self.watching), vector[self._constants :]
-        )
+        now = self.parts(vector)
+        after = self._after(now.watched, vector)
+        return replace(now, watched={name: after[name] for name in self.watching}).joined()
 
     def energy(self, end: Any) -> EnergyBudget:
         """Energy budget of a run from its last vector."""
-        return self.loop.budget(self.watched(end), float(end[0]) * self.step, float(end[2]), float(end[3]))
+        last = self.parts(end)
+        slip, rate = (float(v) for v in last.state[:2])
+        return self.loop.budget(self.watched(end), float(last.counter) * self.step, slip, rate)
 
     def advance(self, vector: Any, method: type[Integrator]) -> Any:
         """Vector (SX) after its own instant has been watched and one step has been taken."""
         import casadi as ca
 
-        first = self.index(WORKS[0])
-        meter = [vector[first : first + len(WORKS)]]
-        loop = replace(self.loop_of(vector), meter=meter)
-        moved = self.scheme.advance(loop, method, vector[0], vector[2 : 2 + self.state_size], self.step)
-        return ca.cse([self.moved(vector, moved, meter[0])])[0]
+        now, first = self.parts(vector), self.index(WORKS[0])
+        meter = Meter(self.loop_of(vector), vector[first : first + len(WORKS)])
+        moved = self.scheme.advance(cast(Stepped, meter), method, now.counter, now.state, self.step)
+        return ca.cse([self.moved(vector, moved, meter.works)])[0]
 
     def moved(self, vector: Any, state: Any, done: Any) -> Any:
         """Vector (SX) after its own instant has been watched, with the state and works of the next instant."""
-        import casadi as ca
-
-        watched, first = self.observe(vector), self.index(WORKS[0])
-        rest = watched[2 + self.state_size : first], done, watched[first + len(WORKS) :]
-        return ca.vertcat(vector[0] + 1, vector[1], state, *rest)
+        now = self.parts(self.observe(vector))
+        watched = now.watched | dict(zip(WORKS, (done[i] for i in range(len(WORKS))), strict=True))
+        return replace(now, counter=now.counter + 1, state=state, watched=watched).joined()
 
     def index(self, name: str) -> int:
         """Place of a watched value in the vector."""
@@ -134,10 +159,11 @@ class Recorder:
     def signals(self, vector: Any) -> dict[str, Any]:
         """Every signal of the loop (SX) at the instant of the vector."""
         loop = self.loop_of(vector)
-        time, state = vector[0] * self.step, vector[2 : 2 + self.state_size]
+        parts = self.parts(vector)
+        counter, state, time = parts.counter, parts.state, parts.counter * self.step
         reference = loop.reference(time)
         h, mu = loop.perturbation(time, state[:2], reference)
-        placed = loop, vector[0], state, self.step
+        placed = loop, counter, state, self.step
         pressure = self.scheme.pressure(*placed)
         return self.scheme.outputs(*placed) | {
             "time": time,
@@ -154,9 +180,9 @@ class Recorder:
     def _after(self, before: dict[str, Any], vector: Any) -> dict[str, Any]:
         import casadi as ca
 
-        now = self.signals(vector)
-        settled = now["time"] > vector[1]
-        later = vector[0] > 0
+        now, parts = self.signals(vector), self.parts(vector)
+        settled = now["time"] > parts.settled_from
+        later = parts.counter > 0
         return {
             **_errors(before, now, settled),
             "rest_count": before["rest_count"] + ca.logic_and(settled, self._rests(now)),
@@ -171,7 +197,8 @@ class Recorder:
         import casadi as ca
 
         fine = ca.logic_and(ca.fabs(now["slip"]) <= LARGEST_MOTION, ca.fabs(now["slip_rate"]) <= LARGEST_MOTION)
-        bounded = [vector[index] for index in range(4, 2 + self.state_size)]
+        parts = self.parts(vector)
+        bounded = [parts.state[i] for i in range(2, self.state_size)]
         further = (now[signal] for signal in self.scheme.described)
         for value in (*bounded, now["pressure"], now["matched_perturbation"], *further):
             fine = ca.logic_and(fine, ca.fabs(value) <= LARGEST_STATE)
@@ -179,7 +206,7 @@ class Recorder:
             "diverged": ca.logic_not(fine),
             "opening": now["pressure"] >= self.loop.fault.effective_normal_stress,
             "reverse_slip": now["slip_rate"] < 0,
-            "stick": ca.logic_and(vector[0] > 0, self._rests(now)),
+            "stick": ca.logic_and(parts.counter > 0, self._rests(now)),
         }
         return {
             name: ca.if_else(ca.logic_and(before[name] < 0, what), now["time"], before[name])

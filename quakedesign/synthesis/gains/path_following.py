@@ -7,7 +7,7 @@ only after a programme with these gains fixed has a margin too. Nothing here is 
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -22,10 +22,52 @@ from quakedesign.synthesis.gains.setting import Setting, State
 from quakedesign.synthesis.lyapunov.balancing import balance
 from quakedesign.synthesis.lyapunov.decay_rate import box, on_box, pace_of
 
-_TRUST = 3.0
-_FIRST, _LAST, _LARGEST = 0.1, 1e-3, 0.35
-_AGAIN, _WORTH, _GROWTH = 0.03, 3e-3, 1.2
-_ROOT_SHARE = 0.5
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrustRegion:
+    """How far the bilinear products that a step leaves out are trusted; a step is a share by which the level improves.
+
+    Attributes
+    ----------
+    initial : float
+        First share. What a step leaves out is of second order, about (`gains` times the share)²: a tenth of what is
+        kept.
+    largest : float
+        Share at which what is left out is as large as what is kept.
+    least : float
+        Share below which the search centres instead: gains are rounded to four digits, ten of which it is.
+    grow, shrink : float
+        What the share is multiplied by after a step that was found, and divided by after one that was not: up slowly
+        and down fast, since a programme that fails takes as long as one that succeeds.
+    gains : float
+        Largest change of a gain over the share: a level asks for changes of several gains larger than its own.
+    again : float
+        Share after centring, below the initial one, which had failed.
+    worthwhile : float
+        Share by which the level must have improved since the last centring for another: three of the least steps.
+    margin : float
+        Factor by which centring must raise the margin; less leaves no room for a step, and the search ends.
+    under_root : float
+        Largest change of a gain under a root over the gain, so that the root stays real.
+    """
+
+    initial: float = 0.1
+    largest: float = 0.35
+    least: float = 1e-3
+    grow: float = 1.5
+    shrink: float = 3.0
+    gains: float = 3.0
+    again: float = 0.03
+    worthwhile: float = 3e-3
+    margin: float = 1.2
+    under_root: float = 0.5
+
+    def longer(self, share: float) -> float:
+        """Share after a step that was found."""
+        return min(self.largest, self.grow * share)
+
+
+TRUST = TrustRegion()
 
 
 def with_gains(loop: Loop, gains: Mapping[str, Fraction]) -> Loop:
@@ -63,23 +105,23 @@ def climb(setting: Setting, state: State, *, free: bool = True, until: float | N
     -------
     list of State
     """
-    states, share, centred = [state], _FIRST, None
+    states, share, centred = [state], TRUST.initial, None
     objective = setting.objective
     for _ in range(rounds):
         if until is not None and not objective.better(until, state.level):
             break
-        if share < _LAST:
-            worthwhile = centred is None or objective.better(state.level, objective.improved(centred, _WORTH))
+        if share < TRUST.least:
+            worthwhile = centred is None or objective.better(state.level, objective.improved(centred, TRUST.worthwhile))
             found = _step(setting, state, 0.0) if free and worthwhile else None
-            if found is None or found.margin < _GROWTH * state.margin:
+            if found is None or found.margin < TRUST.margin * state.margin:
                 break
-            state, share, centred = found, _AGAIN, found.level
+            state, share, centred = found, TRUST.again, found.level
             continue
         found = _step(setting, state, share) if free else _level(setting, state, share)
         if found is None:
-            share /= 3
+            share /= TRUST.shrink
             continue
-        state, share = found, min(_LARGEST, 1.5 * share)
+        state, share = found, TRUST.longer(share)
         if objective.better(state.level, states[-1].level):
             states.append(state)
     return states
@@ -97,7 +139,7 @@ def _step(setting: Setting, state: State, share: float) -> State | None:
     objective = setting.objective
     level = objective.improved(state.level, share)
     loop = objective.at(state.loop, level)
-    changes = _changes(setting, loop, _TRUST * (share or _AGAIN))
+    changes = _changes(setting, loop, TRUST.gains * (share or TRUST.again))
     base = [float(k) for k in loop.gains.values()]
     changed = [with_gains(loop, g) for g in changes.values()]
     sizes = [float(changes[name][name] - loop.gains[name]) for name in changes]
@@ -126,7 +168,7 @@ def _changes(setting: Setting, loop: Loop, trust: float) -> dict[str, dict[str, 
     for name, k in loop.gains.items():
         unit = bound ** float(setting.exponents[name])
         step = trust * math.sqrt(abs(float(k)) * norm * unit)
-        step = min(step, _ROOT_SHARE * float(k)) if name in rooted else step
+        step = min(step, TRUST.under_root * float(k)) if name in rooted else step
         larger = short(loop, {name: float(k) + step})
         if k and larger[name] != k:
             found[name] = {**loop.gains, **larger}
