@@ -17,6 +17,7 @@ _HOME = {
     "Trajectory": "simulation",
     "UncertaintyBox": "fault",
     "Verdict": "certificates",
+    "assess": "synthesis",
     "campaign_problem": "simulation.campaign",
     "certify": "synthesis",
     "compare": "report",

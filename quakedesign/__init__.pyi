@@ -26,6 +26,7 @@ from quakedesign.sos.solve.conic import stated_problems as stated_problems
 from quakedesign.studies import limits as limits
 from quakedesign.symbolic import derive as derive
 from quakedesign.synthesis import Design as Design
+from quakedesign.synthesis import assess as assess
 from quakedesign.synthesis import certify as certify
 from quakedesign.synthesis import design as design
 from quakedesign.synthesis.gains.synthesise import synthesise as synthesise

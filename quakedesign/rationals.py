@@ -3,6 +3,7 @@
 import math
 import re
 import sys
+from decimal import Decimal
 from fractions import Fraction
 from numbers import Rational, Real
 from typing import TYPE_CHECKING, Any
@@ -101,3 +102,8 @@ def float_above(value: Fraction) -> float:
 def float_below(value: Fraction) -> float:
     """Float at or just below a rational."""
     return -float_above(-value)
+
+
+def six_digits(value: Fraction) -> str:
+    """Six digits, to nearest, for people; Decimal has no largest number as floats have."""
+    return f"{Decimal(value.numerator) / Decimal(value.denominator):.6g}"

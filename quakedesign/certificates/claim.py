@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from decimal import Decimal
 from enum import Enum
 from fractions import Fraction
 from math import isqrt
@@ -12,7 +11,7 @@ import sympy as sp
 
 from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.rationals import fraction_of
+from quakedesign.rationals import fraction_of, six_digits
 from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.symbolic.terms import Term, from_terms, to_terms, without_nesting
@@ -29,11 +28,6 @@ class Verdict(Enum):
 
     def __str__(self) -> str:
         return self.name.lower()
-
-
-def _short(value: Fraction) -> str:
-    """Six digits, to nearest; Decimal has no largest number as floats have."""
-    return f"{Decimal(value.numerator) / Decimal(value.denominator):.6g}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,8 +67,8 @@ class Loop:
                 raise ParameterError(f"range of {name} must be ordered. Received [{low}, {high}].")
 
     def __repr__(self) -> str:
-        gains = ", ".join(f"{name} ≈ {_short(value)}" for name, value in self.gains.items())
-        ranges = ", ".join(f"{name} in [{_short(a)}, {_short(b)}]" for name, (a, b) in self.uncertain.items())
+        gains = ", ".join(f"{name} ≈ {six_digits(value)}" for name, value in self.gains.items())
+        ranges = ", ".join(f"{name} in [{six_digits(a)}, {six_digits(b)}]" for name, (a, b) in self.uncertain.items())
         return f"Loop({'; '.join(part for part in (self.law, gains, ranges) if part)})"
 
     @property
@@ -114,6 +108,9 @@ class Witness:
     squares: tuple[Square, ...] = ()
     cofactors: tuple[Polynomial, ...] = ()
     conditions: int = 0
+
+    def __repr__(self) -> str:
+        return f"Witness({len(self.squares)} squares, {len(self.cofactors)} cofactors)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,7 +23,7 @@ from quakedesign.controllers.soundness import (
 )
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import rational, six_digits
 from quakedesign.text import shown
 
 
@@ -188,6 +188,19 @@ class Law(ABC):
         exact = {name: rational(self.gains[name], f"gain {name}") for name in self.gain_units}
         object.__setattr__(self, "gains", MappingProxyType(exact))
 
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "__repr__" not in vars(cls):  # dataclasses write one of their own otherwise
+            type.__setattr__(cls, "__repr__", Law.__repr__)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name} ≈ {six_digits(v)}' for name, v in self.numbers.items())})"
+
+    @property
+    def numbers(self) -> dict[str, Fraction]:
+        """Gains and all other exact numbers of the law, by name."""
+        return dict(self.gains)
+
     def __reduce__(self) -> tuple[Any, tuple[()]]:
         # A read-only view cannot be pickled, and campaigns send controllers to other processes.
         entries = {f.name: getattr(self, f.name) for f in fields(self)} | {"gains": dict(self.gains)}
@@ -318,11 +331,6 @@ class Controller(Law):
     def feedforward(self) -> FeedForward:
         """What is added to ν from what is known of the plant."""
         return NONE
-
-    @property
-    def options(self) -> dict[str, Fraction]:
-        """Exact numbers that it has beside its gains, by name."""
-        return {}
 
     @classmethod
     def for_authority(cls, values: "tuple[str | float | Fraction, ...]", authority: Fraction) -> Self:

@@ -64,12 +64,12 @@ class SlidingMode(Controller):
         """Bound on |h'| that no Lyapunov function can exceed with these gains (ERRATA, end)."""
 
     @property
-    def options(self) -> dict[str, Fraction]:
-        """``scale``, ``divisor``, a feed-forward that is on, and the numbers of the scheme of a law of samples."""
+    def numbers(self) -> dict[str, Fraction]:
+        """Gains, ``scale``, ``divisor``, a feed-forward that is on, and numbers of the scheme of a law of samples."""
         added = {} if self.feedforward == NONE else self.feedforward.coefficients
         known = {f"feedforward_{name}": value for name, value in added.items()}
         settings = self.sampling.settings if self.sampling else ()
-        return {"scale": self.scale, "divisor": self.divisor, **known, **dict(settings)}
+        return {**self.gains, "scale": self.scale, "divisor": self.divisor, **known, **dict(settings)}
 
     @classmethod
     def for_authority(cls, values: "tuple[str | float | Fraction, ...]", authority: Fraction) -> Self:

@@ -90,6 +90,9 @@ class Limits:
     smallest_pressure: Limit
     proved: tuple[Guarantee, ...]
 
+    def __repr__(self) -> str:
+        return f"Limits({self.fault.name}: {', '.join(self.named())})"
+
     def named(self) -> dict[str, Limit]:
         """All limits by name."""
         names = (

@@ -91,6 +91,15 @@ def assess(fault: Fault, controller: Controller) -> Design:
     Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's
     sectors. A law that certificates cannot express yet is ``UNDECIDED``. The verdict on a law of samples is that on its
     guarantee.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : Controller
+
+    Returns
+    -------
+    Design
     """
     fault.require_memoryless("a verdict on gains")
     return Problem(fault=fault, answer=Design).assessed(controller)

@@ -63,8 +63,7 @@ class Design:
 
         A sliding mode of samples has the numbers of its scheme too, ``weight`` [-] and ``authority`` B0 [m²/kg].
         """
-        law = self.controller
-        return {**law.gains, **law.options} if law else {}
+        return self.controller.numbers if self.controller else {}
 
     @property
     def title(self) -> str:

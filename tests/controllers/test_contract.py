@@ -204,3 +204,11 @@ def test_a_suggested_counterexample_names_what_it_must(law):
     found = law.counterexample(dict(zip(law.gain_units, some_gains(law), strict=True)), uncertain)
     assert found is None or set(found) == {"parameters", "point", "weights"}
     assert issubclass(law, Law)
+
+
+def test_its_text_is_short_and_holds_its_gains(law):
+    given = dict(zip(law.gain_units, [*some_gains(law)[1:], F(10) ** 400], strict=True))
+    text = repr(law(gains=given))
+    assert text.startswith(f"{law.__name__}({next(iter(given))} ≈ ")
+    assert "≈ 1.00000e+400" in text
+    assert len(text) < 60 + 25 * len(given)

@@ -12,6 +12,7 @@ from quakedesign.certificates.guarantee.task import Task
 from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.loop import NOISES, LinearLaw, PeriodicLoop, SampledController, held_loop
+from quakedesign.rationals import six_digits
 
 _DIGITS = 4
 _NOISE_WORDS = {
@@ -189,6 +190,11 @@ class Guarantee:
     task: Task
     held: Held
     claims: Claims
+
+    def __repr__(self) -> str:
+        held, claims = self.held, self.claims
+        errors = f"|e1| <= {claims.slip_error:.4g} m, |e2| <= {claims.slip_rate_error:.4g} m/s"
+        return f"Guarantee({self.task.name} held over {six_digits(held.step)} s: {errors})"
 
     @property
     def loop(self) -> PeriodicLoop:

@@ -108,6 +108,9 @@ class Problem:
     def __post_init__(self) -> None:
         self.fault.require_memoryless("a campaign")
 
+    def __repr__(self) -> str:
+        return f"Problem({self.fault.name}, {self.controller}, {self.scheme.name}, {', '.join(self.space.ranges)})"
+
     def point(self, index: int) -> "np.ndarray":
         """Place of sample number `index` in the unit cube.
 
