@@ -8,7 +8,7 @@ from quakedesign import load_fault, published
 from quakedesign.loop.actuators import Actuator, Diffusion
 from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.simulation.backend import _source
-from quakedesign.simulation.energy import WORKS
+from quakedesign.simulation.energy import WORKS, Meter
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import _step, loop_class
@@ -47,10 +47,9 @@ def test_the_digits_are_those_of_steps_written_out(plant, factors):
     varied = tuple(ca.vertsplit(vector[5 + len(WORKS) :]))
     ends = []
     for often in (lambda loop, *told: loop.advance_often(METHOD, *told), written_out):
-        meter = [works]
-        loop = loop_class(plant)(LAB, LAW, meter=meter).with_factors(varied)
-        end = often(loop, motion, given, state, step, 7)
-        ends.append(ca.Function("end", [vector], [ca.vertcat(end, meter[0])]))
+        meter = Meter(loop_class(plant)(LAB, LAW).with_factors(varied), works)
+        end = often(meter, motion, given, state, step, 7)
+        ends.append(ca.Function("end", [vector], [ca.vertcat(end, meter.works)]))
     random = np.random.default_rng(3)
     for scale in (1e-6, 1e-3, 1.0):
         start = [*scale * random.standard_normal(5 + len(WORKS)), *factors]
