@@ -28,7 +28,7 @@ _HOME = {
     "limits": "studies",
     "load_certificate": "certificates",
     "load_fault": "fault",
-    "loop_transfer": "simulation.linear_models",
+    "loop_transfer": "simulation",
     "published": "controllers",
     "run_campaign": "simulation.campaign",
     "scaled_fault": "fault",
@@ -37,7 +37,7 @@ _HOME = {
     "synthesise": "synthesis",
     "to_casadi": "simulation",
     "to_iosystem": "simulation",
-    "to_statespace": "simulation.linear_models",
+    "to_statespace": "simulation",
 }
 
 __all__ = list(_HOME)

@@ -15,13 +15,13 @@ from quakedesign.identification import identify as identify
 from quakedesign.report import compare as compare
 from quakedesign.simulation import Trajectory as Trajectory
 from quakedesign.simulation import export_controller as export_controller
+from quakedesign.simulation import loop_transfer as loop_transfer
 from quakedesign.simulation import simulate as simulate
 from quakedesign.simulation import to_casadi as to_casadi
 from quakedesign.simulation import to_iosystem as to_iosystem
+from quakedesign.simulation import to_statespace as to_statespace
 from quakedesign.simulation.campaign import campaign_problem as campaign_problem
 from quakedesign.simulation.campaign import run_campaign as run_campaign
-from quakedesign.simulation.linear_models import loop_transfer as loop_transfer
-from quakedesign.simulation.linear_models import to_statespace as to_statespace
 from quakedesign.sos.solve.conic import stated_problems as stated_problems
 from quakedesign.studies import limits as limits
 from quakedesign.symbolic import derive as derive

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from quakedesign.simulation.export import controller_step, export_controller
     from quakedesign.simulation.integrators import Integrator, integrator, integrators
     from quakedesign.simulation.interop import to_casadi, to_iosystem
+    from quakedesign.simulation.linear_models import loop_transfer, to_statespace
     from quakedesign.simulation.loading import Load
     from quakedesign.simulation.metrics import ActuatorMetrics, Metrics, StickMetrics
     from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
@@ -89,6 +90,7 @@ __all__ = [
     "integrator",
     "integrators",
     "joint_condition",
+    "loop_transfer",
     "natural_earthquake",
     "noise_sensitivity",
     "perturbation",
@@ -101,6 +103,7 @@ __all__ = [
     "stages",
     "to_casadi",
     "to_iosystem",
+    "to_statespace",
     "velocity_step",
 ]
 
