@@ -142,13 +142,26 @@ def test_a_design_whose_run_opens_the_fault_is_no_positive_answer(capsys, tmp_pa
 @pytest.mark.slow
 def test_a_proved_design_that_is_faster_than_the_natural_earthquake_is_no_positive_answer(capsys):
     path = Path(__file__).parent.parent / "data" / "undersampled_fault.toml"
-    code, out, _ = run(capsys, "compare", path, "--controller", "cta", "--json")
+    code, out, _ = run(capsys, "compare", path, "--controller", "cta", "--continuous", "--json")
     answer = json.loads(out)
     (found,) = answer["controllers"].values()
     assert code == 1
     assert (found["verdict"], found["outcome"]["kind"]) == ("proved", "earthquake")
     assert found["outcome"]["peak_slip_rate"] > answer["uncontrolled"]["outcome"]["peak_slip_rate"] > 0.3
     assert found["headline"].startswith("earthquake: ")
+
+
+@pytest.mark.slow
+def test_a_design_for_a_shorter_period_than_that_of_the_fault_is_no_positive_answer(capsys):
+    path = Path(__file__).parent.parent / "data" / "undersampled_fault.toml"
+    code, out, _ = run(capsys, "compare", path, "--controller", "cta", "--json")
+    (found,) = json.loads(out)["controllers"].values()
+    assert code == 1
+    assert (found["verdict"], found["outcome"]["kind"]) == ("proved", "tracked")
+    (premise,) = (p for p in found["premises"] if p["name"] == "sampling_time")
+    assert not premise["holds"]
+    assert premise["required"] == pytest.approx(0.1)
+    assert found["run"]["step"] == pytest.approx(premise["certified"])
 
 
 UNTIMELY = {
