@@ -9,8 +9,9 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from itertools import chain, pairwise, product
-from math import ceil, comb, lcm
+from functools import lru_cache
+from itertools import chain, count, pairwise, product
+from math import ceil, comb, factorial, lcm
 from typing import Any
 
 BITS = 192
@@ -26,6 +27,8 @@ HALVINGS = 7
 CELLS = 10  # how often the range of e1 is halved
 MODES, PI = 8, Fraction(314159265358979323846, 10**20)  # of a layer of rock; PI is below pi by less than SHORT of it
 SHORT = Fraction(1, 10**20)
+MAX_PARTS = 16  # of the range of a slow input gain
+ONE_OVER_E = Fraction(3679, 10000)  # from above
 SHORTEST = 32  # a layer takes at least the 32nd part of a step
 EVEN = [Fraction(i, 8) for i in range(9)]  # where a flow between two events is cut
 HALVES = [Fraction(i, 2) for i in range(3)]
@@ -595,10 +598,11 @@ def exponential(flow: list[Row], time: Fraction) -> Fixed:
     halvings = int(norm).bit_length()  # to a norm below 1
     base = fixed([[v * time / 2**halvings for v in line] for line in flow])
     term = total = fixed(unit(len(flow)))
-    for k in range(1, BITS // 2):
+    terms = next(n for n in count(2) if factorial(n) >> BITS + 1)
+    for k in range(1, terms):
         term = (term * base).scaled(Fraction(1, k))
         total = total + term
-    # what is left out is below 2/n!, n = BITS/2: less than the unit that the error of the exact first term has to spare
+    # what is left out is below 2/n!, n terms: less than the unit that the error of the exact first term has to spare
     for _ in range(halvings):
         total = total * total
     return total
@@ -606,8 +610,14 @@ def exponential(flow: list[Row], time: Fraction) -> Fixed:
 
 def exponentials(flow: list[Row], times: Row) -> list[Fixed]:
     """The same of several times, as powers of that of the longest time that goes into all of them."""
+    return shared_exponentials(tuple(map(tuple, flow)), tuple(times), BITS)
+
+
+@lru_cache(maxsize=16)  # all inputs of a loop ask for the same ones
+def shared_exponentials(flow: tuple[tuple[Fraction, ...], ...], times: tuple[Fraction, ...], _: int) -> list[Fixed]:
+    """The same, computed once in so many bits."""
     grain = times[0] / lcm(*((times[0] / time).numerator for time in times))
-    found = {1: exponential(flow, grain)}
+    found = {1: exponential([list(line) for line in flow], grain)}
 
     def power(k: int) -> Fixed:
         if k not in found:
@@ -865,9 +875,8 @@ def balanced(loop: Loop, entry: Row) -> tuple[list[Row], Fixed, Fixed]:
 def in_even_units(loop: Loop, entry: Row) -> tuple[Loop, Row]:
     """A loop and an input in units of the states that make the rows and columns of its maps alike."""
     maps = [loop.flow, *(line for line, _ in loop.events)]
-    units = even_units(
-        [[sum(map(abs, entries)) for entries in zip(*lines, strict=True)] for lines in zip(*maps, strict=True)]
-    )
+    sizes = [[sum(map(abs, entries)) for entries in zip(*lines, strict=True)] for lines in zip(*maps, strict=True)]
+    units = even_units(tuple(map(tuple, sizes)))
     flow, *jumps = [
         [[v * u / own for v, u in zip(line, units, strict=True)] for line, own in zip(lines, units, strict=True)]
         for lines in maps
@@ -878,7 +887,8 @@ def in_even_units(loop: Loop, entry: Row) -> tuple[Loop, Row]:
     return even, [v / u for v, u in zip(entry, units, strict=True)]
 
 
-def even_units(table: list[Row]) -> Row:
+@lru_cache(maxsize=4)
+def even_units(table: tuple[tuple[Fraction, ...], ...]) -> Row:
     """Powers of 2 that make every row of a table u_i^-1 |t_ij| u_j about as large as its column."""
     size = len(table)
     units = [Fraction(1)] * size
@@ -899,20 +909,72 @@ def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:
     return [a + b for a, b in zip(own, integral(flows[:-1], before, rows * flows[-1].whole), strict=True)]
 
 
+# ---------------------------------------------------------------- a slow input gain
+
+
+@dataclass
+class Slow:
+    """Cut the range of beta into so many parts; what is past counts e^(growth*t) times, t ago."""
+
+    parts: int
+    growth: Fraction
+
+
+def read_slow(value: Any, task: Task, loop: Loop) -> Slow:
+    """Read how the slow change of beta is used: friction of the slip alone, and a law of samples."""
+    given = keys(value, "slow_gain", "parts", "growth")
+    parts, growth = given["parts"], number(given["growth"], "growth")
+    need(type(parts) is int and 1 <= parts <= MAX_PARTS and growth > 0, "slow_gain needs 1 to 16 parts, growth > 0")
+    need(task.steady_beta and bool(loop.events), "slow_gain needs friction of the slip alone and a law of samples")
+    return Slow(parts, growth)
+
+
+def with_gain(loop: Loop, gain: Fraction, growth: Fraction) -> Loop:
+    """The loop with another nominal beta, its responses e^(growth*t) as large after t."""
+    flow = [[v + growth * (i == j) for j, v in enumerate(line)] for i, line in enumerate(loop.flow)]
+    flow[1] = [*flow[1][:2], *(gain * v for v in loop.outputs[2][2:])]
+    return replace(loop, flow=flow)
+
+
+def slow_gains(task: Task, loop: Loop, slow: Slow) -> list[list[list[Fraction]]]:
+    """Gains of every input, and of one more, the past of what enters as the first, one part after another."""
+    width = (task.beta[1] - task.beta[0]) / slow.parts
+    total: list[list[list[Fraction]]] = [[[] for _ in loop.outputs] for _ in [*loop.inputs, None]]
+    for part in range(slow.parts):
+        gain = task.beta[0] + (2 * part + 1) * width / 2
+        steady, grown = (with_gain(loop, gain, growth) for growth in (Fraction(0), slow.growth))
+        for whole, found in zip(total, [*input_gains(steady), gains(grown, loop.inputs[0], False)], strict=True):
+            for line, values in zip(whole, found, strict=True):
+                line += values
+    return total
+
+
 # ---------------------------------------------------------------- the theorem
 
 
-def bounds(task: Task, loop: Loop) -> tuple[Row, Fraction]:
-    """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee); the best of both classes."""
+def input_gains(loop: Loop) -> list[list[list[Fraction]]]:
+    """Gains of every input."""
     fades = len(loop.inputs) - 1 if loop.fade else None
-    found = [
+    return [
         gains(loop, entry, place > 1 and place != fades, *[loop.fade] * (place == fades))
         for place, entry in enumerate(loop.inputs)
     ]
+
+
+def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fraction(0)) -> tuple[Row, Fraction]:
+    """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee); the best of both classes.
+
+    With a slow gain they hold while the slip error stays below `slip`.
+    """
+    spread = None
+    if slow:
+        off = (task.beta[1] - task.beta[0]) / (2 * slow.parts) + 2 * task.slope_of_beta * slip
+        spread = off, task.slope_of_beta * task.reference_rate * ONE_OVER_E / slow.growth
+    found = slow_gains(task, loop, slow) if slow else input_gains(loop)
     proved, refusals = [], []
     for one in [task] if task.change is None else [task, replace(task, change=None)]:
         try:
-            proved.append(of_class(one, loop, found))
+            proved.append(of_class(one, loop, found, spread))
         except Refused as refusal:
             refusals.append(refusal)
     if not proved:
@@ -920,10 +982,16 @@ def bounds(task: Task, loop: Loop) -> tuple[Row, Fraction]:
     return [min(values) for values in zip(*(peaks for peaks, _ in proved), strict=True)], min(m for _, m in proved)
 
 
-def of_class(task: Task, loop: Loop, found: list[list[list[Fraction]]]) -> tuple[Row, Fraction]:
-    """The same of one class of disturbances, from the gains of every input."""
+def of_class(
+    task: Task, loop: Loop, found: list[list[list[Fraction]]], spread: tuple[Fraction, Fraction] | None = None
+) -> tuple[Row, Fraction]:
+    """The same of one class of disturbances, from the gains of every input.
+
+    `spread`: how far a slow beta is off that of a nominal loop by itself, and by its past.
+    """
     half = [(high - low) / 2 for low, high in (task.s, task.w, task.beta)]
     force, drift, coupling, shifted = inputs(task, half[2])
+    half[2] = spread[0] if spread else half[2]
     own, shares = [force, drift], [half, [Fraction(0), coupling, Fraction(0)]]
     if loop.root:
         low, high = loop.root.slopes
@@ -942,6 +1010,9 @@ def of_class(task: Task, loop: Loop, found: list[list[list[Fraction]]]) -> tuple
             own.append(Fraction(0))
             shares.append([Fraction(0)] * 4)
         shares[-1 if loop.fade else 0][3] = task.beta[1]
+    if spread:
+        own.append(Fraction(0))
+        shares.append([Fraction(0), Fraction(0), spread[1], *[Fraction(0)] * (len(loop.outputs) - 3)])
     table = [
         [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
         for share in shares
@@ -1005,14 +1076,17 @@ def verify(document: dict[str, Any]) -> list[str]:
     Refused
         When a rule is broken, or a claim does not follow.
     """
-    keys(document, "the file", "format", "kind", "fault", "reference", "disturbance", "loop", "claims")
+    more = ["slow_gain"] if "slow_gain" in document else []
+    keys(document, "the file", "format", "kind", "fault", "reference", "disturbance", "loop", "claims", *more)
     claims = numbers(document["claims"], "claims", *CLAIMS)
     task = read_task(document)
     loop = read_loop(document["loop"], task)
     errors = [claims[name] + off for name, off in zip(CLAIMS[:2], loop.noise, strict=True)]
     within = loop.root is None or root_within(loop.root, loop.step, *errors)
     need(within, "the root of the implicit step must lie between its lines for all errors that are claimed")
-    (slip, rate, push), small = bounds(task, loop)
+    slow = read_slow(document["slow_gain"], task, loop) if more else None
+    (slip, rate, push), small = bounds(task, loop, slow, claims["slip_error"])
+    need(not slow or slip < claims["slip_error"], "the slip error that moves the input gain must stay below its claim")
     low, high = task.rest[0] - push / task.b, task.rest[1] + push / task.b
     found = dict(zip(CLAIMS, (slip, rate, rate + task.reference_rate, low, high), strict=True))
     for name, value in found.items():
@@ -1039,8 +1113,9 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         rate = "" if alone else f", slip rate within {loop['noise']['rate']} m/s"
         off = f", measured slip within {loop['noise']['slip']} m of the true one{rate}"
     return [
-        f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction anything within its "
-        "bounds and slopes, continued to negative slip rates",
+        f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction "
+        + ("any function of the slip alone" if "slow_gain" in document else "anything")
+        + " within its bounds and slopes, continued to negative slip rates",
         f"s in [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, w in [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, "
         f"beta in [1, {upper(task.beta[1])}], b = {upper(task.b)} m^2/kg, derived",
         f"law with {len(loop['states'])} states{implicit}{told}, {when}{off}",

@@ -6,6 +6,7 @@ from quakedesign.faces import face
 
 if TYPE_CHECKING:
     from quakedesign.certificates.guarantee.continuous import ContinuousPeaks, continuous_peaks
+    from quakedesign.certificates.guarantee.slow_gain import SlowGain
     from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held, guarantee
     from quakedesign.certificates.guarantee.task import Task, task_of
     from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
@@ -17,6 +18,7 @@ __all__ = [
     "Guarantee",
     "Held",
     "NoGuarantee",
+    "SlowGain",
     "Task",
     "certified_bounds",
     "continuous_peaks",

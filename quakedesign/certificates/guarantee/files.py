@@ -9,6 +9,7 @@ from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
+from quakedesign.certificates.guarantee.slow_gain import SlowGain
 from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held
 from quakedesign.certificates.guarantee.task import Friction, Task
 from quakedesign.errors import CertificateError, ParameterError
@@ -37,6 +38,7 @@ def guarantee_text(claim: Guarantee | ContinuousPeaks) -> str:
     """Text of the file."""
     task = claim.task
     change = {} if task.change is None else {"change": str(task.change)}
+    slow = claim.slow_gain if isinstance(claim, Guarantee) else None
     document = {
         "format": 1,
         "kind": "guarantee",
@@ -57,6 +59,7 @@ def guarantee_text(claim: Guarantee | ContinuousPeaks) -> str:
             "growths": {"slip": str(task.growths[0]), "rate": str(task.growths[1])},
         },
         "loop": _loop(claim),
+        **({} if slow is None else {"slow_gain": {"parts": slow.parts, "growth": str(slow.growth)}}),
         "claims": {name: value.exact for name, value in _claims(claim.claims).items()},
     }
     return json.dumps(document, indent=1) + "\n"
@@ -104,15 +107,18 @@ def read_guarantee(raw: Any) -> Guarantee | ContinuousPeaks:
     CertificateError
         When it breaks a rule of FORMAT.md.
     """
-    with_keys(raw, {"format", "kind", "fault", "reference", "disturbance", "loop", "claims"})
+    slow = {"slow_gain"} & set(raw) if isinstance(raw, dict) else set[str]()
+    with_keys(raw, {"format", "kind", "fault", "reference", "disturbance", "loop", "claims"} | slow)
     need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
     need(raw["kind"] == "guarantee", "kind must be guarantee")
     try:
         task, claims, loop = _task(raw), _read_claims(raw["claims"]), raw["loop"]
         if isinstance(loop, dict) and "rates" in loop:
+            need(not slow, "slow_gain is for a law of samples")
             claim: Guarantee | ContinuousPeaks = ContinuousPeaks(task=task, law=_continuous(loop), claims=claims)
         else:
-            claim = Guarantee(task=task, held=_held(loop), claims=claims)
+            slow_gain = _slow_gain(raw["slow_gain"], task) if slow else None
+            claim = Guarantee(task=task, held=_held(loop), claims=claims, slow_gain=slow_gain)
         need(len(claim.loop.states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
     except ParameterError as error:
         raise CertificateError(str(error)) from None
@@ -140,6 +146,14 @@ def _task(raw: dict[str, Any]) -> Task:
         change=read_rational(given["change"]) if limited else None,
         growths=(read_rational(growths["slip"]), read_rational(growths["rate"])),
     )
+
+
+def _slow_gain(raw: Any, task: Task) -> SlowGain:
+    with_keys(raw, {"parts", "growth"})
+    need(type(raw["parts"]) is int, "parts must be an integer")
+    found = SlowGain(parts=raw["parts"], growth=read_rational(raw["growth"]))
+    found.models(task)
+    return found
 
 
 def _held(raw: Any) -> Held:

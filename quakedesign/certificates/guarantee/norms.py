@@ -29,7 +29,6 @@ the trapezoidal sum. Of the flow since the last jump, a piece that has passed ad
 ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate
@@ -55,7 +54,7 @@ _SMALL = Fraction(1, 1 << 8)  # share of the sums that the tail may be
 _MOST_DOUBLINGS = 13
 
 
-def norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
+def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     """Gains of every (output, input), rounded up, one for each part of the period; the same parts for all.
 
     Raises

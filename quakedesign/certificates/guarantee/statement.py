@@ -8,10 +8,11 @@ from typing import Any, TypedDict
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import sector
+from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
 from quakedesign.certificates.guarantee.task import Task
-from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
+from quakedesign.certificates.guarantee.theorem import Bounds, Gains, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.loop import NOISES, LinearLaw, PeriodicLoop, SampledController, held_loop
+from quakedesign.loop import NOISES, LinearLaw, Model, PeriodicLoop, SampledController, held_loop
 from quakedesign.rationals import six_digits
 
 _DIGITS = 4
@@ -20,6 +21,7 @@ _NOISE_WORDS = {
     "rate_noise": "with any noise of at most {:.6g} m/s in the measured slip rate",
 }
 _MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
+_TURNS = 32  # of claims that follow from themselves
 
 
 class Around(TypedDict, total=False):
@@ -101,10 +103,10 @@ class Held:
             raise UnsupportedError("a law with an implicit root has no explicit run. Simulate its own controller.")
         return SampledController(law=self.law, step=self.step)
 
-    def loop(self, task: Task) -> PeriodicLoop:
-        """Nominal error loop on a task."""
+    def loop(self, task: Task, model: Model | None = None) -> PeriodicLoop:
+        """Nominal error loop on a task, of its model or another one."""
         times = {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
-        return held_loop(self.law, task.model, task.authority, self.step, **times, noisy=self.noise)
+        return held_loop(self.law, model or task.model, task.authority, self.step, **times, noisy=self.noise)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,11 +187,14 @@ class Guarantee:
     task : Task
     held : Held
     claims : Claims
+    slow_gain : SlowGain, optional
+        How the proof uses that the input gain is slow; None for one that lets it jump.
     """
 
     task: Task
     held: Held
     claims: Claims
+    slow_gain: SlowGain | None = None
 
     def __repr__(self) -> str:
         held, claims = self.held, self.claims
@@ -203,12 +208,19 @@ class Guarantee:
 
     def bounds(self) -> Bounds | NoGuarantee:
         """What the theorem gives, computed anew."""
-        return _bounds(self.task, self.held, self.loop)
+        if self.slow_gain is None:
+            return _bounds(self.task, self.held, self.loop)
+        gains = _slow_gains(self.task, self.held, self.slow_gain)
+        if isinstance(gains, NoGuarantee):
+            return gains
+        return _slow_bounds(self.task, self.held, self.slow_gain, gains, self.claims.slip_error)
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         found = self.bounds()
         if isinstance(found, NoGuarantee) or not _root_within(self.held, self.claims):
+            return Verdict.UNDECIDED
+        if self.slow_gain is not None and not found.slip_error < self.claims.slip_error:
             return Verdict.UNDECIDED
         return Verdict.PROVED if self.claims.covers(Claims.of(self.task, found)) else Verdict.UNDECIDED
 
@@ -244,22 +256,58 @@ def sentence_of(task: Task, claims: Claims, when: str) -> str:
     )
 
 
-def guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
+def guarantee(task: Task, held: Held, slow_gain: SlowGain | None = None) -> Guarantee | NoGuarantee:
     """Tightest rounded claims about a loop, or why there are none.
 
     Raises
     ------
     ParameterError
-        For a loop without a steady state.
+        For a loop without a steady state, or a slow gain and friction of the slip rate.
     """
-    found = _bounds(task, held, held.loop(task))
-    if isinstance(found, NoGuarantee):
-        return found
-    claims = Claims.of(task, found).rounded()
+    claims = _claims(task, held) if slow_gain is None else _slow_claims(task, held, slow_gain)
+    if isinstance(claims, NoGuarantee):
+        return claims
     if not _root_within(held, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
         return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
-    return Guarantee(task=task, held=held, claims=claims)
+    return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
+
+
+def _claims(task: Task, held: Held) -> Claims | NoGuarantee:
+    found = _bounds(task, held, held.loop(task))
+    return found if isinstance(found, NoGuarantee) else Claims.of(task, found).rounded()
+
+
+def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
+    """Claims on whose slip error the gain's spread rests that they follow from."""
+    gains, slip_error = _slow_gains(task, held, slow_gain), Fraction(0)
+    if isinstance(gains, NoGuarantee):
+        return gains
+    for _ in range(_TURNS):
+        found = _slow_bounds(task, held, slow_gain, gains, slip_error)
+        if isinstance(found, NoGuarantee):
+            return found
+        claims = Claims.of(task, found).rounded()
+        if claims.slip_error <= slip_error:
+            return claims
+        slip_error = _above(claims.slip_error * _MARGIN)
+    reason = f"the slip error that moves the input gain, beyond {UpperBound(slip_error):.2g} m, moves it further"
+    return NoGuarantee(reason=reason, small_gain=None)
+
+
+def _slow_gains(task: Task, held: Held, slow_gain: SlowGain) -> Gains | NoGuarantee:
+    loops = tuple(held.loop(task, model) for model in slow_gain.models(task))
+    try:
+        return slow_gains(loops, slow_gain.growth)
+    except ParameterError:
+        return _unstable(held)
+
+
+def _slow_bounds(
+    task: Task, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
+) -> Bounds | NoGuarantee:
+    spread = slow_gain.spread(task, slip_error)
+    return best_bounds(task, gains, held.law.root, held.step, held.noise, spread)
 
 
 def _root_within(held: Held, claims: Claims) -> bool:
@@ -273,8 +321,12 @@ def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
     try:
         return certified_bounds(task, loop, held.law.root, held.noise)
     except ParameterError:
-        reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
-        return NoGuarantee(reason=reason, small_gain=None)
+        return _unstable(held)
+
+
+def _unstable(held: Held) -> NoGuarantee:
+    reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
+    return NoGuarantee(reason=reason, small_gain=None)
 
 
 def _above(value: Fraction) -> Fraction:

@@ -32,6 +32,13 @@ them at the samples before kT_s, then the inputs up to kT_s, which these samples
 within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do. With
 noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places of E and R, and ε gains δγN1/T_s. ∎
 
+**Slow input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤ κ(2E + r′σ),
+σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Cut the range of β into parts with middles β_i and half widths δ. Fix t, let
+β(t) be in part i, and take β_i in place of β0 in the nominal loop up to t: |β(τ) − β_i| ≤ δ + 2κE + κr′σ, and σ ≤
+e^{ασ}/(eα) for every α > 0. So (β − β_i)v is at most (δ + 2κE)|v|, as before with a smaller c, and ``aged``, an input
+that enters as a does with c = κr′/(eα) for v, its gains those of the loop with A + α in place of A, whose responses are
+e^{ασ} times as large. All gains are the largest over the parts. E is the claim on the slip error, which has to exceed
+the bound that follows: e1 is continuous and 0 at first, so it never reaches E. ∎
 
 **Layer between well and fault.** Its pressure is that of its modes, v, and what they leave out, R, |R| ≤ sup|y| with
 the output y = ``left_out`` (`quakedesign.loop.layer`), so β(v + R) brings βR into e2′ beside a. Where the well's
@@ -52,6 +59,7 @@ from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.loop import ImplicitRoot, PeriodicLoop
 
+Gains = Mapping[tuple[str, str], tuple[Any, ...]]
 _ZERO = Fraction(0)
 NOISELESS: Mapping[str, Fraction] = MappingProxyType({})
 OUTPUTS = ("slip_error", "slip_rate_error", "push")
@@ -59,6 +67,7 @@ _WORDS = {
     ("acceleration", "slip_error"): "range of friction's slope in slip",
     ("acceleration", "slip_rate_error"): "range of the slope in slip rate",
     ("acceleration", "push"): "input gain's range",
+    ("aged", "push"): "change of the input gain",
     ("drift", "slip_rate_error"): "drift that the input gain makes of the disturbance",
     ("root", "slip_error"): "range of the implicit step's slope",
     ("acceleration", "left_out"): "what the modes of the layer leave out",
@@ -83,6 +92,22 @@ class Channel:
     name: str
     own: Fraction
     shares: Mapping[str, Fraction]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainSpread:
+    """How far the input gain may be off that of a nominal loop [-].
+
+    Attributes
+    ----------
+    half : Fraction
+        By itself.
+    aged : Fraction
+        Of that of a time σ ago, over e^{ασ}.
+    """
+
+    half: Fraction
+    aged: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,9 +168,20 @@ def certified_bounds(
     ParameterError
         When the nominal loop is not found to be stable.
     """
-    gains = norms(loop) if loop.segments else flow_norms(loop)
+    return best_bounds(task, norms(loop) if loop.segments else flow_norms(loop), root, loop.period, noise)
+
+
+def best_bounds(
+    task: Task,
+    gains: Gains,
+    root: ImplicitRoot | None,
+    step: Fraction,
+    noise: Mapping[str, Fraction] = NOISELESS,
+    spread: GainSpread | None = None,
+) -> Bounds | NoGuarantee:
+    """Bounds of the theorem from the gains; of a disturbance of bounded rate, the better of both classes."""
     classes = [task] if task.change is None else [task, replace(task, change=None)]
-    found = [bounds_from(one, gains, root, loop.period, noise) for one in classes]
+    found = [bounds_from(one, gains, root, step, noise, spread) for one in classes]
     proved = [bounds for bounds in found if isinstance(bounds, Bounds)]
     if not proved:
         return found[0]
@@ -154,13 +190,14 @@ def certified_bounds(
 
 def bounds_from(
     task: Task,
-    gains: Mapping[tuple[str, str], tuple[Any, ...]],
+    gains: Gains,
     root: ImplicitRoot | None,
     step: Fraction,
     noise: Mapping[str, Fraction] = NOISELESS,
+    spread: GainSpread | None = None,
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
-    channels = (*channels_of(task, root, step, noise), *_fed_forward(task, {name for _, name in gains}))
+    channels = (*channels_of(task, root, step, noise, spread), *_fed_forward(task, {name for _, name in gains}))
     channels = tuple(_through_layer(task, channels, gains))
     loops = [
         [
@@ -188,19 +225,27 @@ def bounds_from(
 
 
 def channels_of(
-    task: Task, root: ImplicitRoot | None, step: Fraction, noise: Mapping[str, Fraction] = NOISELESS
+    task: Task,
+    root: ImplicitRoot | None,
+    step: Fraction,
+    noise: Mapping[str, Fraction] = NOISELESS,
+    spread: GainSpread | None = None,
 ) -> tuple[Channel, ...]:
     """Inputs of the loop of a task, of a law with an implicit root or without, with noise or without."""
     force, drift, coupling = _task_inputs(task)
-    implicit = []
+    half, implicit, aged = task.half_ranges, [], []
+    if spread is not None:
+        half = {**half, "push": spread.half}
+        aged.append(Channel(name="aged", own=_ZERO, shares={"push": spread.aged}))
     if root is not None:
         share = root.half_range / step
         own = root.remainder + share * noise.get("slip_noise", _ZERO)
         implicit.append(Channel(name="root", own=own, shares={"slip_error": share}))
     return (
-        Channel(name="acceleration", own=force, shares=task.half_ranges),
+        Channel(name="acceleration", own=force, shares=half),
         Channel(name="drift", own=drift, shares={"slip_rate_error": coupling}),
         *implicit,
+        *aged,
         *(Channel(name=name, own=size, shares={}) for name, size in noise.items()),
     )
 
@@ -213,9 +258,7 @@ def _fed_forward(task: Task, names: Collection[str]) -> Iterator[Channel]:
         yield Channel(name="reference_jerk", own=task.reference_jerk, shares={})
 
 
-def _through_layer(
-    task: Task, channels: Sequence[Channel], gains: Mapping[tuple[str, str], tuple[Any, ...]]
-) -> Iterator[Channel]:
+def _through_layer(task: Task, channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
     """Inputs of a loop through a layer: what its modes leave out, by itself or within the acceleration."""
     fades, share = ("left_out", "left_out") in gains, {"left_out": task.beta[1]}
     for channel in channels:
@@ -249,7 +292,7 @@ def _dominates(value: Any, matrix: Sequence[Sequence[Any]]) -> bool:
     return True
 
 
-def _parts(gains: Mapping[tuple[str, str], tuple[Any, ...]]) -> range:
+def _parts(gains: Gains) -> range:
     return range(len(gains["push", "drift"]))
 
 
@@ -284,9 +327,7 @@ def _unshifted(task: Task) -> Fraction:
     return task.amplitude / ((task.beta[0] + task.beta[1]) / 2 if task.friction.rate_slope else 1)
 
 
-def _none(
-    small_gain: Any, channels: Sequence[Channel], gains: Mapping[tuple[str, str], tuple[Any, ...]]
-) -> NoGuarantee:
+def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoGuarantee:
     alone = {(i.name, y): c * max(gains[y, i.name]) for i in channels for y, c in i.shares.items()}
     (name, share), whole = max(alone.items(), key=lambda item: item[1]), UpperBound(small_gain)
     return NoGuarantee(

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from quakedesign.synthesis.guaranteed.families import MEASURED
     from quakedesign.synthesis.guaranteed.reach import longest_delay, reached
     from quakedesign.synthesis.guaranteed.sliding import guarantee_of
+    from quakedesign.synthesis.guaranteed.slowly import best_guarantee, tightened
 
 __all__ = [
     "CLASSES",
@@ -28,6 +29,7 @@ __all__ = [
     "SampledDesign",
     "WorstFound",
     "attacked",
+    "best_guarantee",
     "certified_peaks",
     "compensated",
     "design_compensated",
@@ -37,6 +39,7 @@ __all__ = [
     "reached",
     "sampled_design",
     "sampled_sliding_mode",
+    "tightened",
     "worst_found",
 ]
 

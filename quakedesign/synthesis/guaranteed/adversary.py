@@ -91,7 +91,8 @@ class _Search:
         paces = np.where(np.arange(courses) // 2 % 2, 1, _SLOW)
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.allowed = np.ones((courses, len(vertices)), dtype=bool)
-        if self.limit is not None and beta[0] < beta[1]:  # the class rate has friction of the slip alone: β is slow
+        slow = isinstance(claim, Guarantee) and claim.slow_gain is not None
+        if (slow or self.limit is not None) and beta[0] < beta[1]:  # β is slow; it stays at either end
             half = len(vertices) // 2
             self.allowed[::2, :half] = self.allowed[1::2, half:] = False
         self.aim = np.zeros((courses, self.size))

@@ -1,9 +1,9 @@
 """What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from quakedesign.certificates.guarantee import Guarantee, NoGuarantee
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.fault import Fault
 from quakedesign.loop import LinearLaw
@@ -58,7 +58,7 @@ class Answer:
             both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
             errors = f"the slip-rate error below {limit.slip_rate_error:.3g} m/s{both}"
             said.append(f"no controller held over this T_s keeps {errors}")
-        if self._leaves_with_stick():
+        if self.leaves_with_stick:
             said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
         return said if self.compensation is None else [*said, self.compensation.sentence()]
 
@@ -69,7 +69,9 @@ class Answer:
             return None
         return smallest_peak(self.found.task, self.found.held.step, self.found.held.delay)
 
-    def _leaves_with_stick(self) -> bool:
+    @property
+    def leaves_with_stick(self) -> bool:
+        """Whether a course with stick was found beyond the claims."""
         if not isinstance(self.found, Guarantee) or self.worst_with_stick is None:
             return False
         claims, seen = self.found.claims, self.worst_with_stick
@@ -107,10 +109,20 @@ class Answer:
 
 
 def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> Answer:
-    """A guarantee beside the worst that a search finds on its loop; about a second."""
+    """A guarantee beside the worst that a search finds on its loop; about a second.
+
+    One with a slow input gain whose bounds a course with stick leaves makes way for that with any gain, if that is
+    wider than the course.
+    """
     if isinstance(found, NoGuarantee):
         return Answer(fault=fault, found=found)
-    return Answer(fault=fault, found=found, worst=worst_found(found), worst_with_stick=worst_found(found, sticks=True))
+    seen = Answer(fault=fault, found=found, worst=worst_found(found), worst_with_stick=worst_found(found, sticks=True))
+    if found.slow_gain is None or not seen.leaves_with_stick:
+        return seen
+    wider = replace(seen, found=guarantee(found.task, found.held))
+    if not wider.proved or wider.leaves_with_stick:
+        return seen
+    return attacked(fault, wider.found)
 
 
 def _seen(worst: WorstFound | None) -> dict[str, float] | None:

@@ -1,18 +1,21 @@
 """The bounds of a guarantee in floats, for searches: proposes, decides nothing."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 from scipy.linalg import expm
 
 from quakedesign.certificates.guarantee import Bounds, Held, NoGuarantee, Task
-from quakedesign.certificates.guarantee.theorem import bounds_from
+from quakedesign.certificates.guarantee.theorem import GainSpread, bounds_from
 from quakedesign.loop import PeriodicLoop
 
 _PIECES = 4
 _MOST_PERIODS = 4096
 _FORGOTTEN = 1e-4  # share of the past that is left out
+_ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # of the range of a slow input gain, with whose loops it is judged
+_SPREAD = Fraction(1, 16)  # of the range by which it is off theirs
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,21 @@ def estimated(task: Task, held: Held) -> Estimate | None:
     if gains is None:
         return None
     return Estimate(bounds_from(task, gains, held.law.root, held.step, held.noise), max(gains["slip_error", "drift"]))
+
+
+def slowly_estimated(task: Task, held: Held) -> Estimate | None:
+    """The same where the input gain is slow: of nominal loops at the ends and in the middle of its range."""
+    low, high = task.beta
+    found = []
+    for share in _ENDS:
+        gains = _gains(held.loop(task, replace(task.model, gain=(low + share * (high - low)) * task.authority)))
+        if gains is None:
+            return None
+        found.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
+    whole = {key: tuple(v for gains in found for v in gains[key]) for key in found[0]}
+    spread = GainSpread(half=_SPREAD * (high - low), aged=Fraction(0))
+    bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread)
+    return Estimate(bounds, max(whole["slip_error", "drift"]))
 
 
 @dataclass(frozen=True, slots=True)

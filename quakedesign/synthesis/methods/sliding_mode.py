@@ -24,7 +24,14 @@ from quakedesign.controllers.feed_forward import NONE, FeedForward
 from quakedesign.errors import CertificateError, KinkError, ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.synthesis.guaranteed import Answer, Compensation, attacked, guarantee_of, sampled_sliding_mode
+from quakedesign.synthesis.guaranteed import (
+    Answer,
+    Compensation,
+    attacked,
+    guarantee_of,
+    sampled_sliding_mode,
+    tightened,
+)
 from quakedesign.synthesis.guaranteed.compensated import GUARANTEED
 from quakedesign.synthesis.guaranteed.sliding import sliding_mode
 from quakedesign.synthesis.lyapunov.search import find_certificate
@@ -100,7 +107,7 @@ class SlidingModes(Method[SlidingMode]):
         made = sliding_mode(task, law, step, **options, **wanted.around)
         if isinstance(made, NoGuarantee):
             return Answer(fault=fault, found=made)
-        return replace(attacked(fault, made.found), compensation=made)
+        return replace(attacked(fault, tightened(made.found)), compensation=made)
 
 
 def _proved_base(fault: Fault, law: type[SlidingMode]) -> tuple[BaseGains[SlidingMode], Certificate | None]:

@@ -21,7 +21,15 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.loop import summed_integrals
 from quakedesign.rationals import rational
-from quakedesign.synthesis.guaranteed import Answer, attacked, certified_peaks, design_held, sampled_design
+from quakedesign.synthesis.guaranteed import (
+    Answer,
+    attacked,
+    best_guarantee,
+    certified_peaks,
+    design_held,
+    sampled_design,
+    tightened,
+)
 from quakedesign.synthesis.guaranteed.reach import design_at, longest_step
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
 from quakedesign.synthesis.linear.analysis.robust_stability import unstable_vertex, why_undecided
@@ -87,11 +95,11 @@ class StateFeedback(Method[ExtendedLQR]):
             raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {wanted.scheme!r}. Leave it out.")
         if wanted.gains:
             summed = summed_integrals(_four(wanted.gains), step)
-            return attacked(fault, guarantee(task, Held(law=summed, step=step, **wanted.around)))
+            return attacked(fault, best_guarantee(task, Held(law=summed, step=step, **wanted.around)))
         told: Any = {"measured": wanted.measured, **wanted.around}
         found = design_held(task, step, objective=wanted.objective, **told)
         if isinstance(found, Guarantee):
-            return attacked(fault, found)
+            return attacked(fault, tightened(found))
         longest = longest_step(task, step, **told)
         return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest, wanted.objective))
 

@@ -1,0 +1,50 @@
+"""Guarantees that use how slowly the input gain changes, where friction depends on the slip alone."""
+
+from dataclasses import replace
+from fractions import Fraction
+from math import log
+
+import numpy as np
+from scipy.linalg import expm
+
+from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, SlowGain, Task, guarantee
+from quakedesign.loop import PeriodicLoop
+from quakedesign.synthesis.guaranteed.rounding import short
+
+_PARTS, _PARTS_OF_LAYERS = 8, 12  # where a layer leaves little room
+_SHARE = 0.5  # of the slowest decay, for what is past to grow by
+
+
+def best_guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
+    """Guarantee with an input gain that is slow, where the friction's is and it helps, else with any."""
+    slow = slow_gain(task, held)
+    found = guarantee(task, held) if slow is None else guarantee(task, held, slow)
+    if slow is None or isinstance(found, Guarantee):
+        return found
+    anyhow = guarantee(task, held)
+    return anyhow if isinstance(anyhow, Guarantee) else found
+
+
+def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee:
+    """A guarantee with a slow input gain in place of one with any, where there is one."""
+    if isinstance(found, NoGuarantee) or found.slow_gain is not None:
+        return found
+    better = best_guarantee(found.task, found.held)
+    return better if isinstance(better, Guarantee) else found
+
+
+def slow_gain(task: Task, held: Held) -> SlowGain | None:
+    """Parts and growth for a proof; None where friction depends on the slip rate or a nominal loop is not stable."""
+    if task.friction.rate_slope:
+        return None
+    parts = SlowGain(parts=_PARTS_OF_LAYERS if held.diffusion else _PARTS, growth=Fraction(1))
+    decay = min(_decay(held.loop(task, model)) for model in parts.models(task))
+    return replace(parts, growth=short(_SHARE * decay, 2)) if decay > 0 else None
+
+
+def _decay(loop: PeriodicLoop) -> float:
+    """Of the slowest mode [1/s]."""
+    flow, period = np.array(loop.flow, dtype=float), np.eye(len(loop.flow))
+    for part in loop.segments:
+        period = expm(flow * float(part.duration)) @ np.array(part.jump, dtype=float) @ period
+    return -log(max(max(abs(np.linalg.eigvals(period))), 1e-12)) / float(loop.period)

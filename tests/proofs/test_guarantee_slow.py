@@ -1,0 +1,262 @@
+"""A slow input gain in both checkers: against each other, against sums by hand, and against plants that slip."""
+
+import copy
+import importlib.util
+import json
+from dataclasses import replace
+from fractions import Fraction as F
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from quakedesign.bounds import UpperBound
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, SlowGain, guarantee, statement, task_of
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.guarantee.slow_gain import grown, slow_gains
+from quakedesign.certificates.guarantee.theorem import Bounds
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.loop import Model, Prediction, disturbance_estimate
+
+PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
+SPECIFICATION = importlib.util.spec_from_file_location("guarantee_slow", PATH)
+checker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(checker)
+
+STEP, SLOW = F("0.184"), SlowGain(parts=2, growth=F(1, 4))
+TASK = task_of(load_fault("real-fault"))
+GAIN = F("2.282e-8")
+LAW = disturbance_estimate(
+    (F("7.8e8"), F("2.38e8")), F("0.1"), Prediction(of_slip=F("0.07"), of_rate=F("0.752"), of_pushes=(F("0.16"),)), GAIN
+)
+HELD = Held(law=LAW, step=STEP)
+BETA = tuple(map(float, TASK.beta))
+SLOPE = TASK.friction.weakening * TASK.area_per_mass[1] / TASK.authority
+
+
+@cache
+def claim():
+    return guarantee(TASK, HELD, SLOW)
+
+
+def document():
+    return json.loads(guarantee_text(claim()))
+
+
+def test_both_prove_what_one_of_them_claims_and_a_gain_that_jumps_has_less():
+    assert claim().check() is Verdict.PROVED
+    assert "friction any function of the slip alone" in checker.verify(document())[0]
+    jumping = guarantee(TASK, HELD)
+    assert claim().claims.slip_rate_error < F(9, 10) * jumping.claims.slip_rate_error
+    more = guarantee(TASK, HELD, replace(SLOW, parts=4))
+    assert more.claims.slip_rate_error < F(98, 100) * claim().claims.slip_rate_error
+
+
+def test_without_its_key_the_claims_do_not_follow():
+    raw = document()
+    del raw["slow_gain"]
+    with pytest.raises(checker.Refused, match="claim slip_error must follow"):
+        checker.verify(raw)
+    assert parse_guarantee(json.dumps(raw)).check() is Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize("key", ["slip_error", "slip_rate_error", "peak_slip_rate"])
+def test_a_smaller_claim_is_refused_by_both(key):
+    raw = document()
+    raw["claims"][key] = str(F(raw["claims"][key]) * F(99, 100))
+    with pytest.raises(checker.Refused):
+        checker.verify(raw)
+    assert parse_guarantee(json.dumps(raw)).check() is Verdict.UNDECIDED
+
+
+CONTINUOUS = {"states": ["z"], "rates": [["0"]], "measured": [["1", "0"]], "output": ["1"], "feedback": ["-5", "-5"]}
+REFUSED = [
+    (("slow_gain", "parts"), 0),
+    (("slow_gain", "parts"), 17),
+    (("slow_gain", "parts"), True),
+    (("slow_gain", "parts"), "2"),
+    (("slow_gain", "parts"), 2.0),
+    (("slow_gain", "growth"), "0"),
+    (("slow_gain", "growth"), "-1/2"),
+    (("slow_gain", "growth"), 1),
+    (("slow_gain", "more"), "1"),
+    (("slow_gain",), None),
+    (("fault", "friction", "rate_slope"), "1/10"),
+    (("loop",), CONTINUOUS),
+]
+
+
+@pytest.mark.parametrize(("path", "value"), REFUSED, ids=str)
+def test_both_refuse_what_is_no_slow_gain(path, value):
+    raw = document()
+    holder = raw
+    for key in path[:-1]:
+        holder = holder[key]
+    holder[path[-1]] = value
+    with pytest.raises(checker.Refused):
+        checker.verify(copy.deepcopy(raw))
+    with pytest.raises(CertificateError):
+        parse_guarantee(json.dumps(raw))
+
+
+def test_sixteen_parts_are_read_by_both():
+    raw = document()
+    raw["slow_gain"]["parts"] = 16
+    assert parse_guarantee(json.dumps(raw)).slow_gain.parts == 16
+    task = checker.read_task(raw)
+    assert checker.read_slow(raw["slow_gain"], task, checker.read_loop(raw["loop"], task)).parts == 16
+
+
+def test_the_spread_is_half_a_part_and_what_slip_and_reference_add():
+    """κ = weakening·N̂/b; E = 1 mm, r′ the reference's largest rate."""
+    found, e = SLOW.spread(TASK, F(1, 1000)), F(1, 1000)
+    assert SLOPE == TASK.friction.weakening / TASK.friction.least  # N̂ is one number here
+    assert found.half == (TASK.beta[1] - 1) / 4 + 2 * SLOPE * e
+    assert float(found.aged) == pytest.approx(float(SLOPE * TASK.reference_rates[0]) / (np.e * 0.25), rel=1e-4)
+    assert float(found.aged) > float(SLOPE * TASK.reference_rates[0]) / (np.e * 0.25)
+
+
+def test_the_models_are_the_middles_of_the_parts():
+    low, high = BETA
+    middles = [float(model.gain / TASK.authority) for model in replace(SLOW, parts=4).models(TASK)]
+    assert middles == pytest.approx([low + (high - low) * (2 * k + 1) / 8 for k in range(4)], rel=1e-12)
+    sheared = replace(TASK, friction=replace(TASK.friction, rate_slope=F(1, 10)))
+    with pytest.raises(ParameterError, match="friction of the slip alone"):
+        SLOW.models(sheared)
+
+
+def response(model, growth):
+    """∫e^{ασ}|e2's response|dσ to the acceleration, at a sample, by midpoint sums over 150 periods."""
+    loop, pieces = HELD.loop(TASK, model), 32
+    flow, jump = np.array(loop.flow, float), np.array(loop.segments[0].jump, float)
+    h = float(STEP) / pieces
+    small, half = expm(flow * h), expm(flow * h / 2)
+    row, total = np.eye(len(flow))[1], 0.0
+    for k in range(150 * pieces):
+        if k and k % pieces == 0:
+            row = row @ jump
+        total += h * np.exp(growth * h * (k + 0.5)) * abs(row @ half[:, 1])
+        row = row @ small
+    return total
+
+
+def test_gains_of_the_past_are_those_of_responses_that_count_more():
+    model = SLOW.models(TASK)[1]
+    loop = HELD.loop(TASK, model)
+    for growth in (F(1, 10**6), F(1, 5)):
+        found = slow_gains([loop], growth)["slip_rate_error", "aged"]
+        expected = response(model, float(growth))
+        assert expected * 0.999 <= float(found[-1]) <= expected * 1.02
+    assert grown(loop, F(1)).flow[1][2:] == loop.flow[1][2:]
+
+
+def test_both_find_the_same_gains_of_every_part():
+    raw = document()
+    task = checker.read_task(raw)
+    loop = checker.read_loop(raw["loop"], task)
+    theirs = checker.slow_gains(task, loop, checker.Slow(2, F(1, 4)))
+    ours = slow_gains([HELD.loop(TASK, model) for model in SLOW.models(TASK)], F(1, 4))
+    for column, name in enumerate(("acceleration", "drift", "aged")):
+        for line, output in enumerate(("slip_error", "slip_rate_error", "push")):
+            assert [float(v) for v in theirs[column][line]] == pytest.approx(
+                [float(v) for v in ours[output, name]], rel=1e-6
+            )
+
+
+def test_a_claim_that_no_bound_stays_below_is_not_proved(monkeypatch):
+    """Bounds as large as the claim on the slip error: the argument needs less."""
+    for share, verdict in ((1, Verdict.UNDECIDED), (F(999, 1000), Verdict.PROVED)):
+        bounds = Bounds(slip_error=share * F(1, 10), slip_rate_error=F(0), push=F(0), small_gain=F(1, 2))
+        monkeypatch.setattr(statement, "best_bounds", lambda *_, bounds=bounds: bounds)
+        claims = replace(statement.Claims.of(TASK, bounds), slip_error=UpperBound(F(1, 10)))
+        assert Guarantee(task=TASK, held=HELD, claims=claims, slow_gain=SLOW).check() is verdict
+    raw = document()
+    for share, fails in ((1, True), (F(999, 1000), False)):
+        slip = share * F(raw["claims"]["slip_error"])
+        monkeypatch.setattr(checker, "bounds", lambda *_, slip=slip: ([slip, F(0), F(0)], F(1, 2)))
+        if fails:
+            with pytest.raises(checker.Refused, match="must stay below its claim"):
+                checker.verify(raw)
+        else:
+            assert checker.verify(raw)
+
+
+def test_a_slip_error_that_moves_the_gain_without_end_is_said(monkeypatch):
+    def grows(task, gains, root, step, noise, spread):
+        return Bounds(slip_error=spread.half, slip_rate_error=F(0), push=F(0), small_gain=F(1, 2))
+
+    monkeypatch.setattr(statement, "best_bounds", grows)
+    found = guarantee(TASK, HELD, SLOW)
+    assert isinstance(found, NoGuarantee)
+    assert "moves it further" in found.reason
+
+
+def test_a_loop_that_is_not_stable_at_an_end_of_the_range_has_none():
+    wild = replace(HELD, law=replace(LAW, feedback=tuple(9 * v for v in LAW.feedback)))
+    assert isinstance(guarantee(TASK, wild, SLOW), NoGuarantee)
+    fast = replace(SLOW, growth=F(50))
+    assert "not stable" in guarantee(TASK, HELD, fast).reason
+
+
+@pytest.mark.parametrize("steepness", [1, 500])
+def test_no_plant_whose_friction_falls_with_slip_leaves_the_bounds(steepness):
+    """β = μ(r + e1)N̂/b is a function of the slip, a zigzag with the largest slope; φ and s switch at random.
+
+    The steep one changes by a tenth of its range within the errors that are claimed.
+    """
+    task = TASK
+    found = _bounds_with(task, replace(SLOW, parts=4), SLOPE * steepness)
+    random, courses, pieces = np.random.default_rng(3), 400, 8
+    kept, fed, out, back = (np.array(m, float) for m in (LAW.update, LAW.measured, LAW.output, LAW.feedback))
+    b, s, w = float(task.authority), tuple(map(float, task.slip_chord)), float(task.rate_chord[0])
+    force, h, kappa = float(task.amplitude), float(STEP) / pieces, float(SLOPE * steepness)
+    e, z = np.zeros((2, courses)), np.zeros((2, courses))
+    middle = random.uniform(*BETA, courses)
+    width = BETA[1] - BETA[0]
+    flips = np.cumsum(random.random((40 * pieces, 2, courses)) < 10.0 ** random.uniform(-2.5, 0, courses), axis=0) % 2
+    largest = np.zeros(2)
+    for k in range(40 * pieces):
+        if k % pieces == 0:
+            v = b * (out @ z + back @ e)
+            z = kept @ z + fed @ e
+        way, slope = 2.0 * flips[k, 0] - 1, np.asarray(s)[flips[k, 1]]
+
+        def rate(x, v=v, way=way, slope=slope):
+            place = (kappa * x[0] + middle - BETA[0]) / width  # a zigzag of slope κ between the ends of the range
+            beta = BETA[0] + width * np.abs((place + 1) % 2 - 1)
+            return np.array([x[1], slope * x[0] - w * x[1] + beta * v + way * force])
+
+        k1 = rate(e)
+        k2 = rate(e + h / 2 * k1)
+        k3 = rate(e + h / 2 * k2)
+        e = e + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(e + h * k3))
+        largest = np.maximum(largest, np.abs(e).max(axis=1))
+    assert largest[0] <= found.slip_error
+    assert 0.4 * float(found.slip_rate_error) <= largest[1] <= found.slip_rate_error
+
+
+def _bounds_with(task, slow, slope):
+    """Fixed point of the bounds for a slope κ of the input gain alone."""
+    gains = slow_gains([HELD.loop(task, model) for model in slow.models(task)], slow.growth)
+    slip = F(0)
+    for _ in range(40):
+        half = (task.beta[1] - task.beta[0]) / (2 * slow.parts) + 2 * slope * slip
+        spread = replace(slow.spread(task, F(0)), half=half)
+        found = statement.best_bounds(task, gains, None, STEP, {}, spread)
+        slip = F(f"{float(found.slip_error):.3e}") * F(1001, 1000)
+    assert slip > found.slip_error
+    return found
+
+
+def test_a_model_of_a_part_changes_the_pressure_alone():
+    loop, other = (
+        HELD.loop(TASK),
+        HELD.loop(TASK, Model(slip=TASK.model.slip, rate=TASK.model.rate, gain=TASK.authority)),
+    )
+    assert other.flow[1][-1] == 1
+    assert loop.flow[1][:2] == other.flow[1][:2]
+    assert loop.segments == other.segments
