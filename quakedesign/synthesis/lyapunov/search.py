@@ -18,6 +18,7 @@ from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov.balancing import balance, below, exponents_of, lifted_scale, scaled
 from quakedesign.synthesis.lyapunov.certify_exactly import bounds_of, claims_of, finish
+from quakedesign.synthesis.lyapunov.kept import kept
 
 _WORTH_A_PROOF = 1e-9
 """Margins above this are worth a proof in exact arithmetic, which decides."""
@@ -58,6 +59,7 @@ def find_certificate(
     return next(filter(None, (_of_degree(loop, degree, subject) for degree in chosen)), None)
 
 
+@kept
 def _of_degree(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
     scale = balance(loop)
     family = family_of(loop, degree, scale)

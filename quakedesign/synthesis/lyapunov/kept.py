@@ -1,0 +1,53 @@
+"""Searches that every comparison of the presets asks for again, with what they have found: it is decided anew.
+
+The folder `found` has a certificate for each such question, or ``null`` where nothing was found, by a digest of the
+question. A certificate counts after its exact check only, so that a wrong file costs time and proves nothing.
+"""
+
+from collections.abc import Callable
+from dataclasses import fields
+from functools import wraps
+from hashlib import sha256
+from pathlib import Path
+
+from quakedesign.certificates import Certificate, Loop, Verdict, certificate_text, load_certificate
+from quakedesign.controllers import Subject
+from quakedesign.errors import CertificateError, WorkError
+from quakedesign.output import write_whole
+
+FOLDER = Path(__file__).parent / "found"
+_NOTHING = "null\n"
+
+Search = Callable[[Loop, int, Subject | None], Certificate | None]
+
+
+def kept(search: Search) -> Search:
+    """Take what a search has found before from the folder; search where it has nothing that holds."""
+
+    @wraps(search)
+    def known(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
+        path = place(loop, degree)
+        if not path.exists():
+            return search(loop, degree, subject)
+        if path.read_text(encoding="utf-8") == _NOTHING:
+            return None
+        try:
+            found = load_certificate(path)
+            if found.loop == loop and found.check(subject) is Verdict.PROVED:
+                return found
+        except (CertificateError, WorkError):
+            pass
+        return search(loop, degree, subject)
+
+    return known
+
+
+def place(loop: Loop, degree: int) -> Path:
+    """File of a question: a loop with all its numbers, and the degree of V."""
+    asked = repr([degree, *((field.name, getattr(loop, field.name)) for field in fields(loop))])
+    return FOLDER / f"{loop.law}_{sha256(asked.encode()).hexdigest()[:16]}.json"
+
+
+def keep(loop: Loop, degree: int, found: Certificate | None) -> None:
+    """Write what a search has found."""
+    write_whole(place(loop, degree), _NOTHING if found is None else certificate_text(found))

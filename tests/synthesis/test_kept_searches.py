@@ -1,0 +1,78 @@
+"""What searches have found before is decided anew, answers what the presets ask, and is what they find."""
+
+import pytest
+
+from quakedesign import load_fault, published
+from quakedesign.certificates import Verdict, load_certificate
+from quakedesign.controllers import control_law
+from quakedesign.synthesis import assess
+from quakedesign.synthesis.lyapunov import kept, search
+from quakedesign.synthesis.methods.base import Problem
+from quakedesign.synthesis.methods.sliding_mode import _proved_base
+
+FILES = sorted(kept.FOLDER.glob("*.json"))
+PROOFS = [path for path in FILES if path.read_text(encoding="utf-8") != "null\n"]
+SEARCH = search._of_degree.__wrapped__
+PRESETS = ("real-fault", "lab-fault")
+
+
+@pytest.mark.parametrize("path", PROOFS, ids=lambda path: path.stem)
+def test_every_certificate_that_is_kept_proves_its_claim_in_the_place_of_its_question(path):
+    certificate = load_certificate(path)
+    assert certificate.check() is Verdict.PROVED
+    assert kept.place(certificate.loop, 5) == path
+
+
+def asked(monkeypatch):
+    """Questions that the comparisons of the presets ask, and what they are answered."""
+    found = []
+
+    def noted(loop, degree, subject, answered=search._of_degree):
+        found.append((kept.place(loop, degree), loop, answered(loop, degree, subject)))
+        return found[-1][2]
+
+    monkeypatch.setattr(search, "_of_degree", noted)
+    monkeypatch.setattr(Problem, "judged", lambda self, controller, certificate=None, **more: certificate)
+    for fault in map(load_fault, PRESETS):
+        for name in ("cta", "dia"):
+            assess(fault, published(fault.name)[name])
+            _proved_base(fault, control_law(name))
+    return found
+
+
+def test_what_the_presets_ask_is_kept_and_nothing_else(monkeypatch):
+    monkeypatch.setattr(search, "family_of", lambda *_: pytest.fail("a search was begun"))
+    questions = asked(monkeypatch)
+    assert sorted({path for path, *_ in questions}) == FILES
+    assert {path for path, _, found in questions if found} == set(PROOFS)
+
+
+@pytest.mark.slow
+def test_a_search_finds_the_same_again(monkeypatch):
+    for path, loop, known in asked(monkeypatch):
+        again = SEARCH(loop, 5, None)
+        assert (again is None) == (known is None), path
+        if known is not None:
+            before, now = ({t.factors: float(t.coefficient) for t in one.lyapunov} for one in (known, again))
+            assert now == pytest.approx(before, rel=1e-2)
+
+
+def test_a_file_that_proves_nothing_is_not_believed(monkeypatch, tmp_path):
+    known = load_certificate(next(path for path in PROOFS if path.stem.startswith("cta")))
+    monkeypatch.setattr(kept, "FOLDER", tmp_path)
+    searched = kept.kept(lambda loop, degree, subject: "searched")
+    assert searched(known.loop, 5, None) == "searched"
+    kept.keep(known.loop, 5, known)
+    assert searched(known.loop, 5, None) == known
+    place = kept.place(known.loop, 5)
+    text = place.read_text(encoding="utf-8")
+    for wrong in (text.replace('"positive":"', '"positive":"9', 1), text[: len(text) // 2], "", "{}"):
+        assert wrong != text
+        place.write_text(wrong, encoding="utf-8")
+        assert searched(known.loop, 5, None) == "searched"
+
+
+def test_another_degree_or_number_is_another_question():
+    loop = load_certificate(PROOFS[0]).loop
+    assert kept.place(loop, 5) != kept.place(loop, 7)
+    assert kept.place(loop, 5) != kept.place(load_certificate(PROOFS[1]).loop, 5)
