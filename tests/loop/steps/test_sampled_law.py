@@ -50,7 +50,7 @@ def law(a, b, c):
     root = SignedPower(slip_error, sp.Rational(1, 3))
     nested = SignedPower(b * rate_error + c, sp.Rational(1, 2))
     alike = a * slip_error + b * rate_error + c * ONE
-    return (a * slip_error + b * root * rate_error - c, nested, alike, slip_error * rate_error - ONE, sp.Integer(0))
+    return (alike, a * slip_error + b * root * rate_error - c, nested, slip_error * rate_error - ONE, sp.Integer(0))
 
 
 @pytest.mark.parametrize("given", [(sp.Rational(-5, 2), sp.sqrt(2), 4), (3, -7, sp.Rational(1, 9)), (-2, -3, -5)])
