@@ -95,9 +95,10 @@ def without_nesting(
 def _split(part: sp.Expr, states: Container[sp.Symbol]) -> Term:
     coefficient, parameters = Fraction(1), list[str]()
     powers = list[Factor]()
-    for base, power in (factor.as_base_exp() for factor in sp.Mul.make_args(part)):
-        if base.is_Rational and power.is_Integer:
-            coefficient *= fraction_of(base) ** int(power)
+    for factor in sp.Mul.make_args(part):
+        base, power = factor.as_base_exp()
+        if factor.is_Rational:
+            coefficient *= fraction_of(factor)
         elif base.is_Symbol and base not in states and power.is_Integer and power > 0:
             parameters += [base.name] * int(power)
         else:
@@ -198,16 +199,15 @@ def cell_polynomial(
     """
     total: dict[tuple[int, ...], Fraction] = {}
     for term in terms:
-        coefficient, exponents, sign = value(term, parameters), dict.fromkeys(weights, 0), 1
+        coefficient, exponents = value(term, parameters), dict.fromkeys(weights, 0)
         for state, exponent, kind in term.factors:
             degree, rest = divmod(exponent.numerator * weights[state], exponent.denominator)
             if rest or degree < 0:
                 raise CertificateError(f"⌈{state}⌋^{exponent} with weight {weights[state]} is no polynomial on a cell.")
             exponents[state] = degree
-            sign *= signs[state] if kind == "s" else 1
+            coefficient *= signs[state] if kind == "s" else 1
         key = tuple(exponents.values())
-        signed = coefficient if sign > 0 else -coefficient
-        total[key] = total[key] + signed if key in total else signed
+        total[key] = total[key] + coefficient if key in total else coefficient
     return {e: c for e, c in total.items() if c}
 
 

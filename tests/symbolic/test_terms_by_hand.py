@@ -81,6 +81,7 @@ def test_parts_are_split_into_numbers_parameters_and_powers():
         k**HALF,
         sp.sqrt(k) * a,
         1 / SignedPower(a, HALF),
+        AbsolutePower(a, THIRD) ** HALF,
         SignedPower(a, sp.sqrt(2)),
         SignedPower(k, HALF),
         SignedPower(a + b, HALF),
