@@ -22,7 +22,11 @@ def _fault_name(_type: Any, tokens: Sequence[Any]) -> str:
 
 
 FaultName = Annotated[
-    str, Parameter(help="Preset (real-fault, lab-fault) or path of a .toml file.", converter=_fault_name)
+    str,
+    Parameter(
+        help="Preset (real-fault, lab-fault, crustal-patch, creeping-patch) or path of a .toml file.",
+        converter=_fault_name,
+    ),
 ]
 Box = Annotated[str | None, Parameter(help="Uncertainty box: paper or ten-percent.")]
 Force = Annotated[bool, Parameter(negative="", help="Replace what an earlier run has written.")]

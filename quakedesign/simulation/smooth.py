@@ -1,6 +1,6 @@
 """Integration of smooth differential equations to a tolerance, with crossings of one level found on the way."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,9 @@ class Problem:
     def integrate(
         self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
     ) -> Solution:
-        """Follow the equations from times[0] to times[-1].
+        """Follow the equations from times[0] to times[-1], with a clock that starts with them.
+
+        After years the steps of an earthquake are shorter than what floats of the absolute time can tell apart.
 
         Parameters
         ----------
@@ -83,8 +85,15 @@ class Problem:
             When the method cannot go on.
         """
         _check(method, rtol)
-        if method in adaptive_integrators():
-            return self._resolved(start, load, times, every_step=every_step, method=method, rtol=rtol)
+        began, clock = float(times[0]), replace(load, start=load.start - float(times[0]))
+        solve = self._resolved if method in adaptive_integrators() else self._stepped
+        found = solve(start, clock, times - began, every_step=every_step, method=method, rtol=rtol)
+        time = np.append(began + found.time[:-1], times[-1]) if every_step else times
+        return replace(found, time=time, crossings=began + found.crossings)
+
+    def _stepped(
+        self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
+    ) -> Solution:
         field, jacobian = self._bound(load)
         crossing = self._crossing()
         spans = [times] if every_step or method == "dop853" else [times[i : i + 2] for i in range(len(times) - 1)]

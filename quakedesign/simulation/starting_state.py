@@ -9,6 +9,7 @@ from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_positive
 from quakedesign.simulation.slip_events import direct_strength
 from quakedesign.simulation.state_run import simulate_state
+from quakedesign.symbolic import derive
 
 _CYCLES = 3  # the first one depends on its start
 _MOST_LOADS = 1000.0  # by which a strength aσ' is loaded, before a fault is taken to have no cycle
@@ -65,6 +66,11 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
         raise ParameterError(
             f"share of the cycle must be at least 0 and less than 1. Received {share!r}. Give 0.9, say."
         )
+    if not derive(fault).unstable:
+        raise ParameterError(
+            f"late in the cycle needs a fault with repeated events. Received {fault.name}, which slides stably. "
+            "Start it in steady sliding."
+        )
     unit = direct_strength(fault) * fault.area / (fault.stiffness * rate)
     start: dict[str, Any] = {"start_rate": rate, "start_state": [1.5 * v for v in fault.friction.steady_state(rate)]}
     loads = 10.0
@@ -77,8 +83,8 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
                 fault, rate, duration=math.nextafter(time, math.inf), times=[time], **start, **settings
             )
             return StartingState(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
-        loads *= 4
+        loads *= 2
     raise ParameterError(
         f"late in the cycle needs a fault with repeated events. Received {fault.name}, with {len(onsets)} of them in "
-        f"{loads / 4 * unit:.3g} s at {rate:.3g} m/s. Start it in steady sliding."
+        f"{loads / 2 * unit:.3g} s at {rate:.3g} m/s. Start it in steady sliding."
     )

@@ -19,6 +19,7 @@ from quakedesign.simulation.state_trajectory import StateTrajectory
 
 _ONSET = 10.0
 _SHARE_OF_STRETCH = 1e-3
+_LONGEST = 1e8  # s on one clock, which tells 1.5e-8 s apart
 
 
 def simulate_state(
@@ -211,12 +212,13 @@ class _History:
         return self._joined(np.array(start), parts)
 
     def _spans(self) -> "list[tuple[float, float, float]]":
-        """Starts, ends [s] and loading rates [m/s] of spans without a break of loading or pressure."""
+        """Starts, ends [s] and loading rates [m/s] of spans without a break of loading or pressure, none too long."""
         found, now = [], 0.0
         for length, load in self.pieces:
             end = now + length
-            inside = sorted({time for time in self.course.times if now < time < end})
-            found += [(a, b, load) for a, b in pairwise((now, *inside, end))]
+            inside = {time for time in self.course.times if now < time < end}
+            inside |= {now + i * _LONGEST for i in range(1, math.ceil(length / _LONGEST))}
+            found += [(a, b, load) for a, b in pairwise((now, *sorted(inside), end))]
             now = end
         return found
 

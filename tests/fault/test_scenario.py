@@ -1,5 +1,6 @@
 """Fault descriptions: the presets are the paper's table; everything wrong is one clear message."""
 
+import math
 import os
 from fractions import Fraction as F
 from importlib.resources import files
@@ -32,7 +33,7 @@ def test_presets_are_the_columns_of_the_table():
     hour = 3600
     real = (2500, 30e9, 5e14, 5000, 50e6, 0.2353, 0.1, 0.27635, 0.785, 184.17 * hour, 0.184)
     lab = (1385, 225.5e3, 408, 0.1, 0.1e6, 0.4, 0.17, 2.5e-3, 7.1e-3, hour, 1e-3)
-    assert presets() == ["lab-fault", "real-fault"]
+    assert presets() == ["creeping-patch", "crustal-patch", "lab-fault", "real-fault"]
     assert plain(load_fault("real-fault")) == pytest.approx(real, rel=1e-15)
     assert plain(load_fault("lab-fault")) == pytest.approx(lab, rel=1e-15)
 
@@ -47,8 +48,24 @@ def test_the_laboratory_disturbance_is_that_of_the_real_fault_by_similarity():
 
 @pytest.mark.parametrize("name", presets())
 def test_every_preset_has_a_source(name):
-    assert "Earthquake Control" in load_fault(name).source
+    paper = "Erickson et al. (2020)" if name.endswith("patch") else "Earthquake Control"
+    assert paper in load_fault(name).source
     assert load_fault(name).name == name
+
+
+@pytest.mark.parametrize(
+    ("name", "direct", "change"), [("crustal-patch", 0.010, 0.005), ("creeping-patch", 0.025, -0.010)]
+)
+def test_patches_have_the_numbers_of_the_benchmark(name, direct, change):
+    """BP1-QD: ρ, c_s, σ_n, a, b, D_c, and f0 = 0.6 at 1 µm/s carried to the plate rate of 1 nm/s."""
+    fault = load_fault(name)
+    law, speed = fault.friction, 3464.0
+    assert (fault.density, fault.effective_normal_stress, fault.length) == (2670.0, 50e6, 15e3)
+    assert fault.shear_modulus == pytest.approx(2670 * speed**2, rel=1e-4)
+    assert fault.damping == pytest.approx(fault.area * 2670 * speed / 2, rel=1e-4)
+    assert (law.direct_effect, law.evolution_effect, law.critical_slip) == (direct, 0.015, 8e-3)
+    assert law.reference_coefficient == pytest.approx(0.6 + change * math.log(1e3), abs=5e-6)
+    assert law.reference_rate == 1e-9
 
 
 def test_a_file_is_read_like_a_preset(tmp_path):
@@ -124,7 +141,8 @@ def test_wrong_descriptions(old, new, kind, match):
 @pytest.mark.parametrize("source", ["nope", "", "/", "real-fault.json"])
 def test_neither_preset_nor_file(source):
     with pytest.raises(
-        UnknownNameError, match=r"must be a preset \(lab-fault, real-fault\) or the path of a \.toml file"
+        UnknownNameError,
+        match=r"must be a preset \(creeping-patch, crustal-patch, lab-fault, real-fault\) or the path of a \.toml file",
     ):
         load_fault(source)
 

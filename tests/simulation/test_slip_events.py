@@ -99,6 +99,22 @@ def test_late_in_the_cycle_the_rest_of_the_interval_is_left():
     assert run.onsets[0] == pytest.approx(0.1 * interval, rel=1e-3)
 
 
+def test_an_earthquake_after_decades_is_resolved_with_inertia():
+    """The second event of the crustal patch begins after 5e9 s, where floats of the time are 1e-6 s apart."""
+    patch, start = load_fault("crustal-patch"), {"start_rate": 3e-12, "start_state": (4.4e9,)}
+    run = simulate_state(patch, RATE, duration=6e9, rtol=1e-6, **start)
+    first, second = slip_events(patch, run, RATE)
+    assert second.onset > 5e9
+    assert second.peak_slip_rate == pytest.approx(first.peak_slip_rate, rel=1e-2)
+    assert second.slip == pytest.approx(first.slip, rel=1e-2)
+
+
+def test_instants_that_are_asked_for_come_back_as_they_are():
+    times = [0.1, 2.3e8 + 0.7, 5.9e8]
+    run = simulate_state(fault(), RATE, duration=5.9e8, start_rate=RATE, times=times, **QUASI)
+    assert run.time.tolist() == times
+
+
 def test_a_fault_that_creeps_has_no_cycle():
     with pytest.raises(ParameterError, match="repeated events"):
         late_in_cycle(fault(direct_effect=0.02), RATE, 0.9, **QUASI)
