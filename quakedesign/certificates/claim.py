@@ -9,11 +9,12 @@ from math import isqrt
 
 import sympy as sp
 
-from quakedesign.controllers import LoopField
+from quakedesign.controllers import LoopField, laws
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import fraction_of, six_digits
 from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.proofs import Square
+from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.terms import Term, from_terms, to_terms, without_nesting
 
 Range = tuple[Fraction, Fraction]
@@ -220,8 +221,6 @@ def error_units(loop: Loop, model: LoopField | None = None) -> dict[str, Range]:
 
     The units are those of a model, or of the law of the package that the loop names.
     """
-    from quakedesign.controllers import laws
-
     if model is None and loop.law in laws():
         model = laws()[loop.law].loop_field()
     return unit_ranges(loop, {str(state): unit for state, unit in model.units.items()} if model is not None else {})
@@ -235,8 +234,6 @@ def unit_ranges(loop: Loop, units: Mapping[str, sp.Expr]) -> dict[str, Range]:
     CertificateError
         For a unit that is not positive.
     """
-    from quakedesign.symbolic.balls import enclose
-
     values = {**{n: (v, v) for n, v in loop.parameters.items()}, **{n: ends for n, (_, ends) in loop.roots.items()}}
     found: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))
     for state, unit in units.items():

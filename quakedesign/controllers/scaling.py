@@ -19,6 +19,7 @@ from typing import Any
 
 import sympy as sp
 
+from quakedesign.controllers import control_law
 from quakedesign.controllers.base import Controller, Signals
 from quakedesign.errors import ParameterError
 from quakedesign.fault.radical import Radical, radical
@@ -243,8 +244,6 @@ def _solved(conditions: list[Form], unknown: tuple[str, ...], law: str) -> dict[
 @cache
 def printed_gains(fault_name: str, law: str) -> Mapping[str, str]:
     """Gains as the paper prints them, with their digits; empty where it prints none."""
-    from quakedesign.controllers import control_law
-
     data = tomllib.loads((files("quakedesign.controllers") / "published.toml").read_text(encoding="utf-8"))
     table = data.get(fault_name)
     entry = table.get(law) if isinstance(table, dict) else None

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from quakedesign.controllers import control_laws
+
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Entry
@@ -27,8 +29,6 @@ def colour(name: str) -> str:
 
     From the palette of Okabe and Ito (https://jfly.uni-koeln.de/color/): told apart with every common colour vision.
     """
-    from quakedesign.controllers import control_laws
-
     known = sorted(control_laws())
     return _PALETTE[min(known.index(name), len(_PALETTE) - 1)] if name in known else _PALETTE[-1]
 

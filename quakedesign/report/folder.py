@@ -15,6 +15,8 @@ from quakedesign.fault import fault_toml
 from quakedesign.output import require_room, whole_folder
 from quakedesign.report.comparison import Comparison
 from quakedesign.report.numbers import csv_text, printed, table
+from quakedesign.report.page import page_html
+from quakedesign.report.paper_figures import PAPER
 from quakedesign.studies.facts import fault_dict, fault_sentences
 
 if TYPE_CHECKING:
@@ -64,8 +66,6 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
 
 def study_results(study: "PaperStudy") -> dict[str, Any]:
     """Results of the comparison, and of a study: ``induced``, ``figures``, ``numbers`` and ``printed``."""
-    from quakedesign.report.paper_figures import PAPER
-
     induced = study.induced
     told = {
         "outcome": induced.outcome.to_dict(),
@@ -135,8 +135,6 @@ def _fill(
     drawn: dict[str, Any],
     tell: Callable[[str, float], None],
 ) -> None:
-    from quakedesign.report.page import page_html
-
     for name in ("certificates", "figures"):
         (folder / name).mkdir()
     for entry in comparison.entries:

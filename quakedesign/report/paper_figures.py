@@ -27,6 +27,7 @@ from quakedesign.report.drawing import (
 )
 from quakedesign.report.figures import end, figures
 from quakedesign.report.numbers import BARS, BASIS, baseline, relative
+from quakedesign.simulation.closed_loop import ClosedLoop
 
 if TYPE_CHECKING:
     from quakedesign.studies.comparison import Compared, Entry
@@ -90,8 +91,6 @@ def peak_against_tracking(study: "PaperRuns") -> Any:
 
 def friction_law(comparison: "Compared") -> Any:
     """Friction coefficient against slip, and the slope at which the spring unloads."""
-    from quakedesign.simulation.closed_loop import ClosedLoop
-
     fault, run = comparison.fault, comparison.uncontrolled
     slips = np.linspace(0, 1.1 * max(float(run.slip.max()), fault.reference.target_slip), 400)
     coefficient = ClosedLoop(fault).friction

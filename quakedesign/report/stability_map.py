@@ -3,9 +3,13 @@
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from quakedesign.errors import UnsupportedError
 from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.symbolic import plant, state_plant
+from quakedesign.symbolic.stability import nucleation_length, stability
 
 _COLOURS = {"stable": "#BFD9EC", "unstable": "#F3C6B2"}
 _SIZES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
@@ -38,8 +42,6 @@ def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | No
         When the pressure opens the fault, or the rate is outside of the law's domain.
     """
     from matplotlib.figure import Figure
-
-    from quakedesign.symbolic.stability import stability
 
     verdict = stability(fault, pressure=pressure, loading_rate=loading_rate, inertia=inertia)
     conditions, boundary, limits = _functions(fault, float(verdict.loading_rate), inertia)
@@ -91,11 +93,6 @@ def _functions(fault: Fault, rate: float, inertia: bool) -> tuple[Any, Any, list
     The conditions as functions of effective stress [Pa] and stiffness per area [Pa/m], the critical stiffness as
     function of effective stress, and the effective stresses at which a condition without stiffness is zero.
     """
-    import sympy as sp
-
-    from quakedesign.rationals import rational
-    from quakedesign.symbolic import plant, state_plant
-
     law = fault.friction
     at = sp.Rational(str(rational(rate)))
     values = {s: v for s, v in plant.plant_values(fault).items() if s not in (plant.k_hat, plant.sigma)}
@@ -140,8 +137,6 @@ def _region(
 
 
 def _annotate(axis: Any, fault: Fault, pressure: float, rate: float, critical: float, top: float) -> None:
-    from quakedesign.symbolic.stability import nucleation_length
-
     if not (np.isfinite(critical) and critical > 0):
         said = "no critical stiffness"
     else:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import sympy as sp
 
@@ -144,8 +145,6 @@ class _Piece:
     @classmethod
     def of(cls, march: SmoothMarch, count: int) -> "_Piece":
         """Piece of a march."""
-        import casadi as ca
-
         recorder = march.recorder
         shares = np.arange(1, count + 1) / count
         sizes = scales(recorder.loop)
@@ -168,8 +167,6 @@ class _Piece:
 
 def field(recorder: Recorder) -> Any:
     """CasADi Function (t [s], state, factors) → its time derivative, works per unit mass and time."""
-    import casadi as ca
-
     time, state = ca.SX.sym("t"), ca.SX.sym("state", recorder.state_size)
     factors = ca.SX.sym("factors", len(recorder.loop.factors))
     loop = recorder.loop.with_factors(tuple(ca.vertsplit(factors)) if recorder.loop.factors else ())

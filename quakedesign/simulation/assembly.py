@@ -4,6 +4,8 @@ from functools import partial
 from time import perf_counter
 from typing import Any
 
+import casadi as ca
+
 from quakedesign.controllers import Controller
 from quakedesign.errors import SimulationError
 from quakedesign.fault import fault_toml
@@ -85,8 +87,6 @@ def _law_title(controller: Controller | None) -> str:
 
 def _watchers(recorder: Recorder) -> tuple[Any, Any]:
     """CasADi Functions of the vector: the watching of one instant, and all signals."""
-    import casadi as ca
-
     vector = ca.SX.sym("z", recorder.size)
     signals = recorder.signals(vector)
     return (

@@ -10,6 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
+
 from quakedesign.errors import SimulationError
 from quakedesign.temporary import temporary_folder
 
@@ -76,8 +78,6 @@ def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
 
 def ladder(step: Any) -> tuple[Any, ...]:
     """Functions for 1, RADIX, RADIX² … steps; each calls the one below, so that the code stays small."""
-    import casadi as ca
-
     rungs = [step]
     for level in range(1, LEVELS):
         start = ca.MX.sym("z", step.size1_in(0))
@@ -89,8 +89,6 @@ def ladder(step: Any) -> tuple[Any, ...]:
 
 
 def _source(functions: tuple[Any, ...]) -> tuple[str, tuple[str, ...]]:
-    import casadi as ca
-
     generator = ca.CodeGenerator("steps.c")
     for function in functions:
         generator.add(function)
@@ -119,8 +117,6 @@ def compiler() -> tuple[str, ...]:
 @lru_cache(maxsize=32)
 def _compile(source: tuple[str, tuple[str, ...]], command: tuple[str, ...]) -> tuple[Any, ...]:
     """Load the functions of a C source; the library stays in memory when its file is gone."""
-    import casadi as ca
-
     text, names = source
     with temporary_folder() as folder:
         library = shared_library(text, folder, command)

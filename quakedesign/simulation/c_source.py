@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
+
 _WIDTH = 110
 _USE = """
 Call controller_reset once, and controller_step every CONTROLLER_STEP seconds: it reads CONTROLLER_MEASUREMENTS
@@ -108,8 +110,6 @@ def header_text(found: ControllerStep) -> str:
 
 def source_text(found: ControllerStep, header: str) -> str:
     """CasADi's C for the step, followed by the two functions of the header."""
-    import casadi as ca
-
     generator = ca.CodeGenerator("sampled_step.c", {"with_export": False})
     generator.add(found.function)
     start = ",\n".join(f"    {value!r}" for value in found.start.values())

@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
+import casadi as ca
 import sympy as sp
+from sympy.codegen.cfunctions import expm1
 
 from quakedesign.controllers import Controller
 from quakedesign.controllers.feed_forward import NONE
@@ -67,8 +69,6 @@ def matched_perturbation(fault: Fault, divisor: sp.Rational, varied: bool = Fals
 
 def _with_numbers(expression: sp.Expr, fault: Fault, varied: bool) -> sp.Expr:
     """Insert the law and exact numbers; e^u becomes 1 + (e^u − 1), so that small slips do not drown in rounding."""
-    from sympy.codegen.cfunctions import expm1
-
     law: Any = fault.friction.exact()
     values: dict[Any, Any] = varied_values(fault) if varied else plant.plant_values(fault)
     law = WeakenedFriction(law, symbol("weakening")) if varied else law
@@ -136,15 +136,12 @@ class ClosedLoop(Metered):
             What else the motion depends on.
         times : int
         """
-        import casadi as ca
-
         return self.metered_often(method, motion, given, (state, ca.SX(0, 1)), step, times)[0]
 
     def metered_often(
         self, method: type[Integrator], motion: Any, given: Any, start: tuple[Any, Any], step: float, times: int
     ) -> tuple[Any, Any]:
         """State and works so far (SX) after a number of steps, see `advance_often`; works without entries stay so."""
-        import casadi as ca
 
         def once(loop: Self, moving: Motion, state: Any, works: Any) -> tuple[Any, Any]:
             if not works.shape[0]:
@@ -265,8 +262,6 @@ class ClosedLoop(Metered):
 
 
 def _column(values: tuple[Any, ...]) -> Any:
-    import casadi as ca
-
     return ca.vertcat(*values)
 
 
@@ -280,8 +275,6 @@ def casadi_function(
 
     Derivatives at a kink are those of the side on which x1 and x2 grow.
     """
-    import casadi as ca
-
     vectors = {key: ca.SX.sym(key, len(symbols)) for key, symbols in inputs.items()}
     values = {symbol: vectors[key][i] for key, symbols in inputs.items() for i, symbol in enumerate(symbols)}
     if named:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
+import casadi as ca
 import sympy as sp
 
 from quakedesign.simulation.closed_loop import (
@@ -41,8 +42,6 @@ class CoulombLoop(ClosedLoop):
     @cached_property
     def directed(self) -> Any:
         """CasADi Function (t [s], x [m, m/s], p [Pa], direction 1, 0 or −1) → dx [m/s, m/s²]."""
-        import casadi as ca
-
         varied, numbers = bool(self.factors), plant.plant_values(self.fault)
         law = friction_expression(self.fault, varied)
         authority = float(numbers[plant.N_hat]) * (self.factors[2] if varied else 1)
@@ -68,8 +67,6 @@ class CoulombLoop(ClosedLoop):
 
     def shear_stress(self, time: Any, state: Any, pressure: Any, friction: Any) -> Any:
         """Shear stress [Pa]: μ max(σ' − p, 0) against slip, or what carries the load at rest (SX)."""
-        import casadi as ca
-
         strength = friction * ca.fmax(self.fault.effective_normal_stress - pressure, 0)
         numbers = plant.plant_values(self.fault)
         authority = float(numbers[plant.N_hat]) * (self.factors[2] if self.factors else 1)
@@ -79,8 +76,6 @@ class CoulombLoop(ClosedLoop):
 
     def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
         """State after one step, with at most one change between slip forward, slip backward and rest."""
-        import casadi as ca
-
         course = _Course(self.directed, method, motion, step)
         direction = ca.if_else(state[1] == 0, course.start(0.0, state), ca.sign(state[1]))
         ahead = course.move(direction, 0.0, 1.0, state)
@@ -136,8 +131,6 @@ class _Course:
 
     def start(self, passed: Any, state: Any) -> Any:
         """Direction in which a fault at rest sets off; 0 if it stays."""
-        import casadi as ca
-
         forward, backward = self.push(1, passed, state), self.push(-1, passed, state)
         return ca.if_else(forward > 0, 1, ca.if_else(backward > 0, -1, 0))
 
@@ -147,8 +140,6 @@ class _Course:
         The cubic through the slip rates and accelerations of both ends of the step gives the share; a linear step
         with the state there removes its error. `onset` is the share known beforehand, or −1.
         """
-        import casadi as ca
-
         slopes = [self.rates(direction, passed, now)[1] * self.step for passed, now in ((0.0, state), (1.0, ahead))]
         cubic = _stop(*(direction * value for value in (state[1], ahead[1], *slopes)))
         share = ca.if_else(onset < 0, cubic, onset)
@@ -161,23 +152,17 @@ class _Course:
 
 
 def _with_rate(state: Any, rate: Any) -> Any:
-    import casadi as ca
-
     return ca.vertcat(state[0], rate, state[2:])
 
 
 def _onset(before: Any, after: Any) -> Any:
     """Share of a step at which a quantity that ends positive has left zero, by its secant."""
-    import casadi as ca
-
     crosses = ca.logic_and(before < 0, after > 0)
     return ca.if_else(crosses, before / ca.if_else(crosses, before - after, 1), 0)
 
 
 def _stop(start: Any, end: Any, start_slope: Any, end_slope: Any) -> Any:
     """Share at which the cubic with these ends and slopes falls through zero, from start ≥ 0 to end < 0."""
-    import casadi as ca
-
     third = 2 * (start - end) + start_slope + end_slope
     second = end_slope - start_slope - 3 * third
     second = second / 2

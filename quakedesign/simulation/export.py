@@ -5,6 +5,8 @@ from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
+
 from quakedesign.controllers import Controller
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import Fault
@@ -128,8 +130,6 @@ def _software(scheme: Scheme) -> Sampled:
 
 def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> tuple[Any, dict[str, float]]:
     """CasADi Function of the step, and the memory at the start; what never changes is written into the function."""
-    import casadi as ca
-
     numbers = scheme.memory(loop, step)
     names = [str(symbol) for symbol in loop.integrals] + list(numbers)
     values = [0.0] * len(loop.integrals) + list(numbers.values())

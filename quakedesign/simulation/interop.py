@@ -2,6 +2,9 @@
 
 from typing import Any
 
+import casadi as ca
+import numpy as np
+
 from quakedesign.controllers import Controller, Sampling
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
@@ -35,8 +38,6 @@ def to_casadi(fault: Fault, controller: Controller | None = None) -> Any:
     UnsupportedError
         For a law of samples.
     """
-    import casadi as ca
-
     if controller is not None and controller.sampling_time is not None:
         raise UnsupportedError("a law of samples has no loop in continuous time. Use simulate, or export it.")
     loop = ClosedLoop(fault, controller)
@@ -88,7 +89,6 @@ def to_iosystem(subject: Fault | Controller) -> Any:
 
 
 def _fault_system(fault: Fault) -> Any:
-    import casadi as ca
     import control
 
     field = ClosedLoop(fault).plant
@@ -116,7 +116,6 @@ def _fault_system(fault: Fault) -> Any:
 
 def _controller_system(controller: Controller) -> Any:
     import control
-    import numpy as np
 
     if controller.sampling is not None:
         return _sampled_system(controller, controller.sampling)
@@ -143,7 +142,6 @@ def _controller_system(controller: Controller) -> Any:
 
 def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
     """One step of the law's own scheme; states are the law's, and what the scheme keeps from one sample to the next."""
-    import casadi as ca
     import control
 
     scheme: Any = simulation_scheme(sampling.scheme, **{name: float(value) for name, value in sampling.settings})

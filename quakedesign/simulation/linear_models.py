@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from quakedesign.controllers import Controller
 from quakedesign.errors import UnsupportedError
 from quakedesign.fault import Fault, require_fault
@@ -94,7 +96,6 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0) -> Any:
 def _linear(system: Any) -> Any:
     """StateSpace from slip and slip rate to pressure of a system whose answers are linear, read off unit vectors."""
     import control
-    import numpy as np
 
     n, seen = system.nstates, system.ninputs
 

@@ -4,8 +4,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import sympy as sp
+
 from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import require_nonnegative
+from quakedesign.rationals import rational
+from quakedesign.symbolic import plant
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -42,8 +46,6 @@ class Load:
         require_nonnegative(drift=self.drift)
         if self.perturbation is None:
             return
-        import sympy as sp
-
         try:
             expression = sp.sympify(self.perturbation, strict=True)
         except sp.SympifyError:
@@ -59,10 +61,6 @@ class Load:
     @cached_property
     def acceleration(self) -> "sp.Expr":
         """φ̂_e [m/s²] of the user alone, in x1, x2 and t of `quakedesign.symbolic.plant`."""
-        import sympy as sp
-
-        from quakedesign.symbolic import plant
-
         if self.perturbation is None:
             return sp.Integer(0)
         meant = dict(zip(SYMBOLS, (plant.x1, plant.x2, plant.t), strict=True))
@@ -71,11 +69,6 @@ class Load:
 
     def push(self, fault: "Fault") -> "sp.Expr":
         """k̂·drift·t [m/s²] of the far end on a fault, in t of `quakedesign.symbolic.plant`."""
-        import sympy as sp
-
-        from quakedesign.rationals import rational
-        from quakedesign.symbolic import plant
-
         return plant.plant_values(fault)[plant.k_hat] * sp.Rational(str(rational(self.drift))) * plant.t
 
 

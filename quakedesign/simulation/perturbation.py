@@ -4,6 +4,8 @@ import ast
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import sympy as sp
+
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
 from quakedesign.simulation.loading import SYMBOLS
@@ -50,15 +52,11 @@ def perturbation(text: str) -> "sp.Expr":
 
 def _real(expression: Any) -> bool:
     """Whether every number in an expression is real and finite."""
-    import sympy as sp
-
     return all(part.is_real and part.is_finite for part in sp.preorder_traversal(expression) if part.is_number)
 
 
 def _value(node: ast.expr, text: str) -> Any:
     """SymPy expression of one node."""
-    import sympy as sp
-
     match node:
         case ast.Constant(value=int() | float()) if not isinstance(node.value, bool):
             return sp.Rational(str(rational(ast.get_source_segment(text, node) or "", "perturbation")))

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
+import casadi as ca
+
 from quakedesign.loop.schemes import Scheme, Stepped
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.energy import WORKS, EnergyBudget, Meter
@@ -63,8 +65,6 @@ class Parts:
 
     def joined(self) -> Any:
         """The vector (SX)."""
-        import casadi as ca
-
         return ca.vertcat(self.counter, self.settled_from, self.state, *self.watched.values(), *self.factors)
 
 
@@ -139,8 +139,6 @@ class Recorder:
 
     def advance(self, vector: Any, method: type[Integrator]) -> Any:
         """Vector (SX) after its own instant has been watched and one step has been taken."""
-        import casadi as ca
-
         now, first = self.parts(vector), self.index(WORKS[0])
         meter = Meter(self.loop_of(vector), vector[first : first + len(WORKS)])
         moved = self.scheme.advance(cast(Stepped, meter), method, now.counter, now.state, self.step)
@@ -178,8 +176,6 @@ class Recorder:
         }
 
     def _after(self, before: dict[str, Any], vector: Any) -> dict[str, Any]:
-        import casadi as ca
-
         now, parts = self.signals(vector), self.parts(vector)
         settled = now["time"] > parts.settled_from
         later = parts.counter > 0
@@ -194,8 +190,6 @@ class Recorder:
         }
 
     def _events(self, before: dict[str, Any], now: dict[str, Any], vector: Any) -> dict[str, Any]:
-        import casadi as ca
-
         fine = ca.logic_and(ca.fabs(now["slip"]) <= LARGEST_MOTION, ca.fabs(now["slip_rate"]) <= LARGEST_MOTION)
         parts = self.parts(vector)
         bounded = [parts.state[i] for i in range(2, self.state_size)]
@@ -219,8 +213,6 @@ class Recorder:
 
 
 def _errors(before: dict[str, Any], now: dict[str, Any], settled: Any) -> dict[str, Any]:
-    import casadi as ca
-
     slip_error = ca.if_else(settled, now["slip"] - now["reference"], 0)
     rate_error = ca.if_else(settled, now["slip_rate"] - now["reference_rate"], 0)
     reverse = ca.logic_and(settled, now["slip_rate"] < 0)
@@ -235,8 +227,6 @@ def _errors(before: dict[str, Any], now: dict[str, Any], settled: Any) -> dict[s
 
 
 def _pressures(before: dict[str, Any], now: dict[str, Any], settled: Any, later: Any) -> dict[str, Any]:
-    import casadi as ca
-
     pressure = now["pressure"]
     change = ca.fabs(pressure - before["previous_pressure"])
     return {
@@ -249,8 +239,6 @@ def _pressures(before: dict[str, Any], now: dict[str, Any], settled: Any, later:
 
 
 def _extremes(before: dict[str, Any], now: dict[str, Any], later: Any) -> dict[str, Any]:
-    import casadi as ca
-
     h = now["matched_perturbation"]
     change = ca.if_else(later, ca.fabs(h - before["previous_h"]), 0)
     return {
@@ -261,8 +249,6 @@ def _extremes(before: dict[str, Any], now: dict[str, Any], later: Any) -> dict[s
 
 
 def _ranges(before: dict[str, Any], now: dict[str, Any], signals: Iterable[str]) -> dict[str, Any]:
-    import casadi as ca
-
     found = {}
     for signal in signals:
         found[f"max_{signal}"] = ca.fmax(before[f"max_{signal}"], now[signal])

@@ -6,6 +6,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import casadi as ca
+
 from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, simulation_scheme
@@ -114,8 +116,6 @@ def run_adaptive(
 
 def _step(recorder: Recorder, method: type[Integrator]) -> Any:
     """CasADi Function of the vector: one step."""
-    import casadi as ca
-
     before = ca.SX.sym("z", recorder.size)
     return ca.Function("step", [before], [recorder.advance(before, method)])
 

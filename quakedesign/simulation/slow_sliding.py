@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from quakedesign.errors import ParameterError
@@ -175,8 +176,6 @@ class _Loop:
 
     def rates(self) -> Any:
         """CasADi Function (t, y, (held pressure, its time, modes)) → dy/dt."""
-        import casadi as ca
-
         time, y, told = ca.SX.sym("t"), ca.SX.sym("y", 4), ca.SX.sym("told", 2 + len(self.decay))
         pressure = self.pressure(time, told[0], time - told[1], told[2:], ca.exp)
         turn = 2 * math.pi / self.tide.period

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from quakedesign.errors import ParameterError, SimulationError
@@ -122,8 +123,6 @@ class Problem:
     def _resolved(
         self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
     ) -> Solution:
-        import casadi as ca
-
         time, y, size = ca.SX.sym("t"), ca.SX.sym("y", self.rates.size1_in(0)), len(load.value)
         pushed = ca.SX.sym("load", 2 * size + 1)
         now = pushed[:size] + pushed[size : 2 * size] * (time - pushed[2 * size])
@@ -167,8 +166,6 @@ class _Bound:
 
     @classmethod
     def of(cls, function: Any, index: int, load: Ramp, result: "np.ndarray") -> "_Bound":
-        import casadi as ca
-
         inputs = [ca.SX.sym("y", function.size1_in(0)), ca.SX.sym("load", len(load.value))]
         dense: Any = ca.Function("dense", inputs, [ca.densify(function(*inputs)[index])])
         state, given = np.empty(function.size1_in(0)), np.empty(len(load.value))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import sympy as sp
 
@@ -111,8 +112,6 @@ class SpringSlider:
     @cached_property
     def rates(self) -> Any:
         """CasADi Function (y as in `names`, (loading rate [m/s], p [Pa], dp/dt [Pa/s])) → dy/dt, Jacobian."""
-        import casadi as ca
-
         y, load, values = self._variables()
         known = values | {loading_rate: load[0], plant.p: load[1], pressure_rate: load[2]}
         _, _, *logged = to_casadi(self.derivation, known, [y[0], y[2]])
@@ -123,8 +122,6 @@ class SpringSlider:
     @cached_property
     def readings(self) -> Any:
         """CasADi Function (y, p [Pa]) → friction coefficient [-], driving less resisting stress [Pa]."""
-        import casadi as ca
-
         y, load, values = self._variables()
         law, states = self.law.exact(), state_symbols(self.law.state_names)
         (friction,) = to_casadi([without_overflow(law.coefficient(slip, rate, *states))], values)
@@ -188,8 +185,6 @@ class SpringSlider:
         return float(brentq(excess, *sorted((y[2], y[2] + width)), xtol=1e-14, rtol=1e-15))
 
     def _variables(self) -> tuple[Any, Any, dict[sp.Symbol, Any]]:
-        import casadi as ca
-
         states = state_symbols(self.law.state_names)
         y, load = ca.SX.sym("y", 3 + len(states)), ca.SX.sym("load", 3)
         logged = {x: ca.exp(y[2 + i]) for i, x in enumerate((rate, *states))}

@@ -5,6 +5,8 @@ from functools import cache, reduce
 from operator import add, mul
 from typing import Any
 
+import casadi as ca
+import numpy as np
 import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
@@ -38,8 +40,6 @@ def to_casadi(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], m
     ParameterError
         For a symbol without a value or an operation that is not known.
     """
-    import casadi as ca
-
     table = {**_casadi_operations(), **(_kinks(ca.vertcat(*motion)) if motion else {})}
     return [ca.SX(item) for item in _translate(expressions, values, table)]
 
@@ -152,7 +152,6 @@ def _powers(library: Any) -> dict[Any, Any]:
 
 def _kinks(motion: Any) -> dict[Any, Any]:
     """Max, Min and Abs with the values of CasADi's, and the derivatives of the branch that a motion enters."""
-    import casadi as ca
 
     def not_less(a: Any, b: Any) -> Any:
         ahead: Any = True
@@ -176,8 +175,6 @@ def _kinks(motion: Any) -> dict[Any, Any]:
 
 @cache
 def _casadi_operations() -> Operations:
-    import casadi as ca
-
     other = {expm1: ca.expm1, sp.asinh: ca.asinh, sp.sinh: ca.sinh, sp.cosh: ca.cosh, sp.atan: ca.atan}
     logic = {
         sp.Piecewise: ca.if_else,
@@ -189,8 +186,6 @@ def _casadi_operations() -> Operations:
 
 @cache
 def _numpy_operations() -> Operations:
-    import numpy as np
-
     other = {expm1: np.expm1, sp.asinh: np.arcsinh, sp.sinh: np.sinh, sp.cosh: np.cosh, sp.atan: np.arctan}
     logic = {
         sp.Piecewise: np.where,

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from html import escape
 from typing import Any
 
 from quakedesign.certificates import Certificate, Verdict
@@ -146,8 +147,6 @@ class Design:
         return f"Design of {self.title} for {self.fault.name}: {self.verdict}; gains {gains}"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in self.gains.items())
         rows = "".join(
             f"<tr><td>{escape(p.name)}</td><td>{p.sides[0]}</td><td>{p.sides[1]}</td>"

@@ -16,6 +16,8 @@ from functools import cached_property
 from itertools import pairwise, product
 from math import comb
 
+import sympy as sp
+
 from quakedesign.certificates.matched import static_friction
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
@@ -261,8 +263,6 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
             "the class rate needs a disturbance that starts at 0. Received a constant one of "
             f"{given.constant!r} m/s^2. Use the class amplitude."
         )
-    import sympy as sp
-
     stage = sp.Symbol("s")
     shape = sp.Poly(fault.reference.shape(stage), stage).all_coeffs()[::-1]
     return Task(

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from quakedesign.controllers import Controller
@@ -165,8 +166,6 @@ class Problem:
     @cached_property
     def program(self) -> Program:
         """One step for all samples."""
-        import casadi as ca
-
         before = ca.SX.sym("z", self._watched.size)
         step = ca.Function(STEP, [before], [self._watched.advance(before, self.method)])
         return Program.of(step, self._watched.index("diverged"))
@@ -192,8 +191,6 @@ class Problem:
 
     def results(self, ends: "Sequence[np.ndarray]") -> list[SampleResult]:
         """What the vectors at the end tell."""
-        import casadi as ca
-
         vector = ca.SX.sym("z", self._watched.size)
         observe = ca.Function("observe", [vector], [self._watched.observe(vector)])
         return [self._result(observe(end).full().ravel()) for end in ends]

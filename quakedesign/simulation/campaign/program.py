@@ -10,6 +10,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from quakedesign.simulation.backend import Backend, compiler, ladder, shared_library
@@ -110,8 +111,6 @@ class Program:
     @classmethod
     def of(cls, step: Any, diverged: int) -> "Program":
         """Program of a CasADi Function that maps the vector one step on."""
-        import casadi as ca
-
         generator = ca.CodeGenerator("steps.c")
         generator.add(step)
         sizes = {
@@ -171,8 +170,6 @@ def _machine_code(content: bytes, folder: Path, size: int) -> Mover:
 
 
 def _virtual_machine(program: Program) -> Mover:
-    import casadi as ca
-
     rungs = ladder(ca.Function.deserialize(program.function))
     advancer = Advancer.of(Backend(rungs, "virtual-machine", ""), [0.0] * program.size)
     alone = Lock()  # threads share the advancer

@@ -8,6 +8,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
@@ -201,8 +203,6 @@ class _Runner:
         return [None if end is None else next(found) for end in ends]
 
     def _compute(self, starts: "list[np.ndarray]", names: list[str], what: str, total: int) -> None:
-        import numpy as np
-
         size = self._batch_size(len(starts))
         batches = {first: np.array(starts[first : first + size]) for first in range(0, len(starts), size)}
         done = total - len(starts)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import casadi as ca
 import numpy as np
 
 from quakedesign.errors import ParameterError
@@ -66,8 +67,6 @@ class AdaptiveIntegrator(ABC):
         ParameterError
             For another tolerance.
         """
-        import casadi as ca
-
         require_tolerance(rtol)
         size, count = rates.size1_in(1), rates.size1_in(2)
         start, length = ca.SX.sym("start"), ca.SX.sym("length")

@@ -1,10 +1,14 @@
 """Programmes stated in cvxpy and solved by Clarabel: once, or compiled and solved again with other Parameters."""
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from types import SimpleNamespace
 from typing import Any
+
+import numpy as np
+from scipy import sparse
 
 from quakedesign.sos.solve.moment import MomentProgram, options, pairs, useful
 
@@ -48,8 +52,6 @@ def hand_back(problem: Any) -> None:
 
 def solve(problem: Any, **chosen: Any) -> bool:
     """Run Clarabel; whether there is an answer worth looking at. Its status is no verdict."""
-    import warnings
-
     import cvxpy as cp
 
     hand_back(problem)
@@ -112,8 +114,6 @@ def in_cones(shapes: Sequence[MomentProgram], moments: Any) -> list[Any]:
     Blocks of one size are one constraint, which compiles some ten times faster than one for every block.
     """
     import cvxpy as cp
-    import numpy as np
-    from scipy import sparse
 
     triangles = sparse.block_diag([shape.triangles() for shape in shapes], format="csr")
     relations = sparse.block_diag([shape.relations() for shape in shapes], format="csr")

@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from importlib.metadata import version
 from math import comb
 from time import perf_counter
 from typing import Any
 
 from quakedesign.errors import PolynomialError, WorkError
+from quakedesign.rationals import rational
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.polynomial import (
     Polynomial,
@@ -18,9 +20,11 @@ from quakedesign.sos.exact.polynomial import (
     product,
     square_factor,
 )
-from quakedesign.sos.exact.proofs import Proof, SumOfSquares
+from quakedesign.sos.exact.proofs import Proof, SumOfSquares, multiplier_is_positive
+from quakedesign.sos.exact.reading import read
 from quakedesign.sos.exact.squares import as_element, as_polynomial, in_echelon_form
 from quakedesign.sos.exact.statement import Statement, statement
+from quakedesign.sos.solve.decide import Search, block_sizes
 
 _GROWTH = (0, 2)
 _LARGEST_RETRY = 60  # monomials in a basis, so that a second attempt ends in seconds
@@ -102,8 +106,6 @@ def decide(asked: Statement) -> Answer:
     PolynomialError
         When the multiplier is not shown to be positive.
     """
-    from quakedesign.sos.solve.decide import Search, block_sizes
-
     squares = _squares_of_multiplier(asked)
     start = perf_counter()
     proof: Proof | None
@@ -147,20 +149,14 @@ def _by_square_factor(asked: Statement) -> SumOfSquares | None:
 
 
 def _versions() -> dict[str, str]:
-    from importlib.metadata import version
-
     return {name: version(name) for name in ("quakedesign", "clarabel", "python-flint")}
 
 
 def _read(polynomial: Any, on: Sequence[Any], multiplier: Any, variables: Sequence[Any] | None) -> Any:
-    from quakedesign.sos.exact.reading import read
-
     return read(polynomial, on, multiplier, variables)
 
 
 def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:
-    from quakedesign.rationals import rational
-
     amount = rational(margin, "margin")
     if not amount:
         return polynomial
@@ -191,8 +187,6 @@ def _multipliers(polynomial: Any, factor: Any, inequalities: Any, equalities: An
 
 def _squares_of_multiplier(asked: Statement) -> Any:
     """The multiplier as a sum of squares, unless its coefficients show that it is positive."""
-    from quakedesign.sos.exact.proofs import multiplier_is_positive
-
     if multiplier_is_positive(asked, ()):
         return ()
     own = statement(

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
+from scipy.linalg import qr
 
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, evaluate, monomial
@@ -178,8 +179,6 @@ def at_kernels(
 
 def _kernel(block: Block, gram: Any, threshold: float, tolerance: float, scale: Sequence[Fraction]) -> list[Row]:
     """Rational basis of the eigenspace of small eigenvalues, in the simplest fractions of the unscaled variables."""
-    from scipy.linalg import qr
-
     values, vectors = np.linalg.eigh(gram)
     space = vectors[:, values < threshold].T
     if not len(space):

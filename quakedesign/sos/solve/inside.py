@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.optimize import linprog
 
 from quakedesign.sos.exact.polynomial import degree
 from quakedesign.sos.exact.statement import Statement
@@ -86,8 +87,6 @@ def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[flo
 
 def _into(statement: Statement, point: Any) -> Any:
     """Direction, of largest coordinate at most 1, along which the slowest active constraint grows the fastest."""
-    from scipy.optimize import linprog
-
     rows = []
     for g in (Arrays(g, len(point)) for g in statement.inequalities):
         slope = g.gradient(point)

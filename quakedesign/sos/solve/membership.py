@@ -10,6 +10,7 @@ from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.polynomial import Exponents
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.decide import initial_blocks
+from quakedesign.sos.solve.engine import decide
 from quakedesign.sos.solve.moment import MomentProgram
 from quakedesign.sos.solve.rounding import relations
 
@@ -52,6 +53,4 @@ class Membership:
 
     def prove(self, polynomial: Mapping[Exponents, Fraction]) -> Answer:
         """Exact answer for one of the polynomials."""
-        from quakedesign.sos.solve.engine import decide
-
         return decide(replace(self.template, polynomial=dict(polynomial)))

@@ -13,6 +13,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from quakedesign.sos.exact.polynomial import Exponents
 
@@ -146,8 +147,6 @@ class MomentProgram:
 
         The unknowns are the values of L and one more; `more` has further entries.
         """
-        from scipy import sparse
-
         rows, columns, values, diagonal = self.localizing
         first = equations + limits
         size = sum(s.size * (s.size + 1) // 2 for s in self.blocks)
@@ -184,8 +183,6 @@ class MomentProgram:
 
     def triangles(self) -> Any:
         """Sparse map from L to the upper triangles of all localizing matrices, column by column, below each other."""
-        from scipy import sparse
-
         rows, columns, values, diagonal = self.localizing
         plain = np.where(np.isin(rows, diagonal), values, values / np.sqrt(2.0))
         size = sum(s.size * (s.size + 1) // 2 for s in self.blocks)
@@ -193,8 +190,6 @@ class MomentProgram:
 
     def relations(self) -> Any:
         """Sparse map from L to its values at the multiples of the equalities."""
-        from scipy import sparse
-
         rows, columns, values = self.relation_entries
         return sparse.csr_array((values, (rows, columns)), shape=(self.relation_count, len(self.keys)))
 
@@ -224,15 +219,11 @@ _USEFUL = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
 
 
 def _zero(size: int) -> Any:
-    from scipy import sparse
-
     return sparse.csc_matrix((size, size))
 
 
 def _localizing(blocks: Sequence[Shape], entries: list[Any], where: Any, width: int) -> Any:
     """Rows, columns and values of all localizing matrices below each other, and the rows of their diagonals."""
-    from scipy import sparse
-
     rows, columns, values, diagonal = [], [], [], []
     start = first = 0
     for block, (exponents, factors) in zip(blocks, entries, strict=True):
@@ -312,8 +303,6 @@ def _entries(block: Shape) -> Any:
 
 def _congruence(face: Any) -> Any:
     """Sparse map from the scaled triangle of M to that of F M Fᵀ."""
-    from scipy import sparse
-
     face = np.asarray(face, dtype=float)
     a, b = pairs(face.shape[0])
     i, j = pairs(face.shape[1])

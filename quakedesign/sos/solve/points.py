@@ -6,6 +6,7 @@ from itertools import chain, islice, product
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize
 
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, evaluate
 from quakedesign.sos.exact.proofs import Point, holds
@@ -49,8 +50,6 @@ def local_minima(
 
 
 def _on_sphere(statement: Statement, hints: Any, starts: int) -> Iterator[list[float]]:
-    from scipy.optimize import minimize
-
     size = len(statement.variables)
     p = statement.polynomial
     top = degree(p)
@@ -110,8 +109,6 @@ def _unit(size: int, index: int) -> Exponents:
 
 
 def _constrained(statement: Statement, hints: Any, starts: int) -> Iterator[list[float]]:
-    from scipy.optimize import minimize
-
     size = len(statement.variables)
     p = Arrays(statement.polynomial, size)
     limits = [("ineq", Arrays(g, size)) for g in statement.inequalities]

@@ -6,12 +6,13 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
 
 from quakedesign.errors import PolynomialError
 from quakedesign.rationals import nearest, rational
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.definiteness import positive_definite
-from quakedesign.sos.exact.polynomial import Exponents, combination, degree
+from quakedesign.sos.exact.polynomial import Exponents, combination, degree, times
 from quakedesign.sos.exact.reading import read
 from quakedesign.sos.exact.statement import Statement, statement
 from quakedesign.sos.solve.conic import Compiled, solve
@@ -302,8 +303,6 @@ def _membership(vector: Any, parts: Sequence[Mapping[Any, Any]], template: State
 
 
 def _map(block: Block) -> list[tuple[Exponents, int, int, float]]:
-    from quakedesign.sos.exact.polynomial import times
-
     found = []
     for i, left in enumerate(block.monomials):
         for j, right in enumerate(block.monomials):
@@ -313,8 +312,6 @@ def _map(block: Block) -> list[tuple[Exponents, int, int, float]]:
 
 
 def _sparse(entries: Any, index: Mapping[Exponents, int], size: int) -> Any:
-    from scipy.sparse import coo_array
-
     rows = [index[e] for e, _, _, _ in entries]
     columns = [i + j * size for _, i, j, _ in entries]
     return coo_array(([c for *_, c in entries], (rows, columns)), shape=(len(index), size * size)).tocsr()

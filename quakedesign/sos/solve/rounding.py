@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
+from scipy.linalg import qr
 
 from quakedesign.rationals import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, product, times
@@ -142,8 +143,6 @@ class _System:
 
     def _choose(self) -> Any:
         """Independent rows and columns, by pivoted QR, with the exact square matrix between them."""
-        from scipy.linalg import qr
-
         keys = sorted({e for c in self.columns for e in c})
         self.rows = {e: i for i, e in enumerate(keys)}
         dense = np.zeros((len(keys), len(self.columns)))

@@ -6,6 +6,7 @@ from math import factorial, prod
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligation
@@ -36,7 +37,6 @@ class Cones:
 
     def __init__(self, rows: Sequence[Row], loop: Loop, monomials: Sequence[Term], scale: Sequence[Fraction]) -> None:
         import cvxpy as cp
-        from scipy import sparse
 
         shapes = [shape_of(_template(row, loop, scale)) for row in rows]
         starts = np.cumsum([0, *(len(s.keys) for s in shapes)])

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from fractions import Fraction
 
+import sympy as sp
+
 from quakedesign.certificates import Loop
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import fraction_of
@@ -32,8 +34,6 @@ def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fractio
     ParameterError
         When the terms do not determine the exponents.
     """
-    import sympy as sp
-
     names = (*loop.gains, *loop.states, *loop.lifts)
     unknown = {name: sp.Dummy(name) for name in names}
     known = {name: sp.Integer(sizes.get(name, 0)) for name in (*loop.uncertain, *loop.constants)}

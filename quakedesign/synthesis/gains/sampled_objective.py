@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.premises import coefficient_range, least_authority
@@ -198,8 +199,6 @@ def _tried(
     trial: Sampling, asked: Question, begin: Sequence[Fraction], rounds: int
 ) -> dict[float, tuple[Fraction, ...]]:
     """Screened gains by their errors, from some gains on."""
-    from scipy.optimize import minimize
-
     base = {name: float(k) for name, k in zip(asked.loop.gains, begin, strict=True)}
     free = [name for name, k in base.items() if k]
     setting = replace(asked.setting, degree=asked.degrees[-1])

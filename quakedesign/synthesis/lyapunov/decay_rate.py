@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from scipy.optimize import nnls
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.claim import unit_ranges
@@ -132,8 +133,6 @@ def _lifted(points: Any, one: Obligation) -> Any:
 
 def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
     """Linear form with coefficients ≥ 0 next to the m-th root of a form, in the mean of the squared shares."""
-    from scipy.optimize import nnls
-
     points = _points(potential, m)
     wanted = np.maximum(_values(potential, points), 1e-300) ** (1 / m)
     coefficients, _ = nnls(points / wanted[:, None], np.ones(len(points)))

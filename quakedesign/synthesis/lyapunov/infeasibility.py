@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
+from scipy.optimize import linprog
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligation, Obligations
@@ -192,8 +193,6 @@ class _Search:
 
     def best(self) -> tuple[float, Any]:
         """Largest margin t with line·a ≥ t on all lines and |a_j| ≤ 1, and a."""
-        from scipy.optimize import linprog
-
         A = np.hstack([-np.array(self.lines), np.ones((len(self.lines), 1))])
         count = A.shape[1] - 1
         cost = [*[0.0] * count, -1.0]
@@ -218,8 +217,6 @@ class _Search:
 
     def exact(self) -> Dual | None:
         """Weights of a basic solution, solved for exactly."""
-        from scipy.optimize import linprog
-
         A = np.vstack([np.array(self.lines).T, np.ones(len(self.lines))])
         b = np.array([*[0.0] * (len(A) - 1), 1.0])
         found = linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=b, bounds=(0, None), method="highs-ds")

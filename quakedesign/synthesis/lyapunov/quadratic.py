@@ -4,6 +4,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligations
@@ -36,8 +37,6 @@ def quadratic_margin(loop: Loop, lyapunov: tuple[Term, ...]) -> Fraction:
 
 def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
     """Largest a with V' ≤ −2aV at every vertex, for a quadratic V; floating point, may be negative."""
-    from scipy.linalg import eigh
-
     obligations = Obligations(loop, lyapunov)
     size = len(loop.states)
     V = quadratic_matrix(loop, lyapunov)

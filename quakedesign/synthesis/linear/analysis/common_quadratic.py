@@ -7,6 +7,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
 
 from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
 from quakedesign.certificates.linear_premises import Sectors
@@ -77,8 +78,6 @@ class CommonQuadratic:
         return Proposal(form=self.scaling.back(form), rate=self._decay(form) * self.scaling.pace)
 
     def _decay(self, form: Any) -> float:
-        from scipy.linalg import eigh
-
         return min(float(eigh(-(A.T @ form + form @ A), 2 * form, eigvals_only=True)[0]) for A in self.systems)
 
     def fastest(self, tolerance: float = 1e-3) -> Proposal | None:

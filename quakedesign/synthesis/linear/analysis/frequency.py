@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
 
@@ -56,8 +57,6 @@ def circle_limit(loop: ErrorLoop, beta: Fraction, rate: Fraction, least: Fractio
     1/max Re G(jω) of G(z) = z²/(characteristic polynomial with s = least): for one sector and a constant β no quadratic
     V does better (Yakubovich, Kalman, Popov).
     """
-    from scipy.optimize import minimize_scalar
-
     a3, a2, a1, a0 = (float(c) for c in characteristic(loop, beta, least, rate))
     scale = max(abs(a3), abs(a2) ** 0.5, abs(a1) ** (1 / 3), abs(a0) ** 0.25)
 

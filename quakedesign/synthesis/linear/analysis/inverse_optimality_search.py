@@ -11,7 +11,9 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
+import mpmath
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from quakedesign.synthesis.linear.analysis.inverse_optimality_problem import NOTHING, Question
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, diagonal, total
@@ -64,8 +66,6 @@ def _margin(question: Question, split: Fraction, sizes: Sequence[Fraction]) -> f
 
 def _best_split(question: Question) -> Fraction:
     """Split with the largest margin; the margin is concave in it."""
-    from scipy.optimize import minimize_scalar
-
     if question.fixed_bound is not None:
         return Fraction(1, 2)
 
@@ -82,8 +82,6 @@ def _best_split(question: Question) -> Fraction:
 
 def _factor(moments: Sequence[Fraction]) -> list[Fraction] | None:
     """L = (l2, l3, l1, l0) with π(−z²) = ℓ(z)ℓ(−z), ℓ = l3z³ + l2z² + l1z + l0 stable; None without such a factor."""
-    import mpmath
-
     with mpmath.workdps(_DIGITS):
         square, cube, line, constant = (mpmath.mpf(v.numerator) / v.denominator for v in moments)
         if cube <= 0 or constant <= 0:

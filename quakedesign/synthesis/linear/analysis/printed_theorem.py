@@ -11,6 +11,7 @@ from fractions import Fraction
 from typing import Any
 
 from flint import arb, arb_mat, fmpq
+from scipy.optimize import minimize_scalar
 
 from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.certificates.premises import least_authority, plant_ranges
@@ -195,8 +196,6 @@ def printed_design(example: Example) -> ExactDesign:
 
 def corrected_design(example: Example) -> ExactDesign:
     """K and Θ with the sound bound, Q = Q0 + R·W, the split of W chosen for the smallest trace of Θ."""
-    from scipy.optimize import minimize_scalar
-
     bounds = example.problem.bounds
 
     def design(split: float) -> ExactDesign:

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
+from scipy.optimize import minimize_scalar
+
 from quakedesign.synthesis.linear.design.nondimensional import sound_bound
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 
@@ -45,8 +47,6 @@ def smallest_gain(problem: LinearProblem) -> SmallestGain:
     problem : LinearProblem
         In SI.
     """
-    from scipy.optimize import minimize_scalar
-
     g1, g2 = problem.bounds
     pace = math.sqrt(abs(float(problem.stiffness))) or 1.0
 

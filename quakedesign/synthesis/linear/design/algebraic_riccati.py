@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_continuous_lyapunov
 
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.plant import rational_matrices as matrices
@@ -106,8 +107,6 @@ def _propose(a: Matrix, g: Matrix, q: Matrix) -> Any:
 
 def _refined(a: Matrix, g: Matrix, q: Matrix, proposal: Any) -> tuple[Matrix, Fraction]:
     """Newton steps, Lyapunov equations in floating point, residuals exact; the best X and its relative residual."""
-    from scipy.linalg import solve_continuous_lyapunov
-
     best = rounded(proposal, 100)
     least = relative_residual(a, g, q, best)
     closed = np.array([[float(v) for v in row] for row in matrices.total(a, times(-1, product(g, best)))])

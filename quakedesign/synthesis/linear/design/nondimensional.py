@@ -7,6 +7,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq, minimize_scalar
 
 from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.errors import ParameterError
@@ -77,8 +78,6 @@ class ScaledDesign:
 
     def best_split(self, R: float) -> float:
         """Split of W with the smallest trace of S, to six digits; 1/2 where one of the bounds is 0."""
-        from scipy.optimize import minimize_scalar
-
         if min(self.g) == 0:
             return 0.5
         best = minimize_scalar(
@@ -150,8 +149,6 @@ def vertex_poles(needed: Sectors, gains: Sequence[float | Fraction]) -> list[com
 
 def _root(excess: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
     """Zero of a decreasing function, or the end that is nearest to one."""
-    from scipy.optimize import brentq
-
     if excess(low) <= 0:
         return low
     if excess(high) >= 0:

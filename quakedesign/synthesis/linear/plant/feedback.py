@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+import sympy as sp
+
 from quakedesign.certificates.linear_premises import rest_pressure
 from quakedesign.controllers.elqr import FEEDBACKS
 from quakedesign.fault import Fault
@@ -89,8 +91,6 @@ def lag_coefficient(problem: LinearProblem, gains: Sequence[Fraction], vertex: V
 
 def largest_reference_acceleration(fault: Fault) -> float:
     """Rigorous to rounding: max |r̈| [m/s²] of the reference, from the zeros of its third derivative."""
-    import sympy as sp
-
     stage = sp.Symbol("s", nonnegative=True)
     shape = fault.reference.shape(stage)
     bend, turns = sp.diff(shape, stage, 2), sp.solve(sp.diff(shape, stage, 3), stage)

@@ -7,6 +7,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from scipy.linalg import matrix_balance
 
 from quakedesign.certificates import Loop
 from quakedesign.certificates.linear_premises import Sectors
@@ -173,8 +174,6 @@ def modal_scaling(polytope: Polytope, entries: Sequence[Sequence[float]]) -> Mod
     entries : sequence of sequence of float
         Columns through which the disturbances, or the uncertainty, enter.
     """
-    from scipy.linalg import matrix_balance
-
     modes, moduli = _modes(np.mean(polytope.floats(), axis=0))
     pace, poles = float(moduli.max()), moduli / moduli.max()
     modes = modes / np.linalg.norm(np.linalg.solve(modes, np.asarray(entries, dtype=float).T), axis=1).max()

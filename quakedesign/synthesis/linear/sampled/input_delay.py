@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quakedesign.rationals import rational
 from quakedesign.sos.solve.conic import hand_back
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Scales, Vertex
@@ -132,7 +134,6 @@ def _weight_outside(W: Rows, scales: Scales) -> Matrix:
 def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> list[Any]:
     """P and W with the largest margin, in units in which all parts of the law are as large."""
     import cvxpy as cp
-    import numpy as np
 
     units = balanced_units(K)
     outer = (units[0], units[2], law_unit(K, units))
@@ -172,8 +173,6 @@ def solved(program: Any, margin: Any) -> bool:
 
 def scaled(matrix: Rows, rows: Iterable[Fraction], columns: Iterable[Fraction]) -> Any:
     """Matrix in other units of its rows and columns, in floating point."""
-    import numpy as np
-
     across = np.array([float(u) for u in columns]) / np.array([[float(u)] for u in rows])
     return np.array([[float(v) for v in row] for row in matrix]) * across
 

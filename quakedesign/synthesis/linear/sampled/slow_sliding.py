@@ -12,6 +12,8 @@ from math import exp
 from typing import Any
 
 import numpy as np
+import sympy as sp
+from scipy.linalg import LinAlgError, expm, solve_discrete_are
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
@@ -146,15 +148,11 @@ def _flow(seen: Any, layer: Layer | None, modes: int) -> Any:
 
 
 def _exponential(matrix: Any) -> Any:
-    from scipy.linalg import expm
-
     return expm(matrix)
 
 
 def _gains(update: list[list[Fraction]], seen: Any, w: Weights) -> tuple[list[Fraction], list[Fraction]]:
     """LQ gains on (x, z, modes), and how the observer corrects x, z and the level."""
-    from scipy.linalg import LinAlgError, solve_discrete_are
-
     moved = np.array(update, dtype=float)
     size = len(moved) - 1
     cost = np.outer(seen[:size], seen[:size]) + np.diag([w.slip, w.state, *[0.0] * (size - 2)]) + _LEAST * np.eye(size)
@@ -202,14 +200,10 @@ def _law(
 
 
 def _sympy(value: Fraction) -> Any:
-    import sympy as sp
-
     return sp.Rational(value.numerator, value.denominator)
 
 
 def _number(expression: Any) -> Fraction:
     """Rational near a SymPy number; itself if it is rational."""
-    import sympy as sp
-
     value = expression if expression.is_Rational else sp.N(expression, 30)
     return fraction_of(value) if value.is_Rational else rational(str(value))

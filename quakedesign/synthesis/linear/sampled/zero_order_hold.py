@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat, fmpq
+from scipy.linalg import expm
 
 from quakedesign.errors import ParameterError
 
@@ -104,8 +105,6 @@ def held_matrix(step: float, beta: float, s: float, w: float, push: Sequence[flo
 
 def held_plant(step: float, s: float, w: float, integration: str = "exact") -> tuple[Any, Any]:
     """F (4 × 4) and G (4) of x⁺ = Fx + G·u for an acceleration u held over a step [s]."""
-    from scipy.linalg import expm
-
     chain = np.zeros((5, 5))
     chain[0, 1], chain[1, :2], chain[1, 4], chain[2, 0], chain[3, 2] = 1, (s, -w), 1, 1, 1
     if integration == "euler":
