@@ -15,6 +15,8 @@ from quakedesign.fault import FrictionLaw
 from quakedesign.loop.actuators import SampledStage
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.sensing import Sensor, SlipStage
+from quakedesign.sos.exact.proofs import Square, SumOfSquares
+from quakedesign.sos.solve.methods.base import Method
 
 X1, X2, XI, K1, K2, K3, BETA, S, W, B = sp.symbols("x1 x2 xi k1 k2 k3 beta s w b", real=True)
 
@@ -182,3 +184,17 @@ class Backward(Sensor):
     @property
     def software(self):
         return self
+
+
+class Monomials(Method):
+    """c·x^2k as one square."""
+
+    name: ClassVar[str] = "monomials"
+    order: ClassVar[int] = 0
+
+    def propose(self, asked):
+        (power, coefficient), *more = asked.target.items()
+        if more or any(n % 2 for n in power):
+            return None
+        half = tuple(n // 2 for n in power)
+        return SumOfSquares(squares=(Square(basis=(half,), gram=(coefficient,)),), cofactors=())

@@ -14,17 +14,15 @@ from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.polynomial import (
     Polynomial,
     combination,
-    constant,
     degree,
     from_sympy,
     product,
-    square_factor,
 )
-from quakedesign.sos.exact.proofs import Proof, SumOfSquares, multiplier_is_positive
+from quakedesign.sos.exact.proofs import SumOfSquares, multiplier_is_positive
 from quakedesign.sos.exact.reading import read
-from quakedesign.sos.exact.squares import as_element, as_polynomial, in_echelon_form
 from quakedesign.sos.exact.statement import Statement, statement
-from quakedesign.sos.solve.decide import Search, block_sizes
+from quakedesign.sos.solve.decide import block_sizes
+from quakedesign.sos.solve.methods import methods
 
 _GROWTH = (0, 2)
 _LARGEST_RETRY = 60  # monomials in a basis, so that a second attempt ends in seconds
@@ -106,46 +104,21 @@ def decide(asked: Statement) -> Answer:
     PolynomialError
         When the multiplier is not shown to be positive.
     """
-    squares = _squares_of_multiplier(asked)
-    start = perf_counter()
-    proof: Proof | None
-    if not asked.target:
-        proof = SumOfSquares(squares=(), cofactors=tuple({} for _ in asked.equalities))
-    else:
-        proof = _by_square_factor(asked) or Search(asked).run()
-    if isinstance(proof, SumOfSquares):
-        proof = replace(proof, multiplier=squares)
-    answer = Answer(
-        statement=asked,
-        proof=proof,
-        blocks=block_sizes(asked),
-        seconds=perf_counter() - start,
-        versions=_versions(),
-    )
+    squares, start = _squares_of_multiplier(asked), perf_counter()
+    none = Answer(statement=asked, proof=None, blocks=block_sizes(asked), versions=_versions())
+    nothing = SumOfSquares(squares=(), cofactors=tuple({} for _ in asked.equalities))
+    proposed = (method.propose(asked) for method in methods()) if asked.target else (nothing,)
+    multiplied = (replace(p, multiplier=squares) if isinstance(p, SumOfSquares) else p for p in proposed)
+    answers = (replace(none, proof=proof) for proof in multiplied if proof is not None)
+    return replace(next(filter(_decides, answers), none), seconds=perf_counter() - start)
+
+
+def _decides(answer: Answer) -> bool:
+    """Whether a proof is one, as far as it can be checked with limited work."""
     try:
-        decided = answer.check()
+        return answer.check()
     except WorkError:
-        decided = False
-    return answer if decided else replace(answer, proof=None)
-
-
-def _by_square_factor(asked: Statement) -> SumOfSquares | None:
-    """Proof for s²·r from one for r, where the polynomial has a square factor; None if that leads to none."""
-    root, rest = square_factor(asked.target, len(asked.variables))
-    size = degree(root)
-    if not size or 2 * size > asked.degree:
-        return None
-    one = constant(len(asked.variables))
-    inner = decide(replace(asked, polynomial=rest, multiplier=one, degree=asked.degree - 2 * size)).proof
-    if not isinstance(inner, SumOfSquares):
-        return None
-    count = len(asked.variables)
-    squares = tuple(
-        in_echelon_form(replace(s, basis=tuple(as_element(product(count, (root, as_polynomial(b)))) for b in s.basis)))
-        for s in inner.squares
-    )
-    cofactors = tuple(product(count, (root, root, q)) for q in inner.cofactors)
-    return SumOfSquares(squares=squares, cofactors=cofactors)
+        return False
 
 
 def _versions() -> dict[str, str]:

@@ -1,0 +1,57 @@
+"""What every way to a proof must keep, those of users included."""
+
+from fractions import Fraction
+
+import pytest
+from own_parts import Monomials
+
+from quakedesign.sos import Positivity, prove
+from quakedesign.sos.exact.answer import Answer
+from quakedesign.sos.exact.proofs import Square, SumOfSquares
+from quakedesign.sos.solve import engine
+from quakedesign.sos.solve.methods import methods
+from quakedesign.sos.solve.methods.base import Method
+
+ALL = {method.name: method for method in (*methods(), Monomials())}
+POSITIVE = ("3*x^4*y^2", "x^2 + 1", "x^4 - 2*x^2 + 1", "(x - y)^2*(x^2 + 1)", "x^2*y^2 + x^2 + y^2")
+OTHERS = ("-x^2", "x^3", "x^4*y^2 + x^2*y^4 + 1 - 3*x^2*y^2", "x^2 - 1")
+
+
+def asked(text):
+    return prove(text).statement
+
+
+def test_they_are_tried_in_order():
+    assert [method.name for method in methods()] == ["square-factor", "conic"]
+
+
+@pytest.mark.parametrize("text", [*POSITIVE, *OTHERS])
+@pytest.mark.parametrize("name", ALL)
+def test_what_is_proposed_is_a_proof_of_what_was_asked_or_refused(name, text):
+    question = asked(text)
+    proof = ALL[name].propose(question)
+    answer = Answer(statement=question, proof=proof)
+    assert answer.check() or text in OTHERS
+    if text in OTHERS and answer.check():
+        assert answer.verdict is not Positivity.SOS
+
+
+def test_a_method_of_ones_own_is_one_class(monkeypatch):
+    monkeypatch.setattr(engine, "methods", lambda: (Monomials(),))
+    assert prove("3*x^4*y^2").verdict is Positivity.SOS
+    assert prove("-3*x^4*y^2").verdict is prove("x^2 + 1").verdict is Positivity.UNDECIDED
+
+
+def test_one_that_claims_too_much_changes_no_verdict(monkeypatch):
+    class Bold(Method):
+        name, order = "bold", -1
+
+        def propose(self, asked):
+            """That the polynomial is one, whatever it is."""
+            one = Square(basis=((0,) * len(asked.variables),), gram=(Fraction(1),))
+            return SumOfSquares(squares=(one,), cofactors=())
+
+    honest = {text: prove(text).verdict for text in (*POSITIVE, *OTHERS)}
+    monkeypatch.setattr(engine, "methods", lambda: (Bold(), *methods()))
+    assert {text: prove(text).verdict for text in honest} == honest
+    assert honest["x^2 - 1"] is not Positivity.SOS
