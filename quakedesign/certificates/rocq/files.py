@@ -11,6 +11,7 @@ from quakedesign.certificates.guarantee.files import is_guarantee
 from quakedesign.certificates.obligations import claimed, different
 from quakedesign.certificates.rocq import gallina
 from quakedesign.certificates.rocq.integers import in_integers
+from quakedesign.certificates.rocq.loops import loop_theorems
 from quakedesign.certificates.rocq.multipliers import reason
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.errors import OutputError, UnsupportedError
@@ -21,7 +22,7 @@ from quakedesign.sos.exact.polynomial import evaluate
 from quakedesign.sos.exact.proofs import Point, SumOfSquares
 from quakedesign.sos.exact.statement import Statement
 
-_LIBRARY = ("squares.v", "positivity.v")
+_LIBRARY = ("squares.v", "positivity.v", "loops.v")
 _DATA = "(* " + "=" * 16 + " the certificate *)\n\nLocal Open Scope nat_scope.\n"
 
 
@@ -128,7 +129,7 @@ def _negative(asked: Statement, proof: Point) -> Iterator[str]:
     yield f"Definition point : list Q := {gallina.listed(map(gallina.rational, proof.coordinates))}."
     values = (evaluate(p, proof.coordinates) for p in (asked.polynomial, *asked.inequalities))
     yield f"Definition values : list Q := {gallina.listed(map(gallina.rational, values))}."
-    yield _accepted("negative asked point values")
+    yield gallina.accepted("negative asked point values")
     yield (
         "Theorem certificate :\n"
         "  within (real_point point) asked /\\ (at_point (real_point point) (target asked) < 0)%R.\n"
@@ -140,15 +141,11 @@ def _nonnegative(asked: Statement, proof: SumOfSquares) -> Iterator[str]:
     why = reason(asked, proof.multiplier)
     yield f"Definition proof : witness := {gallina.witness(in_integers(asked, proof.squares, proof.cofactors))}."
     yield f"Definition why : reason := {gallina.reason(why)}."
-    yield _accepted("nonnegative asked proof why")
+    yield gallina.accepted("nonnegative asked proof why")
     yield (
         "Theorem certificate : forall x, within x asked -> (0 <= at_point x (target asked))%R.\n"
         "Proof. exact (nonnegative_sound asked proof why accepted). Qed.\nPrint Assumptions certificate."
     )
-
-
-def _accepted(check: str, name: str = "accepted") -> str:
-    return f"Lemma {name} : {check} = true.\nProof. vm_cast_no_check (eq_refl true). Qed."
 
 
 def _loop(raw: Any) -> Iterator[str]:
@@ -162,13 +159,12 @@ def _loop(raw: Any) -> Iterator[str]:
     for number, (name, text) in enumerate(_obligations(evidence)):
         names.append(number)
         yield f"(* {name} *)\n{text.replace('@', str(number))}"
-    inside = "" if evidence.loop.domain == "reals" else "(forall k, 0 < x k)%R -> "
-    yield (
-        f"Theorem certificate : Forall (fun q => forall x, {inside}within x q -> (0 <= at_point x (target q))%R)\n"
-        f"  {gallina.listed(f'asked_{n}' for n in names)}.\n"
-        f"Proof. exact ({''.join(f'Forall_cons _ holds_{n} (' for n in names)}Forall_nil _{')' * len(names)}). Qed.\n"
-        "Print Assumptions certificate."
-    )
+    on_cells = evidence.loop.domain == "cells"
+    yield f"Definition questions : list question := {gallina.listed(f'asked_{n}' for n in names)}."
+    everywhere = "Forall (fun q => forall x, within x q -> (0 <= at_point x (target q))%R)"
+    proof = f"{''.join(f'Forall_cons _ holds_{n} (' for n in names)}Forall_nil _{')' * len(names)}"
+    yield (f"Theorem certificate : {'all_hold' if on_cells else everywhere} questions.\nProof. exact ({proof}). Qed.")
+    yield from loop_theorems(evidence) if on_cells else ["Print Assumptions certificate."]
 
 
 def _obligations(evidence: Evidence) -> Iterator[tuple[str, str]]:
@@ -188,7 +184,7 @@ def _obligations(evidence: Evidence) -> Iterator[tuple[str, str]]:
                 [
                     f"Definition asked_@ : question := {gallina.question(asked)}.",
                     f"Definition proof_@ : witness := {gallina.witness(proof)}.",
-                    _accepted(f"{check} asked_@ proof_@{tail}", "accepted_@"),
+                    gallina.accepted(f"{check} asked_@ proof_@{tail}", "accepted_@"),
                     f"Definition holds_@ := {sound}.\n",
                 ]
             ),
