@@ -65,6 +65,10 @@ class Experiment(ABC):
     def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
         """Derivatives of `friction`, shape (samples, coordinates)."""
 
+    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+        """What a noise of friction [-] means for what was taken for granted; nothing unless told."""
+        return ()
+
     def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
         """The law with the values of given coordinates."""
         values = {name: v for name, v in self.outward(fitted).items() if name in self.law.quantities()}

@@ -124,7 +124,7 @@ class Fit:
     @cached_property
     def deviations(self) -> "np.ndarray":
         """Standard deviations of what is fitted, from the slopes; infinite where these say nothing."""
-        slopes = self.experiment.slopes(self.fitted)[self.kept]
+        slopes = _finite(self.experiment.slopes(self.fitted))[self.kept]
         scale = np.linalg.norm(slopes, axis=0)
         scale[scale == 0] = 1
         values, turn = np.linalg.svd(slopes / scale, full_matrices=False)[1:]
@@ -224,7 +224,7 @@ def minimised(
     found = least_squares(
         lambda part: residuals(part) / size,
         np.clip(whole[free], np.nextafter(low, high)[free], np.nextafter(high, low)[free]),
-        jac=lambda part: experiment.slopes(at(part))[kept][:, free] / size,
+        jac=lambda part: _finite(experiment.slopes(at(part)))[kept][:, free] / size,
         bounds=(low[free], high[free]),
         x_scale="jac",
         ftol=_SHARE_OF_EXCESS / len(first),
@@ -233,6 +233,12 @@ def minimised(
         max_nfev=steps,
     )
     return at(found.x), float(2 * found.cost * size**2)
+
+
+def _finite(slopes: "np.ndarray") -> "np.ndarray":
+    """Slopes with nothing where they leave the floats, as those of transients that no sample sees can."""
+    found: np.ndarray = np.where(np.isfinite(slopes), slopes, 0.0)
+    return found
 
 
 def settled(fit: Fit, how: Search) -> Fit:

@@ -1,7 +1,7 @@
 """The main call: from a record to friction parameters with their confidence regions."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -101,15 +101,49 @@ def _profiled(record: Record, setup: Setup, best: Fit, seed: int) -> Identificat
         estimates=estimates,
         difference=difference,
         law=best.experiment.best_law(best.fitted),
-        notes=setup.notes,
+        notes=(*setup.notes, *best.experiment.remarks(best.fitted, best.noise)),
         seed=seed,
     )
 
 
 def _estimates(best: Fit) -> dict[str, Estimate]:
-    """Estimates of all coordinates, those of the law first."""
-    places = range(len(best.fitted))
-    return {best.experiment.coordinates[i].name: _estimate(best, i) for i in places}
+    """Estimates of all coordinates, those of the law first.
+
+    Where a law has both effects, profiles are followed in coordinates that hold their difference: where a record tells
+    only that, the valley of equal fits is straight in them.
+    """
+    names = [c.name for c in best.experiment.coordinates]
+    if not set(_PAIR) <= set(names):
+        return {name: _estimate(best, i) for i, name in enumerate(names)}
+    direct, evolution = map(names.index, _PAIR)
+    others_turned = _Turned(best, direct, evolution)
+    first_turned = _Turned(best, evolution, direct)
+    return {name: (first_turned if i == direct else others_turned).estimate(i) for i, name in enumerate(names)}
+
+
+def _difference(best: Fit) -> Estimate | None:
+    """Estimate of the difference of both effects."""
+    names = [c.name for c in best.experiment.coordinates]
+    if not set(_PAIR) <= set(names):
+        return None
+    direct, evolution = map(names.index, _PAIR)
+    return _Turned(best, direct, evolution).estimate(direct)
+
+
+@dataclass(frozen=True)
+class _Turned:
+    """A fit in coordinates with the difference of two in place of the first of them."""
+
+    best: Fit
+    first: int
+    second: int
+
+    def estimate(self, place: int) -> Estimate:
+        turned = Difference(whole=self.best.experiment, first=self.first, second=self.second)
+        try:
+            return _estimate(replace(self.best, experiment=turned, fitted=turned.difference(self.best.fitted)), place)
+        except BetterFit as better:
+            raise BetterFit(turned.whole_of(better.fitted)) from None
 
 
 def _open(told: Estimate) -> Estimate:
@@ -121,16 +155,3 @@ def _estimate(best: Fit, place: int) -> Estimate:
     alone = interval(best, place, best.threshold(1))
     jointly = interval(best, place, best.threshold(len(best.fitted)), inside=alone)
     return estimate(best, place, (alone.low, alone.high), (jointly.low, jointly.high))
-
-
-def _difference(best: Fit) -> Estimate | None:
-    """Estimate of the difference of both effects."""
-    names = [c.name for c in best.experiment.coordinates]
-    if not set(_PAIR) <= set(names):
-        return None
-    first, second = map(names.index, _PAIR)
-    turned = Difference(whole=best.experiment, first=first, second=second)
-    try:
-        return _estimate(replace(best, experiment=turned, fitted=turned.difference(best.fitted)), first)
-    except BetterFit as better:
-        raise BetterFit(turned.whole_of(better.fitted)) from None

@@ -111,18 +111,23 @@ def _sliding(record: Record, law: type[FrictionLaw], stiffness: float | None) ->
     experiment = Sliding(
         law=template,
         drive=drive,
+        normal_unit=record.normal_unit,
         coordinates=tuple(coordinates),
         stiffness=stiffness,
         steps=tuple((length,) for length in lengths.tolist()),
     )
-    notes = (f"the record begins in steady sliding at {first:.4g} m/s", "without inertia")
+    notes = (f"the record begins in steady sliding at {first:.4g} m/s",)
     return Setup(experiment=experiment, used=np.ones(len(record.time), dtype=bool), notes=notes)
 
 
 def _rates(law: type[FrictionLaw], rates: "np.ndarray", first: float) -> dict[str, float]:
     """Rates of a law, which are chosen, not fitted: that of the first sliding, and a range around those of the load."""
     fast = max(float(np.max(rates)), first)
-    chosen = {"reference_rate": first, "slowest_rate": first / _MODERATE, "fastest_rate": fast * _MODERATE}
+    chosen = {
+        "reference_rate": float(f"{first:.6g}"),
+        "slowest_rate": first / _MODERATE,
+        "fastest_rate": fast * _MODERATE,
+    }
     return {name: chosen[name] for name in law.quantities() if name in chosen}
 
 
@@ -168,7 +173,8 @@ def scatter(time: "np.ndarray", values: "np.ndarray") -> float:
 def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
     """Samples after the slip has left the noise about zero for good."""
     assert record.slip is not None
-    resting = np.flatnonzero(record.slip <= _FAR_OFF * scatter(record.time, record.slip))
+    noise = scatter(record.time, record.slip)
+    resting = np.flatnonzero(record.slip <= _FAR_OFF * noise)
     used = np.arange(len(record.slip)) > (resting[-1] if len(resting) else -1)
     if used.sum() < 3 * len(law.quantities()):
         raise RecordError(
@@ -179,7 +185,11 @@ def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
     coordinates = tuple(_coordinate(name, law, record, float(slip.max())) for name in law.quantities())
     template = law(**dict.fromkeys(law.quantities(), 1.0))
     note = f"friction as a function of the measured slip, in {int(used.sum())} samples that slip"
-    return Setup(experiment=MeasuredSlip(law=template, slip=slip, coordinates=coordinates), used=used, notes=(note,))
+    return Setup(
+        experiment=MeasuredSlip(law=template, slip=slip, slip_noise=noise, coordinates=coordinates),
+        used=used,
+        notes=(note,),
+    )
 
 
 def _drawn(record: Record, law: type[FrictionLaw], stiffness: float | None) -> Setup:

@@ -67,6 +67,8 @@ class Sliding(Experiment):
         Logarithmic: the quantities that are fitted, and the stiffness where it is.
     stiffness : float, optional
         Where it is given, in units of normal stress, or of normal force, per m.
+    normal_unit : str
+        ``"Pa"``, ``"N"`` or nothing.
     steps : tuple of tuple of float
         Lengths [s] of the steps that are taken between neighbouring samples.
     """
@@ -75,6 +77,7 @@ class Sliding(Experiment):
     drive: Drive
     coordinates: tuple[Coordinate, ...]
     stiffness: float | None
+    normal_unit: str
     steps: tuple[tuple[float, ...], ...]
 
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
@@ -97,10 +100,22 @@ class Sliding(Experiment):
         found: np.ndarray = np.exp(self._states(fitted)[0, self._sampled])
         return found
 
+    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+        """The mass from which on inertia would have been seen."""
+        rates = self.rates(fitted)
+        acceleration = float(np.max(np.abs(np.diff(rates) / self.drive.lengths * self.drive.compliance)))
+        if not (acceleration > 0 and self.normal_unit):
+            return ()
+        unit = {"Pa": "kg/m^2", "N": "kg"}[self.normal_unit]
+        return (f"without inertia, which reaches the noise for a block of {noise / acceleration:.2g} {unit}",)
+
     def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
-        """The law with a working range, where it has one, twice as wide as the slip rates of the experiment."""
+        """The law with a working range, where it has one, about twice as wide as the slip rates of the experiment."""
         law, rates = Experiment.best_law(self, fitted), self.rates(fitted)
-        ends = {"slowest_rate": float(np.min(rates)) / 2, "fastest_rate": 2 * float(np.max(rates))}
+        ends = {
+            "slowest_rate": float(f"{np.min(rates) / 2:.2g}"),
+            "fastest_rate": float(f"{2 * np.max(rates):.2g}"),
+        }
         return replace(law, **{name: end for name, end in ends.items() if name in law.quantities()})  # type: ignore[type-var]
 
     def resolved(self, fitted: "np.ndarray", accuracy: float) -> "Sliding":

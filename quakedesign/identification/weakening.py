@@ -12,6 +12,7 @@ from quakedesign.identification.experiment import Coordinate, Experiment
 START = "start_friction"
 _MOST_ITERATIONS = 100
 _SMALL = 1e-13
+_SMALL_SHARE = 0.3  # of the noise of friction, that adds 4 % to it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,12 +25,15 @@ class MeasuredSlip(Experiment):
         With any values for what is fitted.
     slip : ndarray
         [m], not negative.
+    slip_noise : float
+        Its standard deviation [m].
     coordinates : tuple of Coordinate
         Logarithmic.
     """
 
     law: FrictionLaw
     slip: "np.ndarray"
+    slip_noise: float
     coordinates: tuple[Coordinate, ...]
 
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
@@ -40,9 +44,14 @@ class MeasuredSlip(Experiment):
         """Derivatives in the logarithms."""
         return self._curve.slopes(self.slip, fitted)
 
-    def per_slip(self, fitted: "np.ndarray") -> "np.ndarray":
-        """dμ/d(slip) [1/m]."""
-        return self._curve.friction(self.slip, fitted)[1]
+    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+        """Whether the noise of the slip, which the fit leaves out, is felt in friction."""
+        felt = float(np.max(np.abs(self._curve.friction(self.slip, fitted)[1]))) * self.slip_noise
+        if felt <= _SMALL_SHARE * noise:
+            return ()
+        return (
+            f"the slip is known exactly, although its noise of {self.slip_noise:.2g} m moves friction by {felt:.2g}",
+        )
 
     @cached_property
     def _curve(self) -> Curve:

@@ -13,6 +13,7 @@ import pytest
 from quakedesign.errors import ParameterError, RecordError
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.identification import Record, cover, identified_fault, identify, save_fault
+from quakedesign.identification.setup import set_up
 from quakedesign.rationals import rational
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
@@ -101,6 +102,23 @@ def test_the_velocity_step_of_rsfmodel_gives_back_its_parameters():
     truth = {"reference_coefficient": 0.6, "direct_effect": 0.005, "evolution_effect": 0.01, "critical_slip": 1e-5}
     assert values == pytest.approx(truth | {"stiffness": 1e3}, rel=1e-4)
     assert found.fit.noise < 2e-7
+
+
+def test_the_mass_from_which_inertia_counts_and_the_noise_of_slip_are_told():
+    """By hand: noise of 5 MPa over the largest change of rate between samples; the steepest friction times 50 µm."""
+    made = synthetic.KINDS["velocity steps, ageing"]()
+    experiment = set_up(made.noisy(0), friction_law(made.law), made.stiffness).experiment
+    truth = experiment.inward([made.true_at(experiment.law.reference_rate)[c.name] for c in experiment.coordinates])
+    change = np.max(np.abs(np.diff(experiment.rates(truth)))) / 0.2
+    (told,) = experiment.remarks(truth, 3e-4)
+    assert f"{3e-4 * synthetic.NORMAL / change:.2g} kg/m^2" in told
+    slipped = synthetic.weakening()
+    measured = set_up(slipped.noisy(0), friction_law(slipped.law), None).experiment
+    at = measured.inward([slipped.truth[c.name] for c in measured.coordinates])
+    assert measured.remarks(at, 2e-3) == ()
+    steepest = 0.17 / 2.5e-3 * np.exp(-measured.slip[0] / 2.5e-3)
+    (felt,) = replace(measured, slip_noise=50e-6).remarks(at, 2e-3)
+    assert f"noise of 5e-05 m moves friction by {steepest * 50e-6:.2g}" in felt
 
 
 def test_the_same_seed_gives_the_same_answer(weak):
