@@ -293,6 +293,15 @@ def test_coqc_accepts_what_holds_and_no_changed_digit(tmp_path):
 
 
 @needs_coqc
+def test_the_comparison_step_is_proved_from_the_same_axioms(tmp_path):
+    text = (CERTIFICATES.parent / "rocq" / "comparison.v").read_text(encoding="utf-8")
+    code, out, err = compiled(text, tmp_path, "comparison")
+    assert (code, err) == (0, "")
+    assert axioms_of(out) == ANALYSIS
+    assert "Admitted" not in text
+
+
+@needs_coqc
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(CERTIFICATES.glob("*.json")), ids=lambda p: p.stem)
 def test_coqc_accepts_the_catalogue(path, tmp_path):
