@@ -25,7 +25,8 @@ class DesignOptions:
     measured
         What the e-LQR that samples is told: slip-and-rate, or slip, from which it estimates the slip rate.
     slip_noise
-        Bound of the error of the slip that it is told, such as '1 um', in its guarantee and in its run.
+        Bound of the error of the slip that it is told, such as '1 um', in its guarantee and in its run. simulate takes
+        a standard deviation by this name.
     rate_noise
         The same of the slip rate.
     scheme

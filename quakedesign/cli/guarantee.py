@@ -60,6 +60,7 @@ def guarantee(
         What the designed e-LQR is told: slip-and-rate, or slip, from which it estimates the slip rate.
     slip_noise
         Bound of the error of the measured slip, whatever its course, such as '1 um'; q/2 for readings in steps of q.
+        simulate takes a standard deviation by this name.
     rate_noise
         The same of the measured slip rate.
     disturbance_class

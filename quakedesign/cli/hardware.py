@@ -111,9 +111,10 @@ class SensorOptions(EstimateOptions):
     Parameters
     ----------
     slip_noise
-        Standard deviation of the measured slip, such as '1 um'.
+        Standard deviation of normal noise of the measured slip, such as '1 um': a third of the readings are off by
+        more. guarantee and design take a bound by this name.
     rate_noise
-        Standard deviation of the measured slip rate, such as '1 um/s', where it is measured.
+        The same of the slip rate, where it is measured, such as '1 um/s'.
     bandwidth
         Of the transducer in front of a differentiator, such as '100 Hz'.
     """

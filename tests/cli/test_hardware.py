@@ -81,6 +81,21 @@ def test_people_see_the_units_of_what_flows(run):
     assert "premise on_trajectory: nothing is certified" in out
 
 
+@pytest.mark.parametrize(("command", "kind", "other"), [
+    ("simulate", "Standard deviation of normal noise of the measured slip", "take a bound by this name"),
+    ("campaign", "Standard deviation of normal noise of the measured slip", "take a bound by this name"),
+    ("guarantee", "Bound of the error of the measured slip", "simulate takes a standard deviation by this name"),
+    ("design", "Bound of the error of the slip", "simulate takes a standard deviation by this name"),
+])  # fmt: skip
+def test_help_says_which_kind_of_number_noise_is(command, kind, other, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert kind in said
+    assert other in said
+
+
 def test_noise_has_units_and_a_seed(run):
     noisy = (*SHORT, "--slip-noise", "1 um", "--rate-noise", "1 mm/s", "--json")
     found = {seed: strict(run(*noisy, "--seed", seed)[1]) for seed in ("0", "1")}
