@@ -19,7 +19,7 @@ from quakedesign.simulation.state_trajectory import StateTrajectory
 
 _ONSET = 10.0
 _SHARE_OF_STRETCH = 1e-3
-_LONGEST = 1e8  # s on one clock, which tells 1.5e-8 s apart
+_LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
 
 
 def simulate_state(

@@ -42,8 +42,10 @@ def test_events_begin_at_the_loading_rate_and_end_at_ten_times_it(cycles):
     assert len(events) == len(cycles.onsets) >= 2
     for event in events[1:]:
         assert event.nucleation < event.onset < event.arrest
-        at = np.interp([event.nucleation, event.onset], cycles.time, np.log(cycles.slip_rate / RATE))
-        assert at == pytest.approx([0.0, math.log(10)], abs=0.02)
+        assert np.interp(event.nucleation, cycles.time, np.log(cycles.slip_rate / RATE)) == pytest.approx(0.0, abs=1e-9)
+        faster = cycles.slip_rate > 10 * RATE
+        assert not np.any(faster[(cycles.time > event.nucleation) & (cycles.time < event.onset)])
+        assert np.all(faster[(cycles.time > event.onset) & (cycles.time < event.arrest)])
         assert np.interp(event.arrest, cycles.time, cycles.slip_rate) == pytest.approx(10 * RATE, rel=1e-6)
         between = (cycles.time > event.nucleation * (1 + 1e-9)) & (cycles.time < event.onset * (1 - 1e-9))
         assert np.all(cycles.slip_rate[between] >= RATE)
@@ -97,22 +99,6 @@ def test_late_in_the_cycle_the_rest_of_the_interval_is_left():
     )
     interval = run.onsets[1] - run.onsets[0]
     assert run.onsets[0] == pytest.approx(0.1 * interval, rel=1e-3)
-
-
-def test_an_earthquake_after_decades_is_resolved_with_inertia():
-    """The second event of the crustal patch begins after 5e9 s, where floats of the time are 1e-6 s apart."""
-    patch, start = load_fault("crustal-patch"), {"start_rate": 3e-12, "start_state": (4.4e9,)}
-    run = simulate_state(patch, RATE, duration=6e9, rtol=1e-6, **start)
-    first, second = slip_events(patch, run, RATE)
-    assert second.onset > 5e9
-    assert second.peak_slip_rate == pytest.approx(first.peak_slip_rate, rel=1e-2)
-    assert second.slip == pytest.approx(first.slip, rel=1e-2)
-
-
-def test_instants_that_are_asked_for_come_back_as_they_are():
-    times = [0.1, 2.3e8 + 0.7, 5.9e8]
-    run = simulate_state(fault(), RATE, duration=5.9e8, start_rate=RATE, times=times, **QUASI)
-    assert run.time.tolist() == times
 
 
 def test_a_fault_that_creeps_has_no_cycle():

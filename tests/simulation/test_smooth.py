@@ -1,0 +1,39 @@
+"""Stiff equations under a ramp against their closed form, however late they begin."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from quakedesign.simulation.smooth import Problem, Ramp
+
+FAST = 1e-5
+
+
+def problem():
+    """y' = load − y/FAST."""
+    y, load = ca.SX.sym("y"), ca.SX.sym("load")
+    rates = load - y / FAST
+    return Problem(ca.Function("rates", [y, load], [rates, ca.jacobian(rates, y)]), np.array([1.0]), 0, 10.0)
+
+
+def follow(times, method, *, every_step=False):
+    load = Ramp(times[0], (3.0,), (2.0,))
+    return problem().integrate(np.array([1.0]), load, np.array(times), every_step=every_step, method=method, rtol=1e-8)
+
+
+@pytest.mark.parametrize("begin", [0.0, 1e12])
+@pytest.mark.parametrize("method", ["radau", "cvodes"])
+def test_steps_may_be_shorter_than_what_floats_of_the_time_tell_apart(begin, method):
+    """Long after the start y = FAST·(3 + 2t) − 2·FAST²; at 1e12 s floats are 1.2e-4 s apart."""
+    found = follow([begin, begin + 0.5, begin + 1.0], method)
+    assert found.time.tolist() == [begin, begin + 0.5, begin + 1.0]
+    expected = [FAST * (3 + 2 * t) - 2 * FAST**2 for t in (0.5, 1.0)]
+    assert found.values[0, 1:] == pytest.approx(expected, abs=1e-7 * FAST)
+
+
+def test_the_last_step_ends_at_the_last_instant():
+    begin, end = 0.1, 0.45
+    found = follow([begin, end], "radau", every_step=True)
+    assert found.time[0] == begin
+    assert found.time[-1] == end
+    assert begin + (end - begin) != end
