@@ -34,7 +34,7 @@ A, B, D, STRESS = 0.011, 0.016, 0.02, 50e6
 
 def fault_with(name, **options):
     kind = friction_law(name)
-    return replace(REAL, friction=kind(**{q: VALUES[q] for q in kind.quantities()}, **options))
+    return replace(REAL, friction=kind(**{q: VALUES[q] for q in kind.quantities() if q in VALUES}, **options))
 
 
 def with_stiffness(fault, stiffness):

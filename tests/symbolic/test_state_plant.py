@@ -32,7 +32,7 @@ THETA = sp.Symbol("theta", real=True)
 
 def law_of(name, **options):
     kind = friction_law(name)
-    return kind(**{q: VALUES[q] for q in kind.quantities()}, **options)
+    return kind(**{q: VALUES[q] for q in kind.quantities() if q in VALUES}, **options)
 
 
 STATEFUL = [
@@ -171,12 +171,13 @@ def test_eigenvalues_cross_where_the_critical_stiffness_says(law, inertia):
                 assert (worst < 0) == (side > 0)
 
 
-@pytest.mark.parametrize("inertia", [True, False])
-def test_the_conditions_of_a_law_with_two_states_agree_with_its_eigenvalues(inertia):
+@pytest.mark.parametrize(("inertia", "plants"), [(True, 18), (False, 40)])
+def test_the_conditions_of_a_law_with_two_states_agree_with_its_eigenvalues(inertia, plants):
+    """So many plants that every condition that ever fails alone does so."""
     law, draw, seen = TwoStates(), random.Random(3), set()
     conditions = state_plant.stability_conditions(law.state_names, inertia=inertia)
     with mpmath.workdps(50):
-        for _ in range(14):
+        for _ in range(plants):
             number = random_plant(draw)
             says = all(inserted(c, law, number) > 0 for c in conditions)
             worst = largest_real_part(differences(*field_of(law, number)), inertia=inertia)
