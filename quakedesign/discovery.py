@@ -1,5 +1,6 @@
 """What stands one a file in a folder, found by looking into it; and what users add, found by its module."""
 
+import sys
 from collections.abc import Collection, Mapping
 from importlib import import_module
 from inspect import isabstract, isclass
@@ -60,6 +61,8 @@ def named(name: str, known: Mapping[str, type[Kind]], kind: type, what: str) -> 
     module, own, attribute = name.partition(":")
     if not own:
         raise UnknownNameError(f"{what} must be one of {', '.join(known)}. Received {shown(name)}.")
+    if "" not in sys.path:  # a script that is installed does not look where it is started
+        sys.path.append("")
     try:
         found: Any = getattr(import_module(module), attribute)
     except Exception as error:

@@ -1,5 +1,6 @@
 """Laws and friction of a user's own go through the same calls as those of the package."""
 
+import sys
 from fractions import Fraction as F
 
 import own_parts
@@ -122,3 +123,10 @@ def test_what_cannot_be_had_is_one_line(given, said):
     for name in (friction_law, simulation_scheme):
         with pytest.raises(UnknownNameError):
             name(given)
+
+
+def test_a_module_is_found_where_the_program_is_started(tmp_path, monkeypatch):
+    (tmp_path / "beside_me.py").write_text("from own_parts import PID as Mine\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [entry for entry in sys.path if entry])
+    assert control_law("beside_me:Mine") is own_parts.PID

@@ -87,7 +87,7 @@ def test_the_page_shows_text_as_text(tmp_path):
 def test_warnings_of_libraries_are_not_shown_to_users():
     """A program that warns and then refuses leaves one line."""
     program = (
-        "import sys, warnings; sys.argv = ['quakedesign', 'fault', 'nowhere']\n"
+        "import sys, warnings; sys.argv = ['quakedesign', 'fault', 'real-fault']\n"
         "import quakedesign.fault, quakedesign.cli as cli\n"
         "def warning(*_, **__):\n"
         "    import numpy; numpy.float64(1e300) * numpy.float64(1e300)\n"
