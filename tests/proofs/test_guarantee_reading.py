@@ -346,3 +346,18 @@ def test_four_digits_are_the_nearest_on_the_outer_side(value, sign):
     assert up - value <= abs(value) / 1000
     assert value - down <= abs(value) / 1000
     assert (checker.upper(F(12345)), checker.lower(F(12345))) == ("1.235e+04", "1.234e+04")
+
+
+def test_a_slow_gain_is_read_to_its_limits_and_needs_friction_of_slip_and_samples():
+    steady, held = changed(HELD, (("fault", "friction", "rate_slope"), "0")), HELD["loop"]
+    task, jumpy = checker.read_task(steady), checker.read_task(HELD)
+    loop = checker.read_loop(held, task)
+    for parts in (1, 16):
+        assert checker.read_slow({"parts": parts, "growth": "1/9"}, task, loop) == checker.Slow(parts, F(1, 9))
+    for wrong in ({"parts": 0}, {"parts": 17}, {"parts": "2"}, {"parts": True}, {"growth": "0"}, {"growth": "-1/9"}):
+        with pytest.raises(checker.Refused, match="1 to 16 parts, growth > 0"):
+            checker.read_slow({"parts": 2, "growth": "1"} | wrong, task, loop)
+    at_once = checker.read_loop(CONTINUOUS["loop"], task)
+    for given, other in ((jumpy, loop), (task, at_once), (jumpy, at_once)):
+        with pytest.raises(checker.Refused, match="friction of the slip alone and a law of samples"):
+            checker.read_slow({"parts": 2, "growth": "1"}, given, other)
