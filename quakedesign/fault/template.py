@@ -55,7 +55,7 @@ _LEFT_OUT = {
 def fault_toml(fault: Fault) -> str:
     """Text of a TOML file that `load_fault` reads as this fault, every number in SI units and nothing left out."""
     named: dict[str, Mapping[str, Any]] = {
-        "friction": {"law": fault.friction.name} | _values(fault.friction, _law_units(type(fault.friction))),
+        "friction": {"law": fault.friction.name} | _law_values(fault.friction),
         "task": _values(fault.reference, TASK) | {"sampling_time": f"{fault.sampling_time!r} s"},
         "disturbance": _values(fault.disturbance, DISTURBANCE),
         "uncertainty": {key: float(getattr(fault.box, key)) for key in WIDTHS},
@@ -75,6 +75,11 @@ def _values(part: object, units: Mapping[str, str]) -> dict[str, Any]:
     return {
         key: (f"{value!r} {units[key]}" if units[key] else value) for key, value in held.items() if value is not None
     }
+
+
+def _law_values(law: FrictionLaw) -> dict[str, Any]:
+    options = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
+    return options | _values(law, _law_units(type(law)))
 
 
 def _law_units(law: type[FrictionLaw]) -> dict[str, str]:

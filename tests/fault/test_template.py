@@ -55,6 +55,15 @@ def test_texts_and_boxes_of_ones_own_are_written_as_toml_has_them():
     assert read.source == awkward
 
 
+def test_an_option_of_a_law_is_written_too():
+    text = template("regularised-rate-and-state").replace(
+        '"regularised-rate-and-state"', '"regularised-rate-and-state"\nevolution = "slip"', 1
+    )
+    fault = parse_fault(text, "own.toml")
+    assert fault.friction.evolution == "slip"
+    assert parse_fault(fault_toml(fault), "own.toml") == fault
+
+
 @pytest.mark.parametrize("name", presets())
 def test_the_schema_accepts_presets(name):
     text = (files("quakedesign.fault") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
