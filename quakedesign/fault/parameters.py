@@ -118,7 +118,7 @@ class Fault:
         """h [m], the shorter side of the patch; L of a square one."""
         return min((self.length, *self._other_side.values()))
 
-    @property
+    @cached_property
     def squares(self) -> Fraction:
         """n, exact: the longer over the shorter side [-]; 1 of a square one."""
         sides = [rational(self.length), rational(self.length if self.width is None else self.width)]

@@ -312,7 +312,10 @@ def test_a_design_with_feed_forward_has_every_premise(preset, name):
 def test_the_linear_law_takes_none():
     with pytest.raises(ParameterError, match="Received 'nominal' with elqr"):
         qd.design(REAL, "elqr", feedforward="nominal")
-    assert not hasattr(control_law("elqr").from_values((1, 1, 1, 1)), "feedforward")
+    law = control_law("elqr").from_values((1, 1, 1, 1))
+    assert law.feedforward.name == "none"
+    with pytest.raises(ParameterError, match=r"belongs to a sliding mode. Received elqr"):
+        law.with_feedforward(feed_forward("nominal", REAL, F(1)))
 
 
 def test_joint_starts_are_bounded(found):

@@ -76,7 +76,7 @@ def test_the_folder_appears_whole_and_is_not_overwritten(comparison, tmp_path, m
 
 def test_a_failure_while_writing_leaves_nothing_behind(comparison, tmp_path, monkeypatch):
     monkeypatch.setattr(Comparison, "figures", lambda _: {})
-    monkeypatch.setattr("quakedesign.report.page.page_html", lambda *_: 1 / 0)
+    monkeypatch.setattr("quakedesign.report.folder.page_html", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_folder(comparison, tmp_path / "results", force=False)
     assert list(tmp_path.iterdir()) == []

@@ -23,6 +23,7 @@ QUANTITIES = {
     "reference_rate": 1e-6,
     "slowest_rate": 1e-9,
     "fastest_rate": 1e-3,
+    "stress_sensitivity": 0.2,
 }
 LAB = load_fault("lab-fault")
 
