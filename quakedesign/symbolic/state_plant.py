@@ -165,14 +165,12 @@ def critical_stiffness(law: FrictionLaw, *, inertia: bool = True) -> sp.Expr:
     UnsupportedError
         When a condition is not linear in the stiffness (several state variables).
     """
-    roots: list[sp.Expr] = []
-    for condition in stability_conditions(law.state_names, inertia=inertia):
-        poly = sp.Poly(condition.subs(_absent(law)), k_hat)
-        if poly.degree() > 1:
-            raise UnsupportedError("the critical stiffness has a closed form for at most one state variable")
-        if poly.degree() == 1:
-            slope, offset = poly.all_coeffs()
-            roots.append(_inserted(sp.factor(-offset / slope), law))
+    conditions = stability_conditions(law.state_names, inertia=inertia)
+    polynomials = [sp.Poly(condition.subs(_absent(law)), k_hat) for condition in conditions]
+    if any(poly.degree() > 1 for poly in polynomials):
+        raise UnsupportedError("the critical stiffness has a closed form for at most one state variable")
+    lines = [poly.all_coeffs() for poly in polynomials if poly.degree() == 1]
+    roots = [_inserted(sp.factor(-offset / slope), law) for slope, offset in lines]
     nontrivial = [_with_stresses(r) for i, r in enumerate(roots) if r != 0 and r not in roots[:i]]
     return sp.Max(*nontrivial) if nontrivial else sp.Integer(0)
 
