@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import float_above, float_below, fraction_of_float, nearest, rational
+from quakedesign.rationals import float_above, float_below, fraction_of_float, nearest, rational, six_digits
 
 
 @pytest.mark.parametrize(
@@ -111,3 +111,8 @@ def test_fractions_are_themselves_and_numbers_have_at_most_308_digits_and_300_ch
     assert rational("1." + "0" * 298) == 1
     with pytest.raises(ParameterError, match="at most 300 characters"):
         rational("1." + "0" * 299)
+
+
+def test_six_digits_are_shown_of_numbers_of_any_size():
+    shown = {F(2, 3): "0.666667", F(-1, 8): "-0.125", F(10) ** 400: "1.00000e+400"}
+    assert {value: six_digits(value) for value in shown} == shown

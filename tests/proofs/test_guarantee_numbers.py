@@ -2,6 +2,7 @@
 
 import importlib.util
 from fractions import Fraction as F
+from math import factorial
 from pathlib import Path
 from random import Random
 
@@ -271,6 +272,17 @@ def test_exponentials_of_matrices_enclose_their_closed_forms(time, bits, monkeyp
             assert found.error < 2**40
             for line, expected in zip(found.rows, exact, strict=True):
                 assert all(abs(e * 2**bits - v) <= found.error for v, e in zip(line, expected, strict=True))
+
+
+@pytest.mark.parametrize("bits", [8, 9, 10, 11, 12, 64, 192])
+def test_a_taylor_sum_has_the_terms_that_its_rest_needs(bits, monkeypatch):
+    """2/n! is below a unit for the n terms that are taken, and for no fewer."""
+    taken, scaled = [], checker.Fixed.scaled
+    monkeypatch.setattr(checker, "BITS", bits)
+    monkeypatch.setattr(checker.Fixed, "scaled", lambda term, factor: taken.append(factor) or scaled(term, factor))
+    checker.exponential([[F(-1, 2)]], F(1))
+    assert taken == [F(1, k) for k in range(1, len(taken) + 1)]
+    assert factorial(len(taken)) < 2 ** (bits + 1) <= factorial(len(taken) + 1)
 
 
 def test_exponentials_of_several_times_enclose_their_closed_forms():

@@ -361,3 +361,49 @@ def test_a_slow_gain_is_read_to_its_limits_and_needs_friction_of_slip_and_sample
     for given, other in ((jumpy, loop), (task, at_once), (jumpy, at_once)):
         with pytest.raises(checker.Refused, match="friction of the slip alone and a law of samples"):
             checker.read_slow({"parts": 2, "growth": "1"}, given, other)
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_slow_gain_is_refused_from_a_file_that_breaks_its_rules():
+    slow = {"parts": 2, "growth": "1/9"}
+    steady, at_once = (changed(raw, (("fault", "friction", "rate_slope"), "0")) for raw in (HELD, CONTINUOUS))
+    found = read_guarantee(steady | {"slow_gain": slow}).slow_gain
+    assert (found.parts, found.growth) == (2, F(1, 9))
+    assert read_guarantee(steady).slow_gain is None
+    assert json.loads(guarantee_text(read_guarantee(at_once))) == at_once
+    for wrong in ({"parts": "2"}, {"parts": True}, {"parts": 2.0}):
+        with pytest.raises(CertificateError, match="parts must be an integer"):
+            read_guarantee(steady | {"slow_gain": slow | wrong})
+    for wrong, said in (
+        (steady | {"slow_gain": slow | {"more": "1"}}, "exactly the keys growth, parts"),
+        (steady | {"more": "1"}, "exactly the keys"),
+        (at_once | {"slow_gain": slow}, "slow_gain is for a law of samples"),
+        (HELD | {"slow_gain": slow}, "friction of the slip alone"),
+        (steady | {"slow_gain": slow | {"parts": 17}}, "1 to 16 parts"),
+        (5, "an object"),
+        (None, "an object"),
+    ):
+        with pytest.raises(CertificateError, match=said):
+            read_guarantee(wrong)
+
+
+@pytest.mark.usefixtures("coarse")
+def test_the_slip_error_on_which_a_slow_gain_rests_stays_below_its_claim(monkeypatch):
+    wide = (("claims", "least_pressure"), "-99"), (("claims", "largest_pressure"), "99")
+    steady, asked = changed(HELD, (("fault", "friction", "rate_slope"), "0"), *wide), []
+    slow = steady | {"slow_gain": {"parts": 3, "growth": "1/9"}}
+
+    def verified(raw, slip):
+        monkeypatch.setattr(checker, "bounds", lambda *given: asked.append(given) or ([slip, F(0), F(0)], F(1, 2)))
+        return checker.verify(raw)[0]
+
+    first = "fault a fault (a name; the data in the file are what counts), friction {} within its bounds and slopes, "
+    first += "continued to negative slip rates"
+    assert verified(slow, F(999, 1000)) == first.format("any function of the slip alone")
+    assert verified(steady, F(1)) == first.format("anything")
+    assert [given[2:] for given in asked] == [(checker.Slow(3, F(1, 9)), F(1)), (None, F(1))]
+    for slip in (F(1), F(2)):
+        with pytest.raises(checker.Refused, match="the slip error that moves the input gain must stay below its claim"):
+            verified(slow, slip)
+    with pytest.raises(checker.Refused, match="the file"):
+        verified(steady | {"more": "1"}, F(0))

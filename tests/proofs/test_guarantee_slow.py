@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from fractions import Fraction as F
 from functools import cache
+from math import ceil, exp
 from pathlib import Path
 
 import numpy as np
@@ -260,3 +261,42 @@ def test_a_model_of_a_part_changes_the_pressure_alone():
     assert other.flow[1][-1] == 1
     assert loop.flow[1][:2] == other.flow[1][:2]
     assert loop.segments == other.segments
+
+
+def test_the_spread_is_asked_for_by_hand(monkeypatch):
+    """Half a part 2/8 and 2κE; κr′/(eα) with four digits of 1/e from above. Without parts there is none."""
+    task = replace(_task_by_hand(), slope_of_beta=F(5), reference_rate=F(7), beta=(F(1), F(3)), change=None)
+    slow, asked = checker.Slow(4, F(1, 11)), []
+    monkeypatch.setattr(checker, "slow_gains", lambda *_: "slow")
+    monkeypatch.setattr(checker, "input_gains", lambda _: "jumping")
+    monkeypatch.setattr(checker, "of_class", lambda _t, _l, *given: asked.append(given) or ([F(1)] * 3, F(1, 2)))
+    for given in ((slow, F(1, 13)), (slow,), ()):
+        assert checker.bounds(task, None, *given) == ([1, 1, 1], F(1, 2))
+    aged = 5 * 7 * 11 * F(ceil(10**4 * exp(-1)), 10**4)
+    assert asked == [("slow", (F(1, 4) + F(10, 13), aged)), ("slow", (F(1, 4), aged)), ("jumping", None)]
+
+
+@pytest.mark.parametrize("outputs", [3, 4])
+@pytest.mark.parametrize("spread", [None, (F(1, 3), F(1, 5))])
+def test_the_inputs_solve_what_the_outputs_make_of_them(outputs, spread):
+    """W = F + S·G·W in floats, for gains by hand; the fourth output is what the modes of a layer leave out."""
+    task, layer = _task_by_hand(), [0] * (outputs - 3)
+    inputs = 2 + (spread is not None)
+    found = [[[F(1, 30 + 7 * k + 3 * y * y)] for y in range(outputs)] for k in range(inputs)]
+    gains = np.array([[float(found[k][y][0]) for k in range(inputs)] for y in range(outputs)])
+    push = spread[0] if spread else F(1)
+    shares = [[1 / 2, 3 / 2, float(push), *(3 for _ in layer)], [0, 0, 0, *layer]]
+    shares += [[0, 0, float(spread[1]), *layer]] if spread else []
+    own = np.array([2 + 1 / 2, 3, 0][:inputs])
+    peaks = gains @ np.linalg.solve(np.eye(inputs) - np.array(shares, float) @ gains, own)
+    loop = checker.Loop([], [([], F(1))], [[]] * outputs, [[]] * 2, None, F(1))
+    (slip, rate, total), _ = checker.of_class(task, loop, found, spread)
+    assert [float(v) for v in (slip, rate, total)] == pytest.approx([*peaks[:2], sum(peaks[2:])], rel=1e-12)
+
+
+def _task_by_hand():
+    return checker.Task(
+        name="", b=F(1), s=(F(0), F(1)), w=(F(0), F(3)), beta=(F(1), F(3)), rest=(F(0), F(0)), reference_rate=F(1),
+        reference_acceleration=F(0), reference_jerk=F(0), smooth=True, reference_force=F(2), drift=F(3),
+        amplitude=F(1, 2), change=None, slope_of_beta=F(1), steady_beta=True,
+    )  # fmt: skip
