@@ -65,12 +65,12 @@ def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[s
     fault = Fault(**trial)
     if "damping" not in parts:
         damping = _cut(radiation_damping(fault.density, fault.shear_modulus, fault.area))
-        assumed.append(f"damping {damping:g} kg/s, the radiation of shear waves, G A/(2 c_s)")
+        assumed.append(f"damping {damping:g} kg/s, the radiation of shear waves, G A/(2 c_s), rounded down")
         fault = Fault(**trial | {"damping": damping})
     target = task.get("target_slip") or _target(fault, assumed)
     if "operation_time" not in task:
         longest = _cut(PERIODS / fault.natural_frequency)
-        assumed.append(f"operation time {longest:g} s, as many natural periods as those of the paper's faults")
+        assumed.append(f"operation time {longest:g} s, about as many natural periods as for the paper's faults")
     step = task.get("sampling_time") or _step(fault, longest, assumed)
     reference = Reference(target_slip=target, operation_time=longest)
     return Fault(
@@ -88,14 +88,16 @@ def _target(fault: Fault, assumed: list[str]) -> float:
             "Received nothing. Add [task] with target_slip."
         )
     target = _cut(slip)
-    assumed.append(f"target slip {target:g} m, at which an earthquake would come to rest")
+    assumed.append(f"target slip {target:g} m, the next rest slip rounded down")
     return target
 
 
 def _step(fault: Fault, operation_time: float, assumed: list[str]) -> float:
     pace = max(fault.natural_frequency, _growth(fault))
     step = _cut(min(1 / (SAMPLES * pace), operation_time / _SHARE), digits=2)
-    assumed.append(f"sampling time {step:g} s, {SAMPLES:g} samples while an error grows e-fold or the block turns")
+    assumed.append(
+        f"sampling time {step:g} s, at least {SAMPLES:g} samples while an error grows e-fold or the block swings a radian"
+    )
     return step
 
 

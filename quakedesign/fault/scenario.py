@@ -35,7 +35,7 @@ DISTURBANCE = {
 WIDTHS = ("stiffness", "damping", "authority")
 OPTIONAL = ("damping", "width")  # of the plant
 _NO_SOURCE = "no source given"
-_UNDISTURBED = "no disturbance; what is guaranteed holds without one"
+_UNDISTURBED = "no disturbance, so that no guarantee covers one"
 
 
 def load_fault(source: str | Path, *, box: str | None = None) -> Fault:

@@ -46,9 +46,9 @@ _COME_TO_REST = ("exponential-slip-weakening", "linear-slip-weakening")
 _LEFT_OUT = {
     "width": "square if left out",
     "damping": "radiation of shear waves, G A/(2 c_s), if left out",
-    "target_slip": "the slip of the next earthquake if left out",
-    "operation_time": "as many natural periods as those of the paper's faults if left out",
-    "sampling_time": "ten samples while an error grows e-fold if left out",
+    "target_slip": "the next rest slip if left out",
+    "operation_time": "about as many natural periods as for the paper's faults if left out",
+    "sampling_time": "at least ten samples while an error grows e-fold if left out",
 }
 
 
