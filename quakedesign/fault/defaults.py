@@ -84,7 +84,7 @@ def _target(fault: Fault, assumed: list[str]) -> float:
     if not slip > 0:
         why = "friction with a state has none" if math.isnan(slip) else "a stable fault has none"
         raise ScenarioError(
-            f"task.target_slip must be given, because it is the slip of the next earthquake unless told, and {why}. "
+            f"task.target_slip must be given, because it is the next rest slip unless told, and {why}. "
             "Received nothing. Add [task] with target_slip."
         )
     target = _cut(slip)
@@ -96,18 +96,17 @@ def _step(fault: Fault, operation_time: float, assumed: list[str]) -> float:
     pace = max(fault.natural_frequency, _growth(fault))
     step = _cut(min(1 / (SAMPLES * pace), operation_time / _SHARE), digits=2)
     assumed.append(
-        f"sampling time {step:g} s, at least {SAMPLES:g} samples while an error grows e-fold or the block swings a radian"
+        f"sampling time {step:g} s, at least {SAMPLES:g} samples while an error grows e-fold or it swings by 1 rad"
     )
     return step
 
 
 def _growth(fault: Fault) -> float:
-    """Largest real part [1/s] of a pole without pressure, friction as steep as it can be."""
+    """Largest real pole [1/s] without pressure, friction as steep as it can be; others turn faster than they grow."""
     push, law = fault.authority * fault.effective_normal_stress, fault.friction
     damping = fault.specific_damping - push * law.rate_slope
     stiffness = fault.specific_stiffness - push * law.slip_slope
-    root = damping**2 - 4 * stiffness
-    return (math.sqrt(root) - damping) / 2 if root > 0 else -damping / 2
+    return (math.sqrt(max(damping**2 - 4 * stiffness, 0)) - damping) / 2
 
 
 def _cut(value: float, digits: int = 3) -> float:

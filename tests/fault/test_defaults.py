@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError, ScenarioError
@@ -40,6 +41,49 @@ def test_a_fault_of_four_numbers_and_a_friction_law_has_a_task_like_the_papers()
     pole = max(z.real for z in derive(fault).eigenvalues)
     assert fault.sampling_time * pole <= 0.1
     assert (fault.source, len(fault.assumed)) == ("no source given", 5)
+
+
+def floored(value, digits):
+    """The first digits of a number, as text has them."""
+    mantissa, exponent = f"{value:.15e}".split("e")
+    return float(f"{mantissa[: digits + 1]}e{exponent}")
+
+
+def test_numbers_are_rounded_down_so_that_they_stay_true():
+    fault = parse_fault(PLAIN, "own.toml")
+    assert fault.damping == floored(2600 * math.sqrt(25e9 / 2600) / 2 * 1.5e3**2, 3)
+    assert fault.reference.operation_time == floored(4.6e5 * math.sqrt(2600 * 1.5e3**2 / 25e9), 3)
+    assert fault.reference.target_slip == floored(fault.rest_slip, 3)
+    pole = max(z.real for z in derive(fault).eigenvalues)  # this law is as steep at the start as anywhere
+    assert fault.sampling_time == floored(0.1 / pole, 2)
+
+
+RATE_WEAKENING = """law = "slip-rate-weakening"
+residual = 0.45
+drop = 0.15
+critical_rate = "2 cm/s"
+"""
+
+
+@pytest.mark.parametrize("damping", ["1e12 kg/s", "9e14 kg/s"])
+def test_the_period_follows_poles_of_the_rate_too(damping):
+    """A real pole where the rate weakens friction faster than damping resists, no growth with more damping."""
+    head = PLAIN[: PLAIN.index("law =")].replace("effective", f'damping = "{damping}"\neffective')
+    fault = parse_fault(f'{head}{RATE_WEAKENING}[task]\ntarget_slip = "1 cm"\n', "own.toml")
+    m, push = 2600 * 1.5e3**3, 25e6 * 1.5e3**2
+    lost = fault.damping / m - push / m * 0.15 / 0.02
+    k = 25e9 * 1.5e3 / m
+    pace = max(math.sqrt(k), *np.roots([1, lost, k]).real)
+    assert fault.sampling_time == floored(0.1 / pace, 2)
+
+
+def test_complex_poles_grow_by_their_real_part():
+    head = (
+        PLAIN[: PLAIN.index("law =")].replace("25 MPa", "2.5 MPa").replace("effective", 'damping = "0 kg/s"\neffective')
+    )
+    law = RATE_WEAKENING.replace('"2 cm/s"', '"25 cm/s"')
+    fault = parse_fault(f'{head}{law}[task]\ntarget_slip = "1 cm"\n', "own.toml")
+    assert fault.sampling_time == floored(0.1 / fault.natural_frequency, 2)
 
 
 @pytest.mark.parametrize(
@@ -103,6 +147,8 @@ def test_symbols_are_names():
     for spelt in ("d_c", "dc", "DC"):
         again = parse_fault(f"{head}{RATE.replace('Dc', spelt)}{TASK}", "own.toml").friction
         assert again == law
+    with pytest.raises(ScenarioError, match=r"given, .* and friction with a state has none"):
+        parse_fault(f"{head}{RATE}", "own.toml")
     with pytest.raises(ScenarioError, match=r"direct_effect must be given once. Received a and direct_effect"):
         parse_fault(f"{head}{RATE}direct_effect = 0.01\n{TASK}", "own.toml")
     assert set(friction_laws()) >= {law.name}
