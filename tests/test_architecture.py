@@ -47,7 +47,7 @@ MAY_IMPORT = {
     "identification": ("fault", "symbolic"),
     "synthesis": (*BELOW, "workers"),
     "studies": (*BELOW, "synthesis"),
-    "report": (*BELOW, "synthesis", "studies", "identification"),
+    "report": (*(r for r in BELOW if not r.startswith(("sos", "loop"))), "synthesis", "studies", "identification"),
     "cli": (*BELOW, "synthesis", "studies", "identification", "report", "interruption"),
     "__main__": ("cli", "interruption", "overview"),
     "workers": ("interruption",),
@@ -187,6 +187,13 @@ def test_the_rule_itself_tells_good_from_bad(source, ok, tmp_path, monkeypatch):
 )  # fmt: skip
 def test_what_decides_knows_no_solver_and_no_floating_point_library(path):
     assert third_party(path) <= {"sympy", "flint"}
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "report").glob("*.py")), ids=module_name)
+def test_what_shows_results_computes_none(path):
+    """Derivations, runs and searches are asked of `quakedesign.studies` and what stands below."""
+    assert third_party(path) <= {"numpy", "matplotlib", "jinja2", "rich"}
+    assert not [n for n in imports(path) if re.match(r"quakedesign\.(sos|loop)\b|.*\.(simulate|ClosedLoop)$", n)]
 
 
 def test_only_the_search_knows_the_solvers():

@@ -34,7 +34,8 @@ def compare(
     from quakedesign.fault import load_fault
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import results
-    from quakedesign.report.numbers import printed, printed_lines, table
+    from quakedesign.report.numbers import printed_lines
+    from quakedesign.studies.paper_numbers import printed, table
 
     names, found = controllers(controller), load_fault(fault, box=box)
     told = options.told(names)

@@ -8,9 +8,8 @@ from quakedesign.report.figures import figures
 from quakedesign.report.headlines import headline, said
 from quakedesign.report.page import table_html
 from quakedesign.simulation import simulation_scheme
-from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared
+from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared, designs_of
 from quakedesign.synthesis import Design
-from quakedesign.synthesis import design as synthesise
 
 
 class Comparison(Compared):
@@ -104,9 +103,4 @@ def designed_comparison(
     """
     for name in filter(None, schemes.values()):
         simulation_scheme(name)
-    designs, wanted = [], list(names)
-    for i, name in enumerate(wanted):
-        tell(f"synthesis and proof of {name}", i / len(wanted))
-        further = linear or {} if name == "elqr" else {}
-        designs.append(synthesise(fault, name, **(options or {}), **further))
-    return compare(fault, designs, progress=tell, **schemes)
+    return compare(fault, designs_of(fault, names, tell, options, linear), progress=tell, **schemes)

@@ -14,10 +14,11 @@ from quakedesign.errors import OutputError
 from quakedesign.fault import fault_toml
 from quakedesign.output import require_room, whole_folder
 from quakedesign.report.comparison import Comparison
-from quakedesign.report.numbers import csv_text, printed, table
+from quakedesign.report.numbers import csv_text
 from quakedesign.report.page import page_html
 from quakedesign.report.paper_figures import PAPER
 from quakedesign.studies.facts import fault_dict, fault_sentences
+from quakedesign.studies.paper_numbers import printed, table
 
 if TYPE_CHECKING:
     from quakedesign.report.paper_study import PaperStudy

@@ -1,7 +1,5 @@
 """A map of certified gains as a figure, a table and a folder; what was screened and what was proved look different."""
 
-import csv
-import io
 import json
 from importlib.metadata import version
 from pathlib import Path
@@ -12,6 +10,7 @@ import numpy as np
 from quakedesign.controllers import LoopField, law
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.drawing import SMALL, WIDTH
+from quakedesign.report.numbers import csv_text
 from quakedesign.synthesis.analysis.gain_map import GainMap
 from quakedesign.synthesis.analysis.gain_map_workers import Place
 
@@ -237,9 +236,4 @@ def write_gain_map(drawn: GainMap, folder: Path) -> dict[str, Any]:
 
 def gain_map_csv(drawn: GainMap) -> str:
     """The table of all points as CSV."""
-    rows = gain_map_rows(drawn)
-    stream = io.StringIO()
-    writer = csv.DictWriter(stream, rows[0], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return stream.getvalue()
+    return csv_text(gain_map_rows(drawn))

@@ -6,8 +6,6 @@ the laboratory show experiments; here the laboratory fault is simulated like any
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from quakedesign.report.closed_loop_figures import pressure
 from quakedesign.report.drawing import (
     INDUCED,
@@ -26,8 +24,8 @@ from quakedesign.report.drawing import (
     with_diverged,
 )
 from quakedesign.report.figures import end, figures
-from quakedesign.report.numbers import BARS, BASIS, baseline, relative
-from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.studies.paper_numbers import BARS, baseline, relative
+from quakedesign.studies.paper_study import friction_curve
 
 if TYPE_CHECKING:
     from quakedesign.studies.comparison import Compared, Entry
@@ -92,10 +90,7 @@ def peak_against_tracking(study: "PaperRuns") -> Any:
 def friction_law(comparison: "Compared") -> Any:
     """Friction coefficient against slip, and the slope at which the spring unloads."""
     fault, run = comparison.fault, comparison.uncontrolled
-    slips = np.linspace(0, 1.1 * max(float(run.slip.max()), fault.reference.target_slip), 400)
-    coefficient = ClosedLoop(fault).friction
-    values = np.array([float(coefficient([slip, 0])) for slip in slips])
-    spring = values[0] - fault.specific_stiffness / (fault.authority * fault.effective_normal_stress) * slips
+    slips, values, spring = friction_curve(fault, 1.1 * max(float(run.slip.max()), fault.reference.target_slip))
     size, unit = length(float(slips[-1]))
     drawing, ((axis,),) = figure(1, 3.0)
     axis.plot(slips / size, values, color=NATURAL, label=f"{fault.friction.name} at rest")
@@ -205,6 +200,3 @@ def _notes(axis: Any, basis: "Entry") -> None:
 
 def _superscript(unit: str) -> str:
     return unit.replace("^2", "²")
-
-
-__all__ = ["BASIS", "PAPER", "paper_figures"]

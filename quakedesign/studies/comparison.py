@@ -1,6 +1,6 @@
 """All controllers of one fault side by side, in closed loop."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from quakedesign.simulation import Trajectory, natural_earthquake, simulate, sim
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.studies.on_trajectory import certified_bound
 from quakedesign.synthesis import Design, assess
+from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.analysis.sampling_time import largest_sampling_time, on_trajectory
 from quakedesign.synthesis.guaranteed import CLASSES, Answer, attacked
 from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
@@ -135,6 +136,22 @@ def compared(
         answer = replace(attacked(fault, found.guarantee), compensation=found.compensation)
         entries.append(replace(entry, answer=answer))
     return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
+
+
+def designs_of(
+    fault: Fault,
+    names: Iterable[str],
+    tell: Tell,
+    options: Mapping[str, Any] | None = None,
+    linear: Mapping[str, Any] | None = None,
+) -> list[Design]:
+    """Designs of the named laws, with options of `quakedesign.design`, and its further ones for an e-LQR."""
+    wanted, designs = list(names), []
+    for i, name in enumerate(wanted):
+        tell(f"synthesis and proof of {name}", i / len(wanted))
+        further = linear or {} if name == "elqr" else {}
+        designs.append(synthesise(fault, name, **(options or {}), **further))
+    return designs
 
 
 def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell) -> Entry:

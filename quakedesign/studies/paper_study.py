@@ -4,7 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import pi
 
+import numpy as np
+
+from quakedesign.fault import Fault
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
+from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.studies import FrontPoint, objective_front
 from quakedesign.studies.comparison import Compared
 
@@ -70,3 +74,14 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     steps = [law.sampling.step for law in laws if law and law.sampling and law.lipschitz_limit is None]
     front = objective_front(fault, steps[0]) if steps else ()
     return PaperRuns(comparison=comparison, induced=induced, close_ups=close_ups, front=front)
+
+
+def friction_curve(fault: Fault, largest: float, points: int = 400) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Slips [m] up to the largest, the friction coefficient at rest there, and how the spring unloads from the first.
+
+    Both curves [-] have shape (points,); the fault is unstable where friction falls faster than the spring unloads.
+    """
+    slips, coefficient = np.linspace(0, largest, points), ClosedLoop(fault).friction
+    values = np.array([float(coefficient([slip, 0])) for slip in slips])
+    unloading = fault.specific_stiffness / (fault.authority * fault.effective_normal_stress)
+    return slips, values, values[0] - unloading * slips

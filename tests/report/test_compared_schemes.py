@@ -116,7 +116,7 @@ def test_one_scheme_for_all_stays_out_of_the_labels(compared, monkeypatch):
 @pytest.mark.parametrize("wrong", [{"scheme": "magic"}, {"published_scheme": "magic"}])
 def test_an_unknown_scheme_is_refused_before_the_work_begins(wrong, monkeypatch):
     monkeypatch.setattr("quakedesign.studies.comparison.natural_earthquake", None)
-    monkeypatch.setattr(comparison, "synthesise", None)
+    monkeypatch.setattr("quakedesign.studies.comparison.synthesise", None)
     with pytest.raises(ParameterError, match="scheme must be one of"):
         compare(SHORT, [], **wrong)
     with pytest.raises(ParameterError, match="scheme must be one of"):
