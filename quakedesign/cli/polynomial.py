@@ -7,13 +7,14 @@ from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Force, Output
 from quakedesign.cli.shared import app, new_file
+from quakedesign.errors import PolynomialError
 
 Text = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 
 @app.command
 def sos(
-    polynomial: Text,
+    polynomial: Text | None = None,
     /,
     *,
     on: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative="")] = (),
@@ -21,6 +22,7 @@ def sos(
     margin: str = "0",
     degree: int | None = None,
     products: bool | None = None,
+    gram: Path | None = None,
     verbose: Annotated[bool, Parameter(negative="")] = False,
     out: Path | None = None,
     force: Force = False,
@@ -42,17 +44,27 @@ def sos(
         Largest degree of a summand; the smallest that fits unless given, and the next even one under constraints.
     products
         Use all products of constraints, or none; unless given, products of variables only.
+    gram
+        Instead of a polynomial: a file, JSON or .mat, with a polynomial and a Gram matrix from another programme.
     verbose
         Show the sizes of the Gram matrices before and after the exact reduction.
     out
         File for the proof (proofs/FORMAT.md).
     """
-    from quakedesign.sos import prove
+    from quakedesign.sos import prove, read_gram
     from quakedesign.sos.exact.files import plain_proof
     from quakedesign.sos.exact.words import sentences
 
     new_file(out, "proof file", force=force)
-    answer = prove(polynomial, on=on, multiplier=multiplier, margin=margin, degree_bound=degree, products=products)
+    asked = (polynomial, on, multiplier, margin, degree, products)
+    if gram is not None and asked != (None, (), None, "0", None, None):
+        raise PolynomialError("--gram is a file that says what is asked. Received more. Leave the rest out.")
+    if gram is not None:
+        answer = read_gram(gram).verify()
+    elif polynomial is None:
+        raise PolynomialError("sos needs a polynomial, or --gram FILE. Received neither. Give for example 'x^2 + 1'.")
+    else:
+        answer = prove(polynomial, on=on, multiplier=multiplier, margin=margin, degree_bound=degree, products=products)
     if out is not None and answer.proof is not None:
         answer.save(out)
     found: dict[str, Any] = {
@@ -62,6 +74,7 @@ def sos(
         "blocks": dict(answer.blocks),
         "witness": plain_proof(answer.proof) if answer.proof is not None else None,
         "file": str(out) if out is not None and answer.proof is not None else None,
+        "remark": answer.remark or None,
         "seconds": answer.seconds,
         "versions": dict(answer.versions),
     }

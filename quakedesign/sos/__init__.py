@@ -28,7 +28,9 @@ __all__ = [
     "holds",
     "largest",
     "prove",
+    "read_gram",
     "statement",
+    "verify",
 ]
 
 _SEARCH = "quakedesign.sos.solve"  # no import, not even for type checkers: what decides knows no solver
@@ -39,4 +41,6 @@ face(
     Program=f"{_SEARCH}.program",
     largest=f"{_SEARCH}.program",
     Membership=f"{_SEARCH}.membership",
+    verify=f"{_SEARCH}.verification",
+    read_gram=f"{_SEARCH}.gram_files",
 )

@@ -40,6 +40,8 @@ class Answer:
         Wall time [s].
     versions : mapping of str to str
         Solver and arithmetic used.
+    remark : str
+        What is to be said beside the verdict, such as what became of a given Gram matrix; empty otherwise.
     """
 
     statement: Statement
@@ -47,6 +49,7 @@ class Answer:
     blocks: Mapping[str, list[int]] = field(default_factory=dict)
     seconds: float = 0.0
     versions: Mapping[str, str] = field(default_factory=dict)
+    remark: str = ""
 
     @property
     def verdict(self) -> Positivity:

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from numbers import Real
 from typing import Any
 
 from quakedesign.errors import PolynomialError
 from quakedesign.rationals import rational
 from quakedesign.sos.exact import text
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, from_sympy
+from quakedesign.sos.exact.squares import Element, as_element
 
 _AUTO = "auto"
 
@@ -32,6 +34,23 @@ def read(
     inequalities = tuple(p for kind, p in constraints if kind == "inequality")
     equalities = tuple(p for kind, p in constraints if kind == "equality")
     return names, exact, inequalities, equalities, factor
+
+
+def read_element(given: Any, names: tuple[str, ...]) -> Element:
+    """Element of a basis: a polynomial as for `read`, or the exponents of a monomial.
+
+    Raises
+    ------
+    PolynomialError
+    """
+    exponents = tuple(map(_whole, given)) if isinstance(given, Sequence) and not isinstance(given, str) else None
+    return as_element(_polynomial({exponents: 1} if exponents is not None else given, names))
+
+
+def _whole(exponent: Any) -> Any:
+    """Integer of an exponent that another programme wrote as a float."""
+    number = float(exponent) if isinstance(exponent, Real) else 0.5
+    return int(number) if number.is_integer() else exponent
 
 
 def _names(inputs: Sequence[Any]) -> tuple[str, ...]:

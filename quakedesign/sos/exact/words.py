@@ -41,7 +41,7 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
     multiplier = polynomial_words(asked.multiplier, asked.variables)
     if multiplier != "1":
         lines.append(f"multiplied by {multiplier}")
-    lines += _reason(answer)
+    lines += [*_reason(answer), *filter(None, [answer.remark])]
     if verbose:
         lines += [f"Gram matrices {when} reduction: {_sizes(sizes)}" for when, sizes in answer.blocks.items()]
     lines.append(f"{answer.seconds:.2f} s; checked in exact arithmetic")

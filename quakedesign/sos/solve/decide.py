@@ -21,7 +21,7 @@ from quakedesign.sos.solve.scaling import Scaled, decimal_units, scaled
 _STRICT = 1e-7
 _ROUNDS = 4
 _ACCURACIES = (1e-9, 1e-12)
-_KERNELS = ((1e-6, 1e-5), (1e-6, 1e-7), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
+KERNELS = ((1e-6, 1e-5), (1e-6, 1e-7), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
 
 
 @dataclass
@@ -144,12 +144,12 @@ class Search:
         zeros = rational_zeros(self.statement, candidates, self.units)
         blocks = at_zeros(self.blocks, zeros) if zeros else self.blocks
         for accuracy in _ACCURACIES:
-            for threshold, tolerance in _KERNELS:
+            for threshold, tolerance in KERNELS:
                 found = self._descend(blocks, threshold, tolerance, accuracy)
                 if found is not None:
                     return found
         smaller = at_real_zeros(blocks, polished_zeros(self.statement, candidates), self.units)
-        return self._descend(smaller, *_KERNELS[0], _ACCURACIES[0]) if smaller != blocks else None
+        return self._descend(smaller, *KERNELS[0], _ACCURACIES[0]) if smaller != blocks else None
 
     def _descend(self, blocks: list[Block], threshold: float, tolerance: float, accuracy: float) -> Proof | None:
         for _ in range(_ROUNDS):

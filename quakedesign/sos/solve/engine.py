@@ -105,7 +105,7 @@ def decide(asked: Statement) -> Answer:
         When the multiplier is not shown to be positive.
     """
     squares, start = _squares_of_multiplier(asked), perf_counter()
-    none = Answer(statement=asked, proof=None, blocks=block_sizes(asked), versions=_versions())
+    none = Answer(statement=asked, proof=None, blocks=block_sizes(asked), versions=versions())
     nothing = SumOfSquares(squares=(), cofactors=tuple({} for _ in asked.equalities))
     proposed = (method.propose(asked) for method in methods()) if asked.target else (nothing,)
     multiplied = (replace(p, multiplier=squares) if isinstance(p, SumOfSquares) else p for p in proposed)
@@ -121,7 +121,8 @@ def _decides(answer: Answer) -> bool:
         return False
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Versions of what an answer rests on."""
     return {name: version(name) for name in ("quakedesign", "clarabel", "python-flint")}
 
 

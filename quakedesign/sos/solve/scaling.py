@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import prod
 
 import numpy as np
 
@@ -44,29 +45,35 @@ class Scaled:
     def restored(self, proof: SumOfSquares) -> SumOfSquares:
         """Sum of squares in u from one in ũ."""
         inverse = tuple(1 / s for s in self.scale)
-        squares = tuple(self._square(s, inverse) for s in proof.squares)
+        squares = tuple(_moved(s, inverse, self._factor(s)) for s in proof.squares)
         cofactors = tuple(
             {e: c * self.target / factor for e, c in rescaled(q, inverse).items()}
             for q, factor in zip(proof.cofactors, self.equalities, strict=True)
         )
         return SumOfSquares(squares=squares, cofactors=cofactors, multiplier=proof.multiplier)
 
-    def _square(self, square: Square, inverse: tuple[Fraction, ...]) -> Square:
-        outer = self.target
-        for i in square.product:
-            outer /= self.inequalities[i]
-        elements = [_restored(b, inverse) for b in square.basis]
-        factors = [factor for _, factor in elements]
-        pairs = (left * right for i, left in enumerate(outer * f for f in factors) for right in factors[i:])
-        gram = tuple(q * factor for q, factor in zip(square.gram, pairs, strict=True))
-        return Square(product=square.product, basis=tuple(b for b, _ in elements), gram=gram)
+    def square(self, square: Square) -> Square:
+        """Square in ũ from one in u."""
+        return _moved(square, self.scale, 1 / self._factor(square))
+
+    def _factor(self, square: Square) -> Fraction:
+        """What a Gram matrix in ũ is multiplied by in u."""
+        return self.target / prod(self.inequalities[i] for i in square.product)
 
 
-def _restored(basis_element: Element, inverse: Sequence[Fraction]) -> tuple[Element, Fraction]:
-    """Basis element in u, and the factor that its rows of the Gram matrix take."""
+def _moved(square: Square, scale: Sequence[Fraction], factor: Fraction) -> Square:
+    elements = [_rescaled(b, scale) for b in square.basis]
+    sizes = [size for _, size in elements]
+    pairs = (left * right for i, left in enumerate(factor * size for size in sizes) for right in sizes[i:])
+    gram = tuple(q * size for q, size in zip(square.gram, pairs, strict=True))
+    return Square(product=square.product, basis=tuple(b for b, _ in elements), gram=gram)
+
+
+def _rescaled(basis_element: Element, scale: Sequence[Fraction]) -> tuple[Element, Fraction]:
+    """Basis element in the other variables, and the factor that its rows of the Gram matrix take."""
     if isinstance(basis_element, tuple):
-        return basis_element, monomial(inverse, basis_element)
-    polynomial = rescaled(basis_element, inverse)
+        return basis_element, monomial(scale, basis_element)
+    polynomial = rescaled(basis_element, scale)
     lead = abs(next(iter(polynomial.values())))
     return {e: c / lead for e, c in polynomial.items()}, lead
 
