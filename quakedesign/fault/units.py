@@ -39,6 +39,20 @@ def _plain(quantity: Any, unit: str) -> Decimal | None:
     return Decimal(found[1]) * Decimal(size) if found and size else None
 
 
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.])\s*((?![*^]).*)", re.ASCII | re.DOTALL)
+_WITHIN_A_UNIT = re.compile(r"^1\s*(?=/)|(\^|\*\*)\s*[+-]?\d+|(?<=[A-Za-z])\d+", re.ASCII)
+
+
+def _number_and_unit(quantity: str, received: str) -> tuple[Decimal | None, str]:
+    """One number and the unit behind it: pint multiplies what stands side by side, so "1 000 s" were 0 s."""
+    if re.match(r"\s*[+-]?\d+,\d", quantity):
+        raise UnitError(f"{received}, with a comma. Write a decimal point, and nothing between thousands.")
+    split = _NUMBER.fullmatch(quantity)
+    if re.search(r"[\d+-]", _WITHIN_A_UNIT.sub("", split[2]) if split else quantity):
+        raise UnitError(f"{received}, which is more than one number and a unit. Write the number in one piece.")
+    return (Decimal(split[1]), split[2]) if split else (None, quantity)
+
+
 @cache
 def _registry() -> Any:
     import pint
@@ -80,8 +94,9 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
         raise UnitError(f"{name} must be {wanted}. Received a text of {len(quantity)} characters.")
     import pint
 
+    number, written = _number_and_unit(quantity, received)
     try:
-        parsed = _registry().Quantity(quantity)
+        parsed = _registry().Quantity(f"1 {written}") * number if number is not None else _registry().Quantity(written)
         converted = parsed.to(unit or "dimensionless") if not (unit and parsed.unitless) else None
     except pint.UndefinedUnitError:
         raise UnitError(f"{received}, whose unit is unknown. Check its spelling.") from None
