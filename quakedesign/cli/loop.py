@@ -209,6 +209,7 @@ def export(
     step: Seconds | None = None,
     scheme: str | None = None,
     sensors: EstimateOptions = _TOLD,
+    fmu: bool = False,
     out: Path | None = None,
     force: Force = False,
     output: Output = PLAIN,
@@ -221,6 +222,8 @@ def export(
         Sampling period; the fault's unless given.
     scheme
         explicit (unless given), implicit, semi-implicit or compensated.
+    fmu
+        Write controller.fmu as well: the same step for co-simulation (FMI 2.0).
     out
         Folder to write; ./quakedesign-FAULT-CONTROLLER unless given.
     """
@@ -240,6 +243,7 @@ def export(
         step=step,
         scheme=scheme,
         **sensors.told(),
+        fmu=fmu,
         force=force,
     )
     output.show(answer, export_lines(answer))

@@ -7,6 +7,7 @@ from typing import Any
 
 import casadi as ca
 
+SOURCE, HEADER = "controller.c", "controller.h"
 _WIDTH = 110
 _USE = """
 Call controller_reset once, and controller_step every CONTROLLER_STEP seconds: it reads CONTROLLER_MEASUREMENTS

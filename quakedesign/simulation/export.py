@@ -14,12 +14,13 @@ from quakedesign.fault.checks import require_positive
 from quakedesign.loop.schemes import Scheme, own_way, simulation_scheme
 from quakedesign.loop.steps.sampled import Sampled
 from quakedesign.output import require_room, whole_folder, write_whole
-from quakedesign.simulation.c_source import ControllerStep, header_text, source_text
+from quakedesign.simulation.c_source import HEADER, SOURCE, ControllerStep, header_text, source_text
 from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.simulation.fmu import UNIT, model_unit
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.run import library_versions
 
-SOURCE, HEADER = "controller.c", "controller.h"
+FILES = (HEADER, SOURCE, UNIT)
 _TOLD = ("gains", "sampling")  # in other words
 
 
@@ -69,6 +70,7 @@ def export_controller(
     *,
     step: float | None = None,
     scheme: str | Scheme | None = None,
+    fmu: bool = False,
     force: bool = False,
 ) -> ControllerStep:
     """Write a controller's sampled step as ``controller.c`` and ``controller.h`` into a folder that appears whole.
@@ -84,6 +86,9 @@ def export_controller(
         New folder in an existing one.
     step, scheme
         As in `controller_step`; step [s].
+    fmu : bool
+        Write ``controller.fmu`` beside them: the same step for co-simulation with FMI 2.0, with a binary for this
+        platform where a C compiler works, and the sources.
     force : bool
         Replace a folder that holds an earlier export and nothing else.
 
@@ -101,10 +106,13 @@ def export_controller(
     target = Path(folder)
     _require_free(target, force)
     found = controller_step(fault, controller, step=step, scheme=scheme)
-    texts = {HEADER: header_text(found), SOURCE: source_text(found, HEADER)}
+    contents: dict[str, str | bytes] = {HEADER: header_text(found), SOURCE: source_text(found, HEADER)}
+    if fmu:
+        contents[UNIT], platform = model_unit(found)
+        found = replace(found, facts={**found.facts, "fmu": platform})
     with whole_folder(target) as partial:
-        for name, text in texts.items():
-            write_whole(partial / name, text)
+        for name, content in contents.items():
+            write_whole(partial / name, content)
     return found
 
 
@@ -113,8 +121,8 @@ def _require_free(folder: Path, force: bool) -> None:
         raise OutputError(
             f"the folder of an export must be new. Received {folder}, which exists. Give --force to replace it."
         )
-    if os.path.exists(folder) and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= {SOURCE, HEADER}):
-        raise OutputError(f"only a folder with {SOURCE} and {HEADER} is replaced. Received {folder}. Choose another.")
+    if os.path.exists(folder) and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= set(FILES)):
+        raise OutputError(f"only a folder with {', '.join(FILES)} is replaced. Received {folder}. Choose another.")
     require_room(folder)
 
 

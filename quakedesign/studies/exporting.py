@@ -9,7 +9,7 @@ from quakedesign.loop.schemes import own_way
 from quakedesign.loop.sensing import OutputFeedback
 from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.simulation import export_controller
-from quakedesign.simulation.export import HEADER, SOURCE
+from quakedesign.simulation.export import FILES
 from quakedesign.simulation.run import sampled_scheme
 from quakedesign.studies.estimation import differentiator_premise, sensor
 
@@ -25,13 +25,14 @@ def export_answer(
     differentiator_order: int = 1,
     filter_order: int = 0,
     averaging: int = 1,
+    fmu: bool = False,
     force: bool = False,
 ) -> dict[str, Any]:
     """Export a controller; return its facts, files and, with a differentiator, the premise of that.
 
     Parameters
     ----------
-    fault, law, folder, step, force
+    fault, law, folder, step, fmu, force
         As in `quakedesign.simulation.export_controller`.
     scheme : str, optional
         That of a law of samples, or ``explicit``, unless given.
@@ -57,9 +58,9 @@ def export_answer(
     period = fault.sampling_time if step is None else step
     seen = sensor(period, EXACT, differentiator_bound, filter_order, order=differentiator_order, averaging=averaging)
     chosen = sampled_scheme(way, measurement=seen, **own)
-    found = export_controller(fault, law, folder, step=step, scheme=chosen, force=force)
+    found = export_controller(fault, law, folder, step=step, scheme=chosen, fmu=fmu, force=force)
     premises = []
     if isinstance(seen, OutputFeedback):
         premises.append(differentiator_premise(fault, law, seen, scheme=chosen.name))
-    files = [str(folder / name) for name in (HEADER, SOURCE)]
+    files = [str(folder / name) for name in (FILES if fmu else FILES[:2])]
     return found.to_dict() | {"files": files, "premises": [p.to_dict() for p in premises]}
