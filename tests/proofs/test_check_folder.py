@@ -39,7 +39,7 @@ KINDS = {
     "sos": (POLYNOMIALS.quadratic, {"exact_numbers", "squares", "polynomials"}),
     "negative": (POLYNOMIALS.POINTS[0], {"exact_numbers", "squares", "polynomials"}),
     "not-sos": (POLYNOMIALS.FUNCTIONALS[0], {"exact_numbers", "squares", "polynomials", "functionals"}),
-    "guarantee": (guarantee, {"exact_numbers", "guarantee"}),
+    "guarantee": (guarantee, {"exact_numbers", *(name for name in NAMES if name.startswith("guarantee"))}),
 }
 
 

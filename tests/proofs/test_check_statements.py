@@ -20,7 +20,7 @@ def module(name, path):
 LOOPS = module("loops_by_hand", Path(__file__).with_name("test_check.py"))
 POLYNOMIALS = module("polynomials_by_hand", Path(__file__).with_name("test_check_polynomials.py"))
 checker = LOOPS.checker
-exact_numbers, squares, loops, cells, stability, equilibria, polynomials, functionals, _ = map(
+exact_numbers, squares, loops, cells, stability, equilibria, polynomials, functionals, *_ = map(
     checker.beside, checker.IMPORTS
 )
 Term = loops.Term

@@ -1,9 +1,7 @@
 """Numbers in both checkers of a guarantee: gains, integers with errors and roots, against closed forms."""
 
-import importlib.util
 from fractions import Fraction as F
 from math import factorial
-from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -11,16 +9,12 @@ import pytest
 from flint import ctx
 from mpmath import mp
 from scipy.linalg import expm
+from standalone_guarantee import checker
 
 from quakedesign.certificates.guarantee import ball_matrices, sector
 from quakedesign.certificates.guarantee.flow_norms import flow_norms
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.loop import ImplicitRoot, PeriodicLoop, Power, Segment
-
-PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
-SPECIFICATION = importlib.util.spec_from_file_location("guarantee_numbers", PATH)
-checker = importlib.util.module_from_spec(SPECIFICATION)
-SPECIFICATION.loader.exec_module(checker)
 
 
 def some(random, low, high, parts):

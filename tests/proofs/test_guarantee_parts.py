@@ -1,15 +1,14 @@
 """Both checkers of a guarantee part by part: against each other on random data, and against closed forms."""
 
-import importlib.util
 import json
 from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction as F
 from functools import cache
-from pathlib import Path
 from random import Random
 
 import pytest
+from standalone_guarantee import checker
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee import (
@@ -36,11 +35,6 @@ from quakedesign.loop import (
     Segment,
     exact_integrals,
 )
-
-PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
-SPECIFICATION = importlib.util.spec_from_file_location("guarantee_parts", PATH)
-checker = importlib.util.module_from_spec(SPECIFICATION)
-SPECIFICATION.loader.exec_module(checker)
 
 SHAPES = [(0, 0, 3, -2), (0, 0, 0, 10, -15, 6), (0, 0, 0, 4, -3), (0, 0, 6, -8, 3)]
 OUTPUTS = ("slip_error", "slip_rate_error", "push")

@@ -1,21 +1,15 @@
 """What both checkers of a guarantee take from a file: every limit just reached and just passed, and the last steps."""
 
 import copy
-import importlib.util
 import json
 from fractions import Fraction as F
-from pathlib import Path
 
 import pytest
+from standalone_guarantee import checker
 
 from quakedesign.certificates.guarantee import task as package_task
 from quakedesign.certificates.guarantee.files import guarantee_text, is_guarantee, parse_guarantee, read_guarantee
 from quakedesign.errors import CertificateError
-
-PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
-SPECIFICATION = importlib.util.spec_from_file_location("guarantee_reading", PATH)
-checker = importlib.util.module_from_spec(SPECIFICATION)
-SPECIFICATION.loader.exec_module(checker)
 
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
 HELD = {

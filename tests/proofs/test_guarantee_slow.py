@@ -1,17 +1,16 @@
 """A slow input gain in both checkers: against each other, against sums by hand, and against plants that slip."""
 
 import copy
-import importlib.util
 import json
 from dataclasses import replace
 from fractions import Fraction as F
 from functools import cache
 from math import ceil, exp
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from standalone_guarantee import checker
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Verdict
@@ -22,11 +21,6 @@ from quakedesign.certificates.guarantee.theorem import Bounds
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop import Model, Prediction, disturbance_estimate
-
-PATH = Path(__file__).parents[2] / "proofs" / "guarantee.py"
-SPECIFICATION = importlib.util.spec_from_file_location("guarantee_slow", PATH)
-checker = importlib.util.module_from_spec(SPECIFICATION)
-SPECIFICATION.loader.exec_module(checker)
 
 STEP, SLOW = F("0.184"), SlowGain(parts=2, growth=F(1, 4))
 TASK = task_of(load_fault("real-fault"))

@@ -1,6 +1,5 @@
 """What fades after a jump, in both checkers, against closed forms: bounds above, and close where pieces are fine."""
 
-import importlib.util
 import json
 from fractions import Fraction as F
 from math import exp
@@ -8,17 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from standalone_guarantee import checker
 
 from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.certificates.guarantee.theorem import bounds_from
 from quakedesign.loop import Fading, PeriodicLoop, Segment
 
-PATH = Path(__file__).parents[3] / "proofs" / "guarantee.py"
-FILE = PATH.parent / "certificates" / "guarantee_real-fault.json"
-SPECIFICATION = importlib.util.spec_from_file_location("guarantee_fading", PATH)
-checker = importlib.util.module_from_spec(SPECIFICATION)
-SPECIFICATION.loader.exec_module(checker)
+PROOFS = Path(__file__).parents[3] / "proofs"
+FILE = PROOFS / "certificates" / "guarantee_real-fault.json"
 
 FINE = tuple(F(i, 32) for i in range(33))
 

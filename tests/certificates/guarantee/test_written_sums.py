@@ -1,22 +1,16 @@
 """The upper sums of FORMAT.md in floats, term by term, and what both checkers find for the same loops."""
 
-import importlib.util
 from dataclasses import dataclass
 from fractions import Fraction as F
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from standalone_guarantee import checker
 
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.loop import Fading, PeriodicLoop, Segment
-
-PATH = Path(__file__).parents[3] / "proofs" / "guarantee.py"
-SPECIFICATION = importlib.util.spec_from_file_location("guarantee_sums", PATH)
-checker = importlib.util.module_from_spec(SPECIFICATION)
-SPECIFICATION.loader.exec_module(checker)
 
 FLOW = ((F(-1), F(2), F(0)), (F(-2), F(-3), F(1)), (F(0), F(1, 2), F(1, 4)))
 JUMPS = (

@@ -1,0 +1,116 @@
+"""The theorem: bounds of the errors and of the pressure from gains, if the small gain is below 1."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+from guarantee_gains import input_gains
+from guarantee_loop import Loop
+from guarantee_reading import Refused, Row, need, upper
+from guarantee_slow import Slow, slow_gains
+from guarantee_task import Task
+
+ONE_OVER_E = Fraction(3679, 10000)  # from above
+
+
+def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fraction(0)) -> tuple[Row, Fraction]:
+    """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee); the best of both classes.
+
+    With a slow gain they hold while the slip error stays below `slip`.
+    """
+    spread = None
+    if slow:
+        off = (task.beta[1] - task.beta[0]) / (2 * slow.parts) + 2 * task.slope_of_beta * slip
+        spread = off, task.slope_of_beta * task.reference_rate * ONE_OVER_E / slow.growth
+    found = slow_gains(task, loop, slow) if slow else input_gains(loop)
+    proved, refusals = [], []
+    for one in [task] if task.change is None else [task, replace(task, change=None)]:
+        try:
+            proved.append(of_class(one, loop, found, spread))
+        except Refused as refusal:
+            refusals.append(refusal)
+    if not proved:
+        raise refusals[0]
+    return [min(values) for values in zip(*(peaks for peaks, _ in proved), strict=True)], min(m for _, m in proved)
+
+
+def of_class(
+    task: Task, loop: Loop, found: list[list[list[Fraction]]], spread: tuple[Fraction, Fraction] | None = None
+) -> tuple[Row, Fraction]:
+    """The same of one class of disturbances, from the gains of every input.
+
+    `spread`: how far a slow beta is off that of a nominal loop by itself, and by its past.
+    """
+    half = [(high - low) / 2 for low, high in (task.s, task.w, task.beta)]
+    force, drift, coupling, shifted = inputs(task, half[2])
+    half[2] = spread[0] if spread else half[2]
+    own, shares = [force, drift], [half, [Fraction(0), coupling, Fraction(0)]]
+    if loop.root:
+        low, high = loop.root.slopes
+        wide = (high - low) / 2 / loop.step
+        own.append(loop.root.remainder + wide * loop.noise[0])
+        shares.append([wide, Fraction(0), Fraction(0)])
+    noise = [off for off in loop.noise if off]
+    own += noise
+    shares += [[Fraction(0)] * 3] * len(noise)
+    if not loop.events and len(loop.inputs) == 4:
+        own += [task.reference_acceleration, task.reference_jerk]
+        shares += [[Fraction(0)] * 3] * 2
+    if len(loop.outputs) > 3:  # the last one bounds what the modes of a layer leave out
+        shares = [[*share, Fraction(0)] for share in shares]
+        if loop.fade:
+            own.append(Fraction(0))
+            shares.append([Fraction(0)] * 4)
+        shares[-1 if loop.fade else 0][3] = task.beta[1]
+    if spread:
+        own.append(Fraction(0))
+        shares.append([Fraction(0), Fraction(0), spread[1], *[Fraction(0)] * (len(loop.outputs) - 3)])
+    table = [
+        [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
+        for share in shares
+    ]
+    small = radius(table)
+    need(small < 1, f"the small gain must be below 1. It is {upper(small)}")
+    sizes = solve(table, own)
+    peaks = [
+        max(sum(g * v for g, v in zip(at, sizes, strict=True)) for at in zip(*of, strict=True))
+        for of in zip(*found, strict=True)
+    ]
+    return [peaks[0], peaks[1], sum(peaks[2:]) + shifted], small
+
+
+def solve(table: list[Row], own: Row) -> Row:
+    """(1 − M)^-1 F by elimination: M >= 0 has all pivots positive if, and only if, its spectral radius is below 1."""
+    lines = [[(i == j) - v for j, v in enumerate(line)] + [own[i]] for i, line in enumerate(table)]
+    for i, line in enumerate(lines):
+        need(line[i] > 0, "the small gain must be below 1")
+        line[:] = [v / line[i] for v in line]
+        for other in lines:
+            if other is not line:
+                other[:] = [v - other[i] * p for v, p in zip(other, line, strict=True)]
+    return [line[-1] for line in lines]
+
+
+def radius(table: list[Row]) -> Fraction:
+    """Upper bound of the spectral radius of M >= 0, by halving: it is below v where M/v passes `solve`."""
+    low, high = Fraction(0), max(sum(line) for line in table) + 1
+    for _ in range(48):
+        middle = (low + high) / 2
+        try:
+            solve([[v / middle for v in line] for line in table], [Fraction(0)] * len(table))
+        except Refused:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def inputs(task: Task, half_beta: Fraction) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+    """Bounds of the force and the drift, the coupling from e2 to the drift, and what the push is shifted by."""
+    if task.change is None:
+        return task.reference_force + task.amplitude, task.drift, Fraction(0), Fraction(0)
+    if not task.steady_beta:
+        middle = sum(task.beta) / 2
+        left = task.amplitude * half_beta / middle
+        return task.reference_force + left, task.drift + task.change / middle, Fraction(0), task.amplitude / middle
+    coupling = task.amplitude * task.slope_of_beta
+    return task.reference_force, task.drift + task.change + coupling * task.reference_rate, coupling, task.amplitude

@@ -1,0 +1,161 @@
+"""L1 norms: bounds of every output for an input of size 1, from upper sums of impulse responses."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from functools import lru_cache
+from math import ceil
+
+from guarantee_flows import MAX_WORK, Flow, cut, integral, majorant, past
+from guarantee_loop import Fade, Loop
+from guarantee_numbers import BITS, Fixed, column, exponential, fixed, unit
+from guarantee_reading import Refused, Row
+
+STRETCHES, PARTS = 128, 6  # of time without samples, each of 2^PARTS pieces
+LATE = 1 << 12  # what is left of the past after those is below a 4096th
+
+
+def gains(loop: Loop, entry: Row, sudden: bool, fade: Fade | None = None) -> list[list[Fraction]]:
+    """Bounds of every output for an input of size 1, on every piece of the period."""
+    if not loop.events:
+        return [[v] for v in flow_gains(loop, entry)]
+    loop, entry = in_even_units(loop, entry)
+    size, many = len(loop.flow), len(loop.outputs)
+    flows, early = (cut(loop, cuts, entry, sudden, fade) for cuts in (loop.cuts, loop.past_cuts))
+    start = fixed(loop.outputs)
+    square = flows[0].generator * flows[0].generator
+    before = past(early, len(flows) * (many * len(loop.cuts) + size))
+    found: list[list[Fraction]] = [[] for _ in loop.outputs]
+    for number_of, flow in enumerate(flows):
+        phases = [start]
+        for step in flow.steps:
+            phases.append(phases[-1] * step)
+        stack = phases[0].above(*phases[1:], fixed(unit(size))) * flow.event
+        earlier = integral(early[:number_of], before, stack)
+        units = Fixed([[v] for v in earlier[-size:]])
+        news = list(since_event(flow, start))
+        for i, h in enumerate(flow.pieces):
+            bent = (((phases[i] * square).size() * flow.nears[i]).size() * units).sums()
+            for k in range(many):
+                first, last, more = (part[k] for part in news[i])
+                larger = max(earlier[many * i + k] + first, earlier[many * (i + 1) + k] + last)
+                found[k].append((larger + more + bent[k] * h**2 / 8) / (1 << BITS))
+    return found
+
+
+def since_event(flow: Flow, outputs: Fixed) -> Iterator[tuple[Row, Row, Row]]:
+    """What came since the event, in every piece: bounds at both ends, and of what may lie above both of them."""
+    ends, size = flow.ends(), outputs.size()
+    heights = [sums_of(outputs * end) for end in ends]
+    total = [Fraction(0)] * len(size.rows)
+    for i, h in enumerate(flow.pieces):
+        bend, slope = sums_of(size * flow.bend(ends[i], i)), sums_of(size * flow.slope(ends[i], i))
+        if flow.sudden:
+            yield heights[i], heights[i + 1], [v * h**2 / 8 for v in bend]
+        elif flow.masses:
+            yield faded(flow, outputs, i)
+        else:
+            parts = zip(total, heights[i], heights[i + 1], bend, strict=True)
+            following = [v + (a + b) * h / 2 + c * h**3 / 12 for v, a, b, c in parts]
+            yield total, following, [v * h**2 / 8 for v in slope]
+            total = following
+
+
+def faded(flow: Flow, outputs: Fixed, i: int) -> tuple[Row, Row, Row]:
+    """The same of what fades: pieces that have passed, and all that the present one may bring."""
+    size, chord = outputs.size(), flow.pieces[i] ** 2 / 8
+    first, last = [Fraction(0)] * len(size.rows), [Fraction(0)] * len(size.rows)
+    ends = [sums_of(outputs * now) for now in (flow.entry, flow.steps[i] * flow.entry)]
+    bent = sums_of(size * flow.bend(flow.entry, i))
+    more = [flow.masses[i][0] * (max(a, b) + c * chord) for a, b, c in zip(*ends, bent, strict=True)]
+    for p, (heavy, moment) in enumerate(flow.masses[:i]):
+        now, later = flow.ends(p)[i - p], flow.ends(p + 1)[i - p - 1]
+        slope = sums_of(size * (flow.nears[p] * flow.slope(later, i)).size())
+        bent = sums_of(size * flow.bend(now, i))
+        here, there = sums_of(outputs * now), sums_of(outputs * (flow.steps[i] * now))
+        first = [v + heavy * a for v, a in zip(first, here, strict=True)]
+        last = [v + heavy * a for v, a in zip(last, there, strict=True)]
+        more = [v + heavy * a * chord + moment * b for v, a, b in zip(more, bent, slope, strict=True)]
+    return first, last, more
+
+
+def sums_of(values: Fixed) -> Row:
+    """Upper bounds of one column."""
+    return [Fraction(v) for v in values.sums()]
+
+
+def flow_gains(loop: Loop, entry: Row) -> Row:
+    """The same without events, for ever: stretches of pieces, each twice as long as the one before."""
+    flow, outputs, now = balanced(loop, entry)
+    size, piece = len(flow), Fraction(1)
+    while max(sum(map(abs, line)) for line in flow) * piece > Fraction(1, 1 << PARTS):
+        piece /= 2
+    step, near = exponential(flow, piece), exponential(majorant(flow), piece).size()
+    square, sums = fixed(flow) * fixed(flow), [[0] * (size + 1) for _ in outputs.rows]
+    for _ in range(min(STRETCHES, MAX_WORK // (4 * size**2 * (size + 1) << PARTS))):
+        ends, power = now, step
+        for _ in range(PARTS):
+            ends, power = ends.beside(power * ends), power * power
+        now = power * now
+        bends = ((outputs.size() * near).size() * (square * ends).size()).size()
+        add_areas(sums, (outputs * ends.beside(now)).size(), bends, piece)
+        late = (Fixed([line[:size] for line in sums]) * now.size()).size()
+        pairs = list(zip(late.rows, sums, strict=True))
+        if all(v * LATE <= total for far, line in pairs for v, total in zip(far[:size], line[:size], strict=True)):
+            return [(line[size] + Fraction(LATE * far[size], LATE - 1)) / (1 << BITS) for far, line in pairs]
+        further = (step.size() * near).size()
+        near = Fixed([list(map(max, *lines)) for lines in zip(near.rows, further.rows, strict=True)])
+        step, piece = step * step, 2 * piece
+    raise Refused("the nominal loop must be stable, and seen to be")
+
+
+def add_areas(sums: list[list[int]], heights: Fixed, bends: Fixed, piece: Fraction) -> None:
+    """Add, to every entry of the sums, bounds of the integrals over all pieces whose ends have these heights."""
+    for total, line, bent in zip(sums, heights.rows, bends.rows, strict=True):
+        for i, bend in enumerate(bent):
+            area = (line[i] + line[i + len(total)]) * piece / 2 + bend * piece**3 / 12
+            total[i % len(total)] += ceil(area)
+
+
+def balanced(loop: Loop, entry: Row) -> tuple[list[Row], Fixed, Fixed]:
+    """A, outputs, and unit columns with the entry, in even units."""
+    even, entry = in_even_units(loop, entry)
+    return even.flow, fixed(even.outputs), fixed(unit(len(even.flow))).beside(column(entry))
+
+
+def in_even_units(loop: Loop, entry: Row) -> tuple[Loop, Row]:
+    """A loop and an input in units of the states that make the rows and columns of its maps alike."""
+    maps = [loop.flow, *(line for line, _ in loop.events)]
+    sizes = [[sum(map(abs, entries)) for entries in zip(*lines, strict=True)] for lines in zip(*maps, strict=True)]
+    units = even_units(tuple(map(tuple, sizes)))
+    flow, *jumps = [
+        [[v * u / own for v, u in zip(line, units, strict=True)] for line, own in zip(lines, units, strict=True)]
+        for lines in maps
+    ]
+    events = [(jump, time) for jump, (_, time) in zip(jumps, loop.events, strict=True)]
+    outputs = [[v * u for v, u in zip(line, units, strict=True)] for line in loop.outputs]
+    even = replace(loop, flow=flow, events=events, outputs=outputs)
+    return even, [v / u for v, u in zip(entry, units, strict=True)]
+
+
+@lru_cache(maxsize=4)
+def even_units(table: tuple[tuple[Fraction, ...], ...]) -> Row:
+    """Powers of 2 that make every row of a table u_i^-1 |t_ij| u_j about as large as its column."""
+    size = len(table)
+    units = [Fraction(1)] * size
+    for i in list(range(size)) * 16:
+        line = sum(abs(v) * units[j] / units[i] for j, v in enumerate(table[i]) if j != i)
+        under = sum(abs(table[j][i]) * units[i] / units[j] for j in range(size) if j != i)
+        if line and under:
+            ratio = Fraction(line / under)
+            units[i] *= Fraction(2) ** ((ratio.numerator.bit_length() - ratio.denominator.bit_length()) // 2)
+    return units
+
+
+def input_gains(loop: Loop) -> list[list[list[Fraction]]]:
+    """Gains of every input."""
+    fades = len(loop.inputs) - 1 if loop.fade else None
+    return [
+        gains(loop, entry, place > 1 and place != fades, *[loop.fade] * (place == fades))
+        for place, entry in enumerate(loop.inputs)
+    ]

@@ -1,0 +1,213 @@
+"""The error loop of a law: its flow, the events of a period, inputs and outputs, from the matrices of the file."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from guarantee_numbers import unit, zeros
+from guarantee_reading import Row, keys, matrix, need, number, numbers, row
+from guarantee_root import Root, read_root
+from guarantee_task import Task
+
+MAX_STATES, MAX_LAW_STATES, MAX_PERIODS = 20, 12, 8
+MODES, PI = 8, Fraction(314159265358979323846, 10**20)  # of a layer of rock; PI is below pi by less than SHORT of it
+SHORT = Fraction(1, 10**20)
+SHORTEST = 32  # a layer takes at least the 32nd part of a step
+EVEN = [Fraction(i, 8) for i in range(9)]  # where a flow between two events is cut
+HALVES = [Fraction(i, 2) for i in range(3)]
+BENT = [Fraction(i, 128) for i in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)]  # after a step into a layer
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
+
+
+@dataclass
+class Fade:
+    """At most height*e^(-rate*t) + floor, t after the event with this number."""
+
+    event: int
+    height: Fraction
+    rate: Fraction
+    floor: Fraction
+
+
+@dataclass
+class Loop:
+    """Flow x' = Ax, then events (map, time until the next one; none in continuous time), inputs, the implicit step.
+
+    The first two inputs flow; those of the implicit step and of the noise, if there are any, enter with the first
+    event. `noise` bounds what the measured e1 and e2 are off, an input each where it is not 0. Without events there may
+    be two inputs more, the second and third derivatives of the reference.
+    With a layer of rock a fourth output bounds what its modes leave out; where `fade` is given, that is one more
+    input, the last one.
+    """
+
+    flow: list[Row]
+    events: list[tuple[list[Row], Fraction]]
+    outputs: list[Row]
+    inputs: list[Row]
+    root: Root | None
+    step: Fraction
+    noise: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
+    cuts: Sequence[Fraction] = field(default_factory=lambda: EVEN)
+    past_cuts: Sequence[Fraction] = field(default_factory=lambda: EVEN)
+    fade: Fade | None = None
+
+
+def read_loop(value: Any, task: Task) -> Loop:
+    """Build the error loop: e1, e2, the law's states, pressures on their way, valve, and what lies behind it.
+
+    That is: where there is a lag, the well's pressure less the valve's; modes of a layer of rock, less the well's.
+    Where a layer has no lag before it, the last state is the last step of the valve.
+    """
+    if type(value) is dict and "rates" in value:
+        return read_continuous(value, task)
+    more = [k for k in ("root", "noise", "diffusion") if type(value) is dict and k in value]
+    parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
+    given = keys(value, "loop", *parts, *more)
+    implicit, layered = "root" in more, "diffusion" in more
+    root = read_root(given["root"]) if implicit else None
+    step, delay, lag = (number(given[k], k) for k in ("step", "delay", "lag"))
+    need(step > 0 and 0 <= delay <= MAX_PERIODS * step and lag >= 0, "step > 0, delay of 0 to 8 steps, lag >= 0")
+    n = count_states(given["states"])
+    update, seen = matrix(given["update"], "update", n, n), matrix(given["measured"], "measured", n, 2 + implicit)
+    output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2 + implicit)
+    noise = read_noise(given["noise"]) if "noise" in more else (Fraction(0), Fraction(0))
+    need(implicit or not noise[1] or uses_rate(seen, feedback), "noise of the slip rate needs a law that measures it")
+    time = number(given.get("diffusion", "0"), "diffusion")
+    need(not layered or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
+    whole, part = delay // step, delay % step
+    waiting = int(whole) + (part > 0)
+    behind, stepped = (lag > 0) + MODES * layered, layered and lag == 0
+    size = 2 + n + waiting + 1 + behind + stepped
+    need(size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
+    valve = 2 + n + waiting
+    path = range(valve + 1, valve + 1 + behind)
+    modes = path[lag > 0 :]
+
+    push = [Fraction(i in (valve, valve + 1)) for i in range(size)]  # modes follow
+    flow = zeros(size)
+    flow[0][1] = Fraction(1)
+    if lag > 0:
+        flow[valve + 1][valve + 1] = -1 / lag
+    for k, mode in enumerate(modes):
+        push[mode], flow[mode][mode] = mode_share(k), -mode_rate(k, time)
+        if lag > 0:
+            flow[mode][valve + 1] = 1 / lag
+    flow[1] = [sum(task.beta) / 2 * v for v in push]
+    flow[1][0], flow[1][1] = sum(task.s) / 2, -sum(task.w) / 2
+
+    rest = [Fraction(0)] * (size - 2 - n)  # behind it the column of w
+    asked = [*(task.b * v for v in (*feedback[:2], *output)), *rest, task.b * sum(feedback[2:])]
+    sample = [[*line, Fraction(0)] for line in unit(size)]
+    for i in range(n):
+        sample[2 + i] = [*seen[i][:2], *update[i], *rest, Fraction(sum(seen[i][2:]))]
+    queue = [*range(2 + n, 2 + n + waiting), *([] if part else [valve])]
+    for i, place in enumerate(queue):
+        sample[place] = [*unit(size)[queue[i - 1]], Fraction(0)] if i else asked
+    arrival = unit(size)
+    arrival[valve] = unit(size)[valve - 1]
+    pressures = [Fraction(0)] * (2 + n) + [Fraction(-1)] * (waiting + 1) + [Fraction(0)] * (behind + stepped)
+    still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(update)]
+    drift = [
+        *pressures[:2],
+        *(-v / task.b for v in steady_states(still, output, [Fraction(0)] * n, Fraction(1))),
+        *pressures[2 + n :],
+    ]
+    last = arrival if part else sample
+    change = [v - (i == valve) for i, v in enumerate(last[valve])]
+    for i in path[:1] if lag > 0 else path:  # it stays while the valve's pressure jumps
+        last[i] = [v - c for v, c in zip(last[i], change, strict=True)]
+    if stepped:
+        last[-1] = change
+    slope = sum(root.slopes) / (2 * step) if root else Fraction(0)
+    events = [([[line[0] - slope * line[size], *line[1:size]] for line in sample], part or step)]
+    events += [(arrival, step - part)] if part else []
+    inputs = [unit(size)[1], drift, *([[line[size] for line in sample]] if root else [])]
+    told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
+    inputs += [entry for entry, off in zip(told, noise, strict=True) if off]
+    outputs = [unit(size)[0], unit(size)[1], push]
+    if not layered:
+        return Loop(flow, events, outputs, inputs, root, step, noise)
+    high, rate, floor = abs(mode_share(MODES)), mode_rate(MODES, time), 6 * MODES * SHORT
+    if lag > 0:
+        left = (high / rate + floor * time) / lag
+        return Loop(
+            flow, events, [*outputs, [left * v for v in unit(size)[valve + 1]]], inputs, root, step, noise, BENT, HALVES
+        )
+    height, floor = high * (1 + 1 / (rate * step)), floor * (1 + time / step)
+    most = height + floor
+    fade = Fade(int(part > 0), height / most, rate, floor / most)
+    outputs, inputs = [*outputs, [most * v for v in unit(size)[-1]]], [*inputs, unit(size)[1]]
+    return Loop(flow, events, outputs, inputs, root, step, noise, BENT, HALVES, fade)
+
+
+def read_noise(value: Any) -> tuple[Fraction, Fraction]:
+    """Bounds of what the measured slip and slip rate are off."""
+    slip, rate = numbers(value, "noise", "slip", "rate").values()
+    need(slip >= 0 and rate >= 0, "bounds of the noise must be >= 0")
+    return slip, rate
+
+
+def uses_rate(measured: list[Row], feedback: Row) -> bool:
+    """Whether a law without an implicit step does anything with the slip rate."""
+    return any(line[1] for line in (*measured, feedback))
+
+
+def mode_rate(number: int, time: Fraction) -> Fraction:
+    """How fast a mode of a layer decays, from below, for L^2/D = time."""
+    return ((2 * number + 1) * PI / 2) ** 2 / time
+
+
+def mode_share(number: int) -> Fraction:
+    """What a mode of a layer takes of a step, its size from above."""
+    return (-1) ** number * 4 / ((2 * number + 1) * PI)
+
+
+def read_continuous(value: Any, task: Task) -> Loop:
+    """Build the error loop of a law whose pressure acts at once: e1, e2 and the law's states."""
+    parts = ("states", "rates", "measured", "output", "feedback")
+    given = keys(value, "loop", *parts, *(["of_reference"] if "of_reference" in value else []))
+    n = count_states(given["states"])
+    rates, seen = matrix(given["rates"], "rates", n, n), matrix(given["measured"], "measured", n, 2)
+    output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2)
+    push = [task.b * v for v in (*feedback, *output)]
+    middles = [sum(task.s) / 2, -sum(task.w) / 2] + [Fraction(0)] * n
+    flow = [unit(2 + n)[1]]
+    flow.append([v + sum(task.beta) / 2 * p for v, p in zip(middles, push, strict=True)])
+    flow += [[*fed, *kept] for fed, kept in zip(seen, rates, strict=True)]
+    steady = steady_states(rates, output, [Fraction(0)] * n, Fraction(1))
+    inputs = [unit(2 + n)[1], [Fraction(0)] * 2 + [-v / task.b for v in steady]]
+    forward = row(given.get("of_reference", ["0", "0"]), "of_reference", 2)
+    if any(forward):
+        need(task.smooth, "the reference must start and end without acceleration for this law")
+        moving = steady_states(rates, output, steady, Fraction(0))
+        inputs += [[Fraction(0)] * 2 + [k * v for v in moving] for k in forward]
+    return Loop(flow, [], [unit(2 + n)[0], unit(2 + n)[1], push], inputs, None, Fraction(0))
+
+
+def count_states(names: Any) -> int:
+    """Number of a law's states, after checking their names."""
+    sound = type(names) is list and len(names) <= MAX_LAW_STATES and all(type(v) is str for v in names)
+    need(sound and all(NAME.fullmatch(v) for v in names) and len(set(names)) == len(names), "states must be names")
+    return len(names)
+
+
+def steady_states(own: list[Row], output: Row, rates: Row, asked: Fraction) -> Row:
+    """Some z with Mz = rates and Cz = asked, by elimination."""
+    n = len(output)
+    table = [[*line, rate] for line, rate in zip(own, rates, strict=True)]
+    table.append([*output, asked])
+    found = [Fraction(0)] * n
+    pivots: list[tuple[int, Row]] = []
+    for column in range(n):
+        chosen = next((line for line in table if line[column]), None)
+        if chosen is None:
+            continue
+        chosen = [v / chosen[column] for v in chosen]
+        table = [[a - line[column] * c for a, c in zip(line, chosen, strict=True)] for line in table]
+        pivots.append((column, chosen))
+    need(not any(line[n] for line in table), "the law must be able to ask for a constant pressure without errors")
+    for column, line in reversed(pivots):
+        found[column] = line[n] - sum(v * f for v, f in zip(line, found, strict=False))
+    return found

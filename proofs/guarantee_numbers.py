@@ -1,0 +1,120 @@
+"""Matrices of integers in units of 2^-BITS, each with a bound of its error, and their exponentials."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from itertools import chain, count
+from math import factorial, lcm
+
+from guarantee_reading import Row, need
+
+BITS = 192
+LARGEST = 1 << 2 * BITS  # entries beyond 2^BITS
+
+
+def zeros(size: int) -> list[Row]:
+    """Square matrix of zeros."""
+    return [[Fraction(0)] * size for _ in range(size)]
+
+
+def unit(size: int) -> list[Row]:
+    """Unit matrix."""
+    return [[Fraction(i == j) for j in range(size)] for i in range(size)]
+
+
+@dataclass
+class Fixed:
+    """Matrix of integers in units of 2^-BITS; no entry is farther from the true one than `error` units."""
+
+    rows: list[list[int]]
+    error: int = 0
+
+    def __mul__(self, other: "Fixed") -> "Fixed":
+        columns = list(zip(*other.rows, strict=True))
+        rows = [[sum(map(int.__mul__, line, column)) >> BITS for column in columns] for line in self.rows]
+        widest = max(sum(map(abs, line)) for line in self.rows) + self.error * len(self.rows[0])
+        tallest = max((sum(map(abs, column)) for column in columns), default=0)
+        return bounded(Fixed(rows, (widest * other.error + tallest * self.error >> BITS) + 2))
+
+    def __add__(self, other: "Fixed") -> "Fixed":
+        rows = [[a + b for a, b in zip(*lines, strict=True)] for lines in zip(self.rows, other.rows, strict=True)]
+        return Fixed(rows, self.error + other.error)
+
+    def scaled(self, factor: Fraction) -> "Fixed":
+        """Times a number that is not negative."""
+        top, bottom = factor.numerator, factor.denominator
+        return bounded(Fixed([[v * top // bottom for v in line] for line in self.rows], self.error * top // bottom + 2))
+
+    def size(self) -> "Fixed":
+        """Upper bounds of the absolute values, exact."""
+        return Fixed([[abs(v) + self.error for v in line] for line in self.rows])
+
+    def beside(self, *others: "Fixed") -> "Fixed":
+        """Columns of several matrices side by side."""
+        parts = (self, *others)
+        rows = [[v for line in lines for v in line] for lines in zip(*(p.rows for p in parts), strict=True)]
+        return Fixed(rows, max(p.error for p in parts))
+
+    def above(self, *others: "Fixed") -> "Fixed":
+        """Rows of several matrices, one after another."""
+        parts = (self, *others)
+        return Fixed([line for p in parts for line in p.rows], max(p.error for p in parts))
+
+    def sums(self) -> list[int]:
+        """Upper bounds of the sums of absolute values, row by row."""
+        return [sum(map(abs, line)) + self.error * len(line) for line in self.rows]
+
+
+def bounded(value: Fixed) -> Fixed:
+    """Refuse numbers that only an unstable or absurd loop can have."""
+    largest = max(map(abs, chain([value.error], *value.rows)))
+    need(largest <= LARGEST, "the nominal loop must be stable, its numbers of ordinary size")
+    return value
+
+
+def fixed(rows: Sequence[Sequence[Fraction]]) -> Fixed:
+    """Nearest multiples below."""
+    return bounded(Fixed([[(v.numerator << BITS) // v.denominator for v in line] for line in rows], 1))
+
+
+def column(values: Sequence[Fraction]) -> Fixed:
+    """One column."""
+    return fixed([[v] for v in values])
+
+
+def exponential(flow: list[Row], time: Fraction) -> Fixed:
+    """e^{At} by a Taylor sum at t/2^j and squaring."""
+    norm = max(sum(map(abs, line)) for line in flow) * time
+    need(norm <= 1 << 12, "the flow must change by a factor of ordinary size between two events")
+    halvings = int(norm).bit_length()  # to a norm below 1
+    base = fixed([[v * time / 2**halvings for v in line] for line in flow])
+    term = total = fixed(unit(len(flow)))
+    terms = next(n for n in count(2) if factorial(n) >> BITS + 1)
+    for k in range(1, terms):
+        term = (term * base).scaled(Fraction(1, k))
+        total = total + term
+    # what is left out is below 2/n!, n terms: less than the unit that the error of the exact first term has to spare
+    for _ in range(halvings):
+        total = total * total
+    return total
+
+
+def exponentials(flow: list[Row], times: Row) -> list[Fixed]:
+    """The same of several times, as powers of that of the longest time that goes into all of them."""
+    return shared_exponentials(tuple(map(tuple, flow)), tuple(times), BITS)
+
+
+@lru_cache(maxsize=16)  # all inputs of a loop ask for the same ones
+def shared_exponentials(flow: tuple[tuple[Fraction, ...], ...], times: tuple[Fraction, ...], _: int) -> list[Fixed]:
+    """The same, computed once in so many bits."""
+    grain = times[0] / lcm(*((times[0] / time).numerator for time in times))
+    found = {1: exponential([list(line) for line in flow], grain)}
+
+    def power(k: int) -> Fixed:
+        if k not in found:
+            half = power(k // 2)
+            found[k] = half * half * found[1] if k % 2 else half * half
+        return found[k]
+
+    return [power(int(time / grain)) for time in times]

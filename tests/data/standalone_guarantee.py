@@ -1,0 +1,24 @@
+"""The standalone modules that verify guarantees as one, with all their names; one is replaced in all of them."""
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+PATH = Path(__file__).parents[2] / "proofs" / "check.py"
+SPECIFICATION = importlib.util.spec_from_file_location("check_of_guarantees", PATH)
+CHECK = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(CHECK)
+MODULES = [CHECK.beside(name) for name in CHECK.IMPORTS if name.startswith("guarantee")]
+
+
+class Checker(ModuleType):
+    def __setattr__(self, name, value):
+        super().__setattr__(name, value)
+        for module in MODULES:
+            if hasattr(module, name):
+                setattr(module, name, value)
+
+
+checker = Checker("guarantees")
+for part in MODULES:
+    vars(checker).update(vars(part))
