@@ -63,9 +63,9 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         rate = "" if alone else f", slip rate within {loop['noise']['rate']} m/s"
         off = f", measured slip within {loop['noise']['slip']} m of the true one{rate}"
     return [
-        f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction "
-        + ("any function of the slip alone" if "slow_gain" in document else "anything")
-        + " within its bounds and slopes, continued to negative slip rates",
+        f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction any function of "
+        + ("the slip alone" if task.steady_beta else "slip and slip rate")
+        + " within its bounds and slopes, continued to negative slip rates, parameters constant",
         f"s in [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, w in [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, "
         f"beta in [1, {upper(task.beta[1])}], b = {upper(task.b)} m^2/kg, derived",
         f"law with {len(loop['states'])} states{implicit}{told}, {when}{off}",

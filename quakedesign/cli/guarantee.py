@@ -34,8 +34,8 @@ def guarantee(
 ) -> int:
     """Prove how far slip, slip rate and pressure of the loop that runs can go: sampled, held, late, for ever.
 
-    For all friction and parameters of the box and every disturbance of a class, from rest, along the reference. Exit
-    code 0 only if proved.
+    For all friction and constant parameters of the box and every disturbance of a class, from rest, along the
+    reference. Exit code 0 only if proved.
 
     Parameters
     ----------

@@ -241,8 +241,8 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
     claims = dict(zip(CLAIMS, (F(1, 3), F(2, 3), F(1, 7), F(-1, 3), F(2, 3)), strict=True))
     raw = changed(HELD, (("loop", "delay"), "1/3"), (("loop", "lag"), "2/3"))
     assert checker.statement(raw, task, claims, F(1, 3)) == [
-        "fault a fault (a name; the data in the file are what counts), friction anything within its bounds and slopes, "
-        "continued to negative slip rates",
+        "fault a fault (a name; the data in the file are what counts), friction any function of slip and slip rate "
+        "within its bounds and slopes, continued to negative slip rates, parameters constant",
         "s in [-0.3334, 0.6667] 1/s^2, w in [-0.6667, 0.3334] 1/s, beta in [1, 0.3334], b = 0.6667 m^2/kg, derived",
         "law with 1 states, every 1 s, 1/3 s late, lag 2/3 s",
         "disturbance: |phi| <= 0.3333 m/s^2, |phi'| <= 0.1428 m/s^3, phi(0) = 0; from rest, along the reference, "
@@ -391,10 +391,9 @@ def test_the_slip_error_on_which_a_slow_gain_rests_stays_below_its_claim(monkeyp
         monkeypatch.setattr(checker, "bounds", lambda *given: asked.append(given) or ([slip, F(0), F(0)], F(1, 2)))
         return checker.verify(raw)[0]
 
-    first = "fault a fault (a name; the data in the file are what counts), friction {} within its bounds and slopes, "
-    first += "continued to negative slip rates"
-    assert verified(slow, F(999, 1000)) == first.format("any function of the slip alone")
-    assert verified(steady, F(1)) == first.format("anything")
+    first = "fault a fault (a name; the data in the file are what counts), friction any function of the slip alone "
+    first += "within its bounds and slopes, continued to negative slip rates, parameters constant"
+    assert [verified(slow, F(999, 1000)), verified(steady, F(1))] == [first, first]
     assert [given[2:] for given in asked] == [(checker.Slow(3, F(1, 9)), F(1)), (None, F(1))]
     for slip in (F(1), F(2)):
         with pytest.raises(checker.Refused, match="the slip error that moves the input gain must stay below its claim"):

@@ -249,7 +249,7 @@ def sentence_of(task: Task, claims: Claims, when: str) -> str:
         kind = "without disturbance"
     pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
     return (
-        f"from rest, {when}, {kind}, for all friction and parameters of the box: "
+        f"from rest, {when}, {kind}, for all friction and constant parameters of the box: "
         f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
         f"{claims.slip_error:.3g} m of the reference, the pressure between {pressures} "
         "(for a plant continued to negative slip rates)"

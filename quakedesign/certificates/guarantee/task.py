@@ -5,8 +5,9 @@ About p*(t), the pressure that would hold the fault at rest at the reference r(t
     e1′ = e2,   e2′ = s·e1 − w·e2 + β·b·(p − p*) + φ − w·r′ − r″.
 
 p* balances N̂(μ*σ′ − μ(r, 0)(σ′ − p*)) = (k̂ − φ1)r; s and w are chords of friction between x and (r, 0), times N̂(σ′
-− p*), with −k̂ + φ1 and η̂ − φ2; β·b = μ(x)N̂. So all three lie in ranges for every friction with the bounds and
-slopes given, and b·|dp*/dt| = |s_r|r′/β_r with s_r, β_r in the same ranges. r stands still outside [0, t_op].
+− p*), with −k̂ + φ1 and η̂ − φ2; β·b = μ(x)N̂. So all three lie in ranges for every friction μ(x) with the bounds
+and slopes given, and, k̂, N̂ and φ1 being constant, b·|dp*/dt| = |s_r|r′/β_r with s_r, β_r in the same
+ranges. r stands still outside [0, t_op].
 """
 
 from collections.abc import Iterable

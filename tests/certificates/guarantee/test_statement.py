@@ -86,6 +86,12 @@ def test_a_sentence_says_which_disturbances_and_none_that_are_larger(amplitude, 
     assert said in sentence_of(replace(TASK, amplitude=amplitude, change=change), CLAIMS, "held over 1 s")
 
 
+def test_parameters_are_said_to_be_constant_for_a_spring_that_stiffens_at_once_pulls_more_than_any_disturbance():
+    """At the end of the task, by a tenth: 0.1·k̂·785 mm, k̂ = 0.48/s², which no sampled law can know of for a period."""
+    assert "for all friction and constant parameters of the box" in sentence_of(TASK, CLAIMS, "held over 1 s")
+    assert TASK.stiffness[0] * TASK.target_slip / 10 == F("0.03768") > 100 * TASK.amplitude
+
+
 def test_noise_is_said_and_must_be_of_what_is_measured():
     alone = LinearLaw(
         states=("z",), update=((F(1),),), measured=((F(1), F(0)),), output=(F(1),), feedback=(F(1), F(0)), root=None
