@@ -124,6 +124,43 @@ def circle(arrows):
     return sorted(rest)
 
 
+SLOW = {
+    "fault": {"sympy", "pint", "mpmath", "docstring_parser"},
+    "rationals": {"sympy"},
+    "sos.exact": {"sympy"},
+    "sos.solve": {"cvxpy", "scipy"},
+    "simulation": {"control", "scipy", "pandas", "xarray", "matplotlib", "distributed"},
+    "synthesis": {"cvxpy", "control"},
+    "report": {"matplotlib", "jinja2"},
+}
+"""Libraries that a room loads inside functions: each takes longer than much that does without it."""
+
+
+def late_imports(path):
+    """Names that a file imports inside functions."""
+    functions = (node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if hasattr(node, "args"))
+    for node in (inner for function in functions for inner in ast.walk(function)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in SOURCES if room(module_name(p)) not in ("cli", "__main__")], ids=module_name
+)
+def test_imports_stand_at_the_top_but_those_of_slow_libraries(path):
+    """Commands refuse what is wrong before they load anything, so that they import inside as well."""
+    assert {name.split(".")[0] for name in late_imports(path)} <= SLOW.get(room(module_name(path)), set())
+
+
+def test_no_slow_library_is_named_in_vain():
+    rooms = {}
+    for path in SOURCES:
+        rooms.setdefault(room(module_name(path)), set()).update(name.split(".")[0] for name in late_imports(path))
+    assert {name: rooms[name] for name in SLOW} == SLOW
+
+
 def test_no_module_imports_in_a_circle():
     arrows = {module_name(p).removesuffix(".__init__"): imported_modules(p) for p in SOURCES}
     assert circle(arrows) == []

@@ -17,9 +17,13 @@ from quakedesign.cli.shared import (
     Whole,
     in_unit,
 )
+from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:
+    from quakedesign.loop.actuators import Stage
     from quakedesign.simulation import Actuator, Sensor
+
+_SAME = 1e-9  # of a sampling period
 
 _ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
 _SENSORS = Group("Sensors (schemes that sample)")
@@ -63,10 +67,42 @@ class ActuatorOptions:
     cells: Whole = 16
 
     def build(self, step: float) -> "Actuator":
-        """Actuator for a sampling period [s]; raises `ParameterError`."""
-        from quakedesign.studies.hardware import actuator
+        """Stages of an actuator in the order of the signal, for a sampling period [s].
 
-        return actuator(step, **asdict(self))
+        Raises
+        ------
+        ParameterError
+            For values that a stage refuses, or for a part of a stage that is not there.
+        """
+        from quakedesign.simulation import Actuator, Delay, Diffusion, Lag, Quantisation, RateLimit, Saturation
+
+        if self.storage is not None and self.diffusion is None:
+            raise ParameterError(f"a storage belongs to a diffusion. Received {self.storage:g} m³/Pa alone. Give both.")
+        if self.withdrawal is not None and self.saturation is None:
+            raise ParameterError(
+                f"a withdrawal belongs to a saturation. Received {self.withdrawal:g} Pa alone. Give both."
+            )
+        stages: list[Stage] = [Delay(samples=_periods(self.delay, step))] if self.delay else []
+        stages += [] if self.quantum is None else [Quantisation(quantum=self.quantum)]
+        if self.saturation is not None:
+            least = 0.0 - (self.saturation if self.withdrawal is None else self.withdrawal)
+            stages.append(Saturation(lowest=least, highest=self.saturation))
+        stages += [] if self.rate_limit is None else [RateLimit(rate=self.rate_limit)]
+        stages += [] if self.lag is None else [Lag(time_constant=self.lag)]
+        if self.diffusion is not None:
+            stages.append(Diffusion.of_time(self.diffusion, storage=self.storage, cells=self.cells))
+        return Actuator(stages=tuple(stages))
+
+
+def _periods(delay: float, step: float) -> int:
+    """Number of sampling periods in a delay [s]."""
+    count = round(delay / step) if step > 0 and 0 <= delay < 1e9 * step else -1
+    if count < 0 or abs(delay - count * step) > _SAME * step:
+        raise ParameterError(
+            f"delay must be a whole number of sampling periods of {step:g} s, since p is held over each. "
+            f"Received {delay:g} s. Change the delay or the step."
+        )
+    return count
 
 
 @Parameter(name="*", group=_SENSORS)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import require_ordinary, require_positive
+from quakedesign.rationals import rational
 from quakedesign.text import shown
 
 if TYPE_CHECKING:
@@ -48,8 +49,6 @@ class Reference:
     def slip(self, time: "sp.Expr") -> "sp.Expr":
         """Reference slip [m] at a time [s] of [0, operation_time], with exact numbers."""
         import sympy as sp
-
-        from quakedesign.rationals import rational
 
         d_max, t_op = (sp.Rational(str(rational(v))) for v in (self.target_slip, self.operation_time))
         return d_max * self.shape(time / t_op)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from quakedesign.fault import FrictionLaw
@@ -96,8 +97,6 @@ class Experiment(ABC):
 
 def fitted_quantities(law: FrictionLaw, names: Sequence[str], fitted: Any) -> dict[Any, Any]:
     """What the symbols of a law stand for: exponentials of what is fitted by name, else its own numbers."""
-    import casadi as ca
-
     places = {name: i for i, name in enumerate(names)}
     return {
         symbol: ca.exp(fitted[places[name]]) if name in places else getattr(law, name)

@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy import stats
+from scipy.optimize import least_squares
 
 from quakedesign.errors import RecordError
 from quakedesign.identification.experiment import Experiment
@@ -112,9 +114,7 @@ class Fit:
 
     def threshold(self, count: int) -> float:
         """`excess` that so many parameters jointly stay below with the confidence of `CONFIDENCE` (Fisher's F)."""
-        from scipy.stats import f
-
-        return float(count * f.ppf(CONFIDENCE, count, self.freedom))
+        return float(count * stats.f.ppf(CONFIDENCE, count, self.freedom))
 
     def distance(self, fitted: "np.ndarray") -> float:
         """`excess` of given coordinates, infinite where there is no such experiment."""
@@ -202,8 +202,6 @@ def minimised(
     steps: int = 100,
 ) -> "tuple[np.ndarray, float]":
     """Coordinates with the least sum of squares near a start, and that sum; `fixed` ones stay as they are."""
-    from scipy.optimize import least_squares
-
     free = np.ones(len(start), dtype=bool) if fixed is None else ~fixed
     low, high = experiment.bounds
     whole = np.clip(np.array(start, dtype=float), low, high)
@@ -259,11 +257,9 @@ def outliers(residuals: "np.ndarray", longest: int) -> "np.ndarray":
 
     The size of the noise is that of the median residual.
     """
-    from scipy.stats import norm
-
     middle = np.median(residuals)
-    size = np.median(np.abs(residuals - middle)) / norm.ppf(0.75)
-    far = np.abs(residuals - middle) > size * norm.isf((1 - CONFIDENCE) / 2 / len(residuals))
+    size = np.median(np.abs(residuals - middle)) / stats.norm.ppf(0.75)
+    far = np.abs(residuals - middle) > size * stats.norm.isf((1 - CONFIDENCE) / 2 / len(residuals))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], far.astype(int), [0]])))
     found = np.zeros(len(residuals), dtype=bool)
     for begin, end in zip(edges[::2], edges[1::2], strict=True):

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
+import casadi as ca
+
 ORDER = 3
 SOURCE = "RODAS3 of Sandu, Verwer, Blom, Spee, Carmichael and Potra (1997), Atmos. Environ. 31(20), 3459"
 _DIAGONAL = 0.5
@@ -24,8 +26,6 @@ def step(field: Callable[[Any], Any], y: Any, length: Any) -> tuple[Any, Any]:
     -------
     tuple of casadi.SX
     """
-    import casadi as ca
-
     rates = field(y)
     inverse = ca.inv(ca.SX.eye(y.numel()) - _DIAGONAL * length * ca.jacobian(rates, y))
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from quakedesign.fault import FrictionLaw
@@ -153,8 +154,6 @@ class Sliding(Experiment):
     @cached_property
     def _readings(self) -> dict[str, Any]:
         """Functions of all samples at once, the coordinates shared."""
-        import casadi as ca
-
         found = {}
         for name in ("friction", "slopes"):
             one = self._build[f"{name}_of_state"]
@@ -206,8 +205,6 @@ class _Course:
 @lru_cache(maxsize=8)
 def _built(law: FrictionLaw, names: tuple[str, ...], stiffness: float | None, first_rate: float) -> dict[str, Any]:
     """CasADi Functions of a step, its derivatives and what is read, for logarithms of rate, states and coordinates."""
-    import casadi as ca
-
     model = _Model(law, names, stiffness)
     count, size = len(names), 1 + len(law.state_names)
     q, u = ca.SX.sym("q", count), ca.SX.sym("u", 4)
@@ -243,8 +240,6 @@ class _Model:
 
     def field(self, y: Any, u: Any, q: Any) -> Any:
         """d/dt of the logarithms of rate and states, from d(σ'μ)/dt = k(load rate − rate)."""
-        import casadi as ca
-
         friction, *ageing = self._expressions
         slopes = [friction.diff(x) for x in (rate, *self._states)]
         (mu, mu_rate), others = (found := self._casadi([friction, *slopes, *ageing], y, q))[:2], found[2:]
@@ -258,8 +253,6 @@ class _Model:
 
     def start(self, first_rate: float, q: Any) -> Any:
         """Steady sliding."""
-        import casadi as ca
-
         steady = self.law.symbolic().steady_state(rate)
         values = fitted_quantities(self.law, self.names, q) | {rate: ca.SX(first_rate)}
         return ca.log(ca.vertcat(first_rate, *to_casadi(steady, values)))
@@ -275,7 +268,5 @@ class _Model:
         return [friction, *law.state_rates(x1, rate, *self._states)]
 
     def _casadi(self, expressions: Any, y: Any, q: Any) -> list[Any]:
-        import casadi as ca
-
         moving = {x: ca.exp(y[i]) for i, x in enumerate((rate, *self._states))}
         return to_casadi(expressions, fitted_quantities(self.law, self.names, q) | moving)

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import casadi as ca
+
 from quakedesign.loop.schemes import Stepped
 from quakedesign.simulation.loading import Load
 from quakedesign.symbolic import plant
@@ -104,8 +106,6 @@ class Meter:
 
     def advance(self, method: Any, motion: Any, state: Any, step: float) -> Any:
         """See `Stepped.advance`; the works are integrated along with the motion."""
-        import casadi as ca
-
         size = state.shape[0]
 
         def with_powers(plant: Any, passed: Any, now: Any) -> Any:
@@ -161,8 +161,6 @@ class Metered(Stepped):
         Friction counts relative to its static value under the whole normal stress, whose work is exact in the slip; it
         acts against `direction`.
         """
-        import casadi as ca
-
         _, normal, damping, stress = self.hats()
         rate, relief = (ca.fabs(x[1]), ca.fmin(pressure, stress)) if self.sticks else (x[1], pressure)
         friction, way = self.friction(ca.vertcat(x[0], rate)), direction * x[1]

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import casadi as ca
+
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop.actuators.base import SampledStage
 
@@ -35,7 +37,5 @@ class Quantisation(SampledStage):
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
         """Nearest multiple; see `SampledStage.apply`."""
-        import casadi as ca
-
         (quantum,) = numbers
         return quantum * ca.floor(pressure / quantum + 0.5), memory

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import casadi as ca
+
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop.actuators.base import SampledStage
 
@@ -41,8 +43,6 @@ class RateLimit(SampledStage):
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
         """Pressure that can be reached; see `SampledStage.apply`."""
-        import casadi as ca
-
         (rate,), (held,) = numbers, memory
         reached = held + ca.fmin(ca.fmax(pressure - held, -rate * step), rate * step)
         return reached, [reached]

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import casadi as ca
+
 from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators.base import SampledStage
 
@@ -43,7 +45,5 @@ class Saturation(SampledStage):
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
         """Pressure within the bounds; see `SampledStage.apply`."""
-        import casadi as ca
-
         lowest, highest = numbers
         return ca.fmin(ca.fmax(pressure, lowest), highest), memory

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import casadi as ca
 import sympy as sp
 
 from quakedesign.errors import ParameterError
@@ -75,8 +76,6 @@ class Compensated(Sampled):
     @classmethod
     def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
-        import casadi as ca
-
         begun, before, ahead_before, estimate, weight = own
         pull, feed_forward, slope = found
         gain, rate_error = known[sampled_law.step] * known[sampled_law.authority], known[sampled_law.rate_error]

@@ -2,6 +2,8 @@
 
 from typing import Any, ClassVar
 
+import casadi as ca
+
 from quakedesign.loop.schemes.base import Scheme, Stepped
 
 
@@ -31,7 +33,5 @@ class Continuous(Scheme):
 
     @staticmethod
     def _motion(loop: Stepped, plant: Any, time: Any, now: Any) -> Any:
-        import casadi as ca
-
         pressure, integral_rates = loop.law(now[:2], now[2:], loop.reference(time))
         return ca.vertcat(plant(time, now[:2], pressure), integral_rates)

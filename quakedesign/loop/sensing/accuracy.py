@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import casadi as ca
+import numpy as np
 
 from quakedesign.loop.sensing.differentiator import Differentiator
-
-if TYPE_CHECKING:
-    import numpy as np
 
 SAMPLES = 1000
 SETTLED = 400
@@ -51,15 +51,11 @@ def constants(unit: Differentiator, noisy: bool) -> tuple[float, ...]:
 
 
 def _orders(unit: Differentiator, scale: float) -> "np.ndarray":
-    import numpy as np
-
     return scale ** np.arange(unit.order + 1, 0, -1.0)
 
 
 def _errors(unit: Differentiator, scale: float) -> "np.ndarray":
     """Largest settled errors; with a scale above 1 under the noise that has it."""
-    import numpy as np
-
     random = np.random.default_rng(0)
     noise = scale ** (unit.order + 1) if scale > 1 else 0.0
     acceleration, sign = (part.ravel() for part in np.meshgrid(*[np.arange(_kinds(unit))] * 2))
@@ -85,8 +81,6 @@ def _kinds(unit: Differentiator) -> int:
 
 def _signs(sample: int, errors: "np.ndarray", random: Any) -> "np.ndarray":
     """One row an adversary: square waves, for and against every error, and chance; one column a run."""
-    import numpy as np
-
     columns = errors.shape[1]
     waves = [np.full(columns, 1.0 if sample // half % 2 else -1.0) for half in HALF_PERIODS]
     chasing = [way * np.where(error > 0, 1.0, -1.0) for error in errors for way in (1, -1)]
@@ -95,8 +89,6 @@ def _signs(sample: int, errors: "np.ndarray", random: Any) -> "np.ndarray":
 
 def _moved(derivatives: "np.ndarray", highest: "np.ndarray") -> "np.ndarray":
     """Derivatives one time unit later, with a constant next one."""
-    import numpy as np
-
     whole = [*derivatives, highest]
     after = []
     for i in range(len(derivatives)):
@@ -109,8 +101,6 @@ def _moved(derivatives: "np.ndarray", highest: "np.ndarray") -> "np.ndarray":
 
 def _function(unit: Differentiator) -> Any:
     """CasADi Function (memory, slip) → memory, estimates."""
-    import casadi as ca
-
     memory, slip = ca.SX.sym("memory", unit.size), ca.SX.sym("slip")
     estimates, after = unit.estimate([*map(ca.SX, unit.numbers)], ca.vertsplit(memory), slip)
     return ca.Function("differentiator", [memory, slip], [ca.vertcat(*after), ca.vertcat(*estimates)])

@@ -3,6 +3,8 @@
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
+import casadi as ca
+
 from quakedesign.errors import ParameterError
 
 _SAME = 1e-12  # relative difference of two sampling periods that are meant to be one
@@ -71,8 +73,6 @@ class Sensor(ABC):
 
     def function(self) -> Any:
         """CasADi Function (memory, slip [m]) → memory, slip estimate [m], slip-rate estimate [m/s]."""
-        import casadi as ca
-
         memory, slip = ca.SX.sym("memory", self.size), ca.SX.sym("slip")
         seen, after = self.measure([*map(ca.SX, self.numbers)], ca.vertsplit(memory), ca.vertcat(slip, 0))
         outputs = [ca.vertcat(*after), seen[0], seen[1]]

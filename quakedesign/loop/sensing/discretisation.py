@@ -28,6 +28,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+import casadi as ca
+
 NEWTON_STEPS = 8
 
 
@@ -35,8 +37,6 @@ def explicit_step(
     gains: Sequence[Any], step: Any, state: Sequence[Any], slip: Any, filters: int, taylor: bool
 ) -> list[Any]:
     """y after one sample (SX); the gains are T·λ̃_(N−j)·λ_d^(j/N), j = 1 … N."""
-    import casadi as ca
-
     size = len(state)
     distance = state[0] if filters else state[0] - slip
     root = _root(ca.fabs(distance), size)
@@ -53,8 +53,6 @@ def implicit_step(
     gains: Sequence[Any], scale: Any, table: Sequence[float], step: Any, state: Sequence[Any], slip: Any, filters: int
 ) -> list[Any]:
     """y after one sample (SX); the gains are λ̃_(N−j)·λ_d·T^(N−j+1), j = 1 … N, and the scale is λ_d·T^N."""
-    import casadi as ca
-
     size = len(state)
     ahead = state[-1]
     for value in reversed(state[:-1]):
@@ -82,8 +80,6 @@ def lag_free(order: int) -> tuple[tuple[Fraction, ...], ...]:
 
 def _solve(target: Any, table: Sequence[float]) -> tuple[Any, Any]:
     """q of the polynomial, and the selection of |⌈s⁺⌋⁰| from [0, 1]."""
-    import casadi as ca
-
     size, (jump, *rest) = len(table), table
     excess = ca.fmax(target - jump, 0)
     rising = [*rest, 1.0]  # of q, q² … q^N
@@ -102,8 +98,6 @@ def _solve(target: Any, table: Sequence[float]) -> tuple[Any, Any]:
 
 def _root(value: Any, degree: int) -> Any:
     """Root of a number that is not negative; square roots are correctly rounded."""
-    import casadi as ca
-
     return value if degree == 1 else ca.sqrt(value) if degree == 2 else value ** (1.0 / degree)
 
 

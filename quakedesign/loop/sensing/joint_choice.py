@@ -25,6 +25,8 @@ from quakedesign.fault.checks import require_nonnegative
 from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.loop.sensing.accuracy import worst_errors
 from quakedesign.loop.sensing.differentiator import Differentiator
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.casadi_printer import to_numpy
 
 LARGEST_BOUND = 1e12
 _HALVINGS = 60
@@ -140,8 +142,5 @@ def pressure_swing(controller: Controller, slip_error: float, rate_error: float)
 
 
 def _pressure(controller: Controller, slip: float, rate: float) -> float:
-    from quakedesign.symbolic import plant
-    from quakedesign.symbolic.casadi_printer import to_numpy
-
     rest = dict.fromkeys((*integral_symbols(controller), r, r_rate, r_acceleration), 0.0)
     return float(to_numpy([law_expressions(controller)[0]], {plant.x1: slip, plant.x2: rate, **rest})[0])

@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import casadi as ca
+import numpy as np
+
 from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import require_nonnegative
 from quakedesign.loop.sensing.base import Sensor
@@ -67,15 +70,12 @@ class Measurement(Sensor):
         """State of the generator, from the seed; none without noise."""
         if not self.noisy:
             return ()
-        import numpy as np
 
         words = np.random.SeedSequence(self.seed).generate_state(len(_MODULI))
         return tuple(float(int(word) % (m - 1) + 1) for word, m in zip(words, _MODULI, strict=True))
 
     def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
         """Measured x1 [m] and x2 [m/s] (SX), and the generator afterwards."""
-        import casadi as ca
-
         if not self.noisy:
             return x, memory
         drawn = []
@@ -90,8 +90,6 @@ EXACT = Measurement()
 
 def _normal(memory: list[Any]) -> tuple[list[Any], Any]:
     """State of the generator after two steps, and a number of the standard normal distribution."""
-    import casadi as ca
-
     memory, radius = _uniform(memory)
     memory, angle = _uniform(memory)
     return memory, ca.sqrt(-2 * ca.log(radius)) * ca.cos(2 * ca.pi * angle)
@@ -99,8 +97,6 @@ def _normal(memory: list[Any]) -> tuple[list[Any], Any]:
 
 def _uniform(memory: list[Any]) -> tuple[list[Any], Any]:
     """Next state of the generator, and a number strictly between 0 and 1."""
-    import casadi as ca
-
     after = [ca.fmod(a * state, m) for a, state, m in zip(_FACTORS, memory, _MODULI, strict=True)]
     difference = after[0] - after[1]
     top = _MODULI[0] - 1

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import casadi as ca
+
 from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import require_nonnegative
 from quakedesign.loop.sensing.base import SlipStage
@@ -54,8 +56,6 @@ class Transducer(SlipStage):
 
     def pass_on(self, numbers: list[Any], memory: list[Any], slip: Any) -> tuple[Any, list[Any]]:
         """See `SlipStage.pass_on`."""
-        import casadi as ca
-
         numbers, memory, own = list(numbers), list(memory), []
         if self._filtered:
             before = memory.pop(0)

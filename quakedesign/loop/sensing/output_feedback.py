@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+import casadi as ca
+
 from quakedesign.errors import ParameterError
 from quakedesign.loop.sensing.base import Sensor, SlipStage
 from quakedesign.loop.sensing.differentiator import Differentiator
@@ -63,8 +65,6 @@ class OutputFeedback(Sensor):
 
     def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
         """See `Sensor.measure`."""
-        import casadi as ca
-
         own, past = iter(numbers), iter(memory)
         slip, kept = x[0], []
         for stage in self.stages:

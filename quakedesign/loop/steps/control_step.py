@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
+import casadi as ca
 import sympy as sp
 
 from quakedesign.loop.steps import sampled_law
@@ -85,8 +86,6 @@ class ControlStep:
 @lru_cache(maxsize=64)
 def control_step(kind: type[Decided], law: Law) -> ControlStep:
     """Sampled-step function of a law under a scheme."""
-    import casadi as ca
-
     slopes = tuple(slope_of(law.pressure, symbol) for symbol in law.integrals)
     lifted = Lifted.of((*kind.derive(law), *slopes))
     symbols = {"signals": SIGNALS, "integrals": law.integrals, "numbers": lifted.numbers}
@@ -111,6 +110,4 @@ def slope_of(pressure: sp.Expr, integral: sp.Symbol) -> sp.Expr:
 
 
 def _column(entries: list[Any]) -> Any:
-    import casadi as ca
-
     return ca.vertcat(*entries) if entries else ca.SX(0, 1)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Any
 
+import casadi as ca
 import sympy as sp
 
 from quakedesign.errors import ParameterError
@@ -114,8 +115,6 @@ class Inclusion:
 
     def solve(self, known: Values) -> Values:
         """Values (SX) of `end_slip`, `end_rate` and the signs, from those of all other symbols."""
-        import casadi as ca
-
         excess = self.selected(end_rate - self.free - self.pull)
         jumps = [self._jump(argument, known) for argument in self.arguments]
         sides, there = [], []
@@ -152,8 +151,6 @@ class Inclusion:
 
     def _signs(self, jumps: list[Values], number: int, own: Any) -> Values:
         """Selections at a jump; those whose jumps coincide with it go along."""
-        import casadi as ca
-
         here = jumps[number][end_rate]
         ways = [ca.sign(here - point[end_rate]) for point in jumps]
         found = [own if i == number else ca.if_else(way == 0, own, way) for i, way in enumerate(ways)]
@@ -176,8 +173,6 @@ class Inclusion:
 
     def _quarter(self, falling: sp.Expr, known: Values, width: Any) -> Any:
         """Zero of a falling function of the end of the step, between 0 and `width`."""
-        import casadi as ca
-
         test = _sign_only(falling)
         low, length = ca.fmin(width, 0), ca.fabs(width)
         for _ in range(ROUNDS):
@@ -190,14 +185,10 @@ class Inclusion:
         return to_casadi([expression], known | self._ends(known, end))[0]
 
     def _ends(self, known: Values, end: Any) -> Values:
-        import casadi as ca
-
         return {end_rate: ca.SX(end), end_slip: known[self.slip_error] + known[self.step] * end}
 
 
 def _choose(at: Any, case: Values, other: Values) -> Values:
-    import casadi as ca
-
     return {symbol: ca.if_else(at, case[symbol], other[symbol]) for symbol in other}
 
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
+
 from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators import DIRECT, Actuator
 from quakedesign.loop.actuators.base import FLOWS
@@ -107,8 +109,6 @@ class Sampled(Scheme, Decided):
 
     def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
         """See `Scheme.advance`."""
-        import casadi as ca
-
         sample = self._sample(loop, counter, state, step)
         given = ca.vertcat(counter, sample.held, *sample.numbers)
         start, period = ca.vertcat(state[:2], *sample.flow), step / self.substeps
@@ -121,7 +121,6 @@ class Sampled(Scheme, Decided):
 
     def _motion(self, step: float) -> Any:
         """Rates of plant and actuator under a pressure held, as `Stepped.advance_often` takes them."""
-        import casadi as ca
 
         def motion(plant: Any, passed: Any, now: Any, given: Any) -> Any:
             counter, held, *numbers = ca.vertsplit(given)
@@ -153,8 +152,6 @@ class Sampled(Scheme, Decided):
 
     def _sample(self, loop: Stepped, counter: Any, state: Any, step: float) -> Sample:
         """Measure, decide, and pass the decision on to the actuator; ξ does not wind up where a stage limits."""
-        import casadi as ca
-
         count = len(loop.integrals)
         entries = iter(ca.vertsplit(state[2 + count :]))
         part = {name: [next(entries) for _ in values] for name, values in self._parts(loop).items()}
@@ -175,8 +172,6 @@ class Sampled(Scheme, Decided):
     @staticmethod
     def _known(loop: Stepped, counter: Any, step: float, seen: Any) -> Values:
         """Values of the signals of one sample."""
-        import casadi as ca
-
         now, later = loop.reference(counter * step), loop.reference((counter + 1) * step)
         return {
             sampled_law.slip: seen[0],

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
+from quakedesign.sos.exact.files import save
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares, holds
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.exact.work import limited
@@ -77,6 +78,4 @@ class Answer:
         CertificateError
             When nothing was decided, or the proof is too large for the format.
         """
-        from quakedesign.sos.exact.files import save
-
         save(self.statement, self.proof, path)

@@ -9,6 +9,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly_ctx
 
+from quakedesign.errors import PolynomialError
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.work import expanded, length, longest, spend
 
@@ -137,8 +138,6 @@ def from_sympy(expression: Any, variables: Sequence[Any]) -> dict[Exponents, Fra
         When it is not one.
     """
     import sympy as sp
-
-    from quakedesign.errors import PolynomialError
 
     try:
         terms = sp.Poly(expression, *variables, domain="QQ").terms()

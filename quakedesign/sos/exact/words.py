@@ -5,7 +5,7 @@ from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 
 from quakedesign.sos.exact.answer import Answer
-from quakedesign.sos.exact.polynomial import Polynomial
+from quakedesign.sos.exact.polynomial import Polynomial, evaluate
 from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares
 from quakedesign.sos.exact.work import length
 
@@ -68,8 +68,6 @@ def _reason(answer: Answer) -> list[str]:
 
 
 def _value(answer: Answer, point: Point) -> Fraction:
-    from quakedesign.sos.exact.polynomial import evaluate
-
     return evaluate(answer.statement.polynomial, point.coordinates)
 
 

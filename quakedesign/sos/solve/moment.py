@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import clarabel
 import numpy as np
 from scipy import sparse
 
@@ -105,8 +106,6 @@ class MomentProgram:
         return next(filter(None, (self._solve(target, accuracy, most) for most in _LARGEST_MARGINS)), None)
 
     def _solve(self, target: Mapping[Exponents, float], accuracy: float, most: float) -> Solution | None:
-        import clarabel
-
         cost = np.append(self.vector(target), most)
         if self._solver is None or self._accuracy != accuracy:
             slack = [(0, len(self.keys), 1.0), (1 + self.relation_count, len(self.keys), -1.0)]
@@ -138,8 +137,6 @@ class MomentProgram:
         )
 
     def _cones(self) -> list[Any]:
-        import clarabel
-
         return [clarabel.PSDTriangleConeT(s.size) for s in self.blocks]
 
     def _matrix(self, more: Sequence[tuple[int, int, float]], *, equations: int, limits: int) -> Any:
@@ -164,8 +161,6 @@ class MomentProgram:
 
     def interior(self, target: Mapping[Exponents, float], value: float) -> Mapping[Exponents, float] | None:
         """Functional with L(target) = value < 0 and the largest smallest eigenvalue; None if none is found."""
-        import clarabel
-
         cost = self.vector(target)
         count = 1 + self.relation_count
         unit = np.concatenate([_unit_vector(s.size) for s in self.blocks])
@@ -252,8 +247,6 @@ def options(accuracy: float) -> dict[str, Any]:
 
 def settings(accuracy: float) -> Any:
     """Settings of Clarabel with these values."""
-    import clarabel
-
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     for name, value in options(accuracy).items():

@@ -2,9 +2,13 @@
 
 import pytest
 
+from quakedesign.cli.hardware import ActuatorOptions
 from quakedesign.errors import ParameterError
 from quakedesign.simulation import Delay, Diffusion, Lag, Quantisation, RateLimit, Saturation, stages
-from quakedesign.studies.hardware import actuator
+
+
+def actuator(step, **options):
+    return ActuatorOptions(**options).build(step)
 
 
 def test_nothing_asked_for_is_no_stage():
