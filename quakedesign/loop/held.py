@@ -1,6 +1,7 @@
 """A linear law around a fault: sample, hold, delay, lag, and diffusion between well and fault."""
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from fractions import Fraction
 
 from quakedesign.errors import ParameterError
@@ -60,62 +61,96 @@ def held_loop(
     ParameterError
         For a law that leaves an error under a constant p*, or times that are negative or too long.
     """
-    if step <= 0 or not 0 <= delay <= MOST_PERIODS * step or lag < 0:
-        raise ParameterError(
-            f"a held loop needs a positive step, a delay of 0 to {MOST_PERIODS} steps and a lag of 0 or more. Received "
-            f"{float(step):.4g} s, {float(delay):.4g} s, {float(lag):.4g} s. Shorten the delay."
-        )
-    if diffusion and SHORTEST * diffusion < step:
-        raise ParameterError(
-            f"diffusion must take at least T_s/{SHORTEST}, here {float(step / SHORTEST):.4g} s, or nothing. Received "
-            f"{float(diffusion):.4g} s. Leave it out."
-        )
-    whole, part = delay // step, delay % step
-    waiting = int(whole) + (1 if part else 0)
-    behind = ["behind"] * (lag > 0) + [f"layer{i}" for i in range(MODES)] * (diffusion > 0)
-    stepped = ["stepped"] * (diffusion > 0 and not lag)
-    names = ("e1", "e2", *law.states, *(f"waiting{i}" for i in range(waiting)), "valve", *behind, *stepped)
-    n, valve = len(names), 2 + len(law.states) + waiting
-    still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
-    steady = steady_states(still, law.output, (Fraction(0),) * len(law.states), Fraction(1))
-    zero, one = Fraction(0), Fraction(1)
-    sample, arrival = _events(law, authority, names, valve, part > 0)
+    path = _Path(own=len(law.states), step=step, delay=delay, lag=lag, diffusion=diffusion)
+    sample, arrival = _events(law, authority, path)
+    n = path.size
     slope = Fraction(0) if law.root is None else law.root.middle / step
     jump = tuple((row[0] - slope * row[n], *row[1:n]) for row in sample)
     sampled = {} if law.root is None else {"root": tuple(row[n] for row in sample)}
     for k, name in enumerate(NOISES):
         if name in noisy:
             sampled[name] = tuple(row[k] - (i == k) for i, row in enumerate(jump))
-    push = _push(n, valve, lag, diffusion)
-    acceleration = tuple(Fraction(i == 1) for i in range(n))
     ends, past_ends = (BENT, HALVES) if diffusion else (EVEN, EVEN)
-    left_out, fading = _left_out(n, valve, step, lag, diffusion, int(part > 0))
+    maps = [(jump, path.part or step), *([(arrival, step - path.part)] if path.part else [])]
+    left_out, fading = _left_out(path)
+    push = _push(path)
     return PeriodicLoop(
-        states=names,
-        flow=_flow(push, model, model.gain / authority, valve, lag, diffusion),
-        segments=(
-            Segment(jump=jump, duration=part or step, ends=ends, past_ends=past_ends),
-            *([Segment(jump=arrival, duration=step - part, ends=ends, past_ends=past_ends)] if part else []),
-        ),
-        inputs={
-            "acceleration": acceleration,
-            "drift": (
-                zero,
-                zero,
-                *(-v / authority for v in steady),
-                *[-one] * (waiting + 1),
-                *[zero] * (n - valve - 1),
-            ),
-        },
-        outputs={
-            "slip_error": tuple(Fraction(i == 0) for i in range(n)),
-            "slip_rate_error": acceleration,
-            "push": push,
-            **left_out,
-        },
+        states=("e1", "e2", *law.states, *(f"waiting{i}" for i in range(path.waiting)), "valve", *path.behind),
+        flow=_flow(path, push, model, model.gain / authority),
+        segments=tuple(Segment(jump=j, duration=time, ends=ends, past_ends=past_ends) for j, time in maps),
+        inputs={"acceleration": _unit(n, 1), "drift": _drift(law, authority, path)},
+        outputs={"slip_error": _unit(n, 0), "slip_rate_error": _unit(n, 1), "push": push, **left_out},
         sampled=sampled,
         fading=fading,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Path:
+    """The way of a pressure from a law with so many states of its own to the fault, and its places in the loop."""
+
+    own: int
+    step: Fraction
+    delay: Fraction
+    lag: Fraction
+    diffusion: Fraction
+
+    def __post_init__(self) -> None:
+        step, delay, lag, diffusion = self.step, self.delay, self.lag, self.diffusion
+        if step <= 0 or not 0 <= delay <= MOST_PERIODS * step or lag < 0:
+            raise ParameterError(
+                f"a held loop needs a positive step, a delay of 0 to {MOST_PERIODS} steps and a lag of 0 or more. "
+                f"Received {float(step):.4g} s, {float(delay):.4g} s, {float(lag):.4g} s. Shorten the delay."
+            )
+        if diffusion and SHORTEST * diffusion < step:
+            raise ParameterError(
+                f"diffusion must take at least T_s/{SHORTEST}, here {float(step / SHORTEST):.4g} s, or nothing. "
+                f"Received {float(diffusion):.4g} s. Leave it out."
+            )
+
+    @property
+    def part(self) -> Fraction:
+        """From a sample to the arrival of a pressure between two [s]; 0 where it arrives with a sample."""
+        return self.delay % self.step
+
+    @property
+    def waiting(self) -> int:
+        """Pressures on their way."""
+        return int(self.delay // self.step) + (1 if self.part else 0)
+
+    @property
+    def valve(self) -> int:
+        """Place of the valve's pressure."""
+        return 2 + self.own + self.waiting
+
+    @property
+    def behind(self) -> tuple[str, ...]:
+        """What follows the valve: the well, the modes of a layer, and its last step for a layer that has no lag."""
+        layer = [f"layer{i}" for i in range(MODES)] * (self.diffusion > 0)
+        return (*["behind"] * (self.lag > 0), *layer, *["stepped"] * (self.diffusion > 0 and not self.lag))
+
+    @property
+    def size(self) -> int:
+        """Number of states."""
+        return self.valve + 1 + len(self.behind)
+
+    @property
+    def modes(self) -> dict[int, int]:
+        """Places of the modes of the layer, with their numbers."""
+        first = self.valve + (2 if self.lag else 1)
+        return {first + i: i for i in range(MODES if self.diffusion else 0)}
+
+
+def _unit(n: int, place: int) -> Row:
+    return tuple(Fraction(i == place) for i in range(n))
+
+
+def _drift(law: LinearLaw, authority: Fraction, path: _Path) -> Row:
+    """What a change of p* does to the states, which are counted from those that ask for p*."""
+    still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
+    steady = steady_states(still, law.output, (Fraction(0),) * path.own, Fraction(1))
+    zero, pressures = Fraction(0), [Fraction(-1)] * (path.waiting + 1)
+    return (zero, zero, *(-v / authority for v in steady), *pressures, *[zero] * len(path.behind))
 
 
 def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
@@ -147,75 +182,68 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
     return tuple(found)
 
 
-def _push(n: int, valve: int, lag: Fraction, diffusion: Fraction) -> Row:
+def _push(path: _Path) -> Row:
     """What the states say of the fault's pressure."""
-    push = [Fraction(i in (valve, valve + 1)) for i in range(n)]  # modes follow
-    if diffusion:
-        first, layer = valve + (2 if lag else 1), Layer(time=diffusion)
-        push[first : first + MODES] = [layer.share(i) for i in range(MODES)]
+    push = [Fraction(i in (path.valve, path.valve + 1)) for i in range(path.size)]  # modes follow
+    for place, number in path.modes.items():
+        push[place] = Layer(time=path.diffusion).share(number)
     return tuple(push)
 
 
-def _flow(push: Row, model: Model, gain: Fraction, valve: int, lag: Fraction, diffusion: Fraction) -> Matrix:
-    n = len(push)
-    rows = [[Fraction(0)] * n for _ in range(n)]
+def _flow(path: _Path, push: Row, model: Model, gain: Fraction) -> Matrix:
+    rows = [[Fraction(0)] * path.size for _ in range(path.size)]
     rows[0][1] = Fraction(1)
     rows[1] = [gain * v for v in push]
     rows[1][:2] = model.slip, -model.rate
-    if lag:
-        rows[valve + 1][valve + 1] = -1 / lag
-    for i in range(MODES if diffusion else 0):
-        mode, rate = valve + (2 if lag else 1) + i, Layer(time=diffusion).rate(i)
-        rows[mode][mode] = -rate
-        if lag:
-            rows[mode][valve + 1] = 1 / lag
+    well = path.valve + 1
+    if path.lag:
+        rows[well][well] = -1 / path.lag
+    for place, number in path.modes.items():
+        rows[place][place] = -Layer(time=path.diffusion).rate(number)
+        if path.lag:
+            rows[place][well] = 1 / path.lag
     return tuple(map(tuple, rows))
 
 
-def _left_out(
-    n: int, valve: int, step: Fraction, lag: Fraction, diffusion: Fraction, first: int
-) -> tuple[dict[str, Row], dict[str, Fading]]:
+def _left_out(path: _Path) -> tuple[dict[str, Row], dict[str, Fading]]:
     """Bound of what the modes of a layer leave out, as an output, and how it fades where the well steps."""
-    if not diffusion:
+    if not path.diffusion:
         return {}, {}
-    layer = Layer(time=diffusion)
-    if lag:
-        size = layer.left_out_in_all / lag
-        return {"left_out": tuple(size * (i == valve + 1) for i in range(n))}, {}
-    height, rate, floor = layer.left_out(step)
-    most, acceleration = height + floor, tuple(Fraction(i == 1) for i in range(n))
-    fading = Fading(entry=acceleration, first=first, height=height / most, rate=rate, floor=floor / most)
-    return {"left_out": tuple(most * (i == n - 1) for i in range(n))}, {"left_out": fading}
+    n, layer = path.size, Layer(time=path.diffusion)
+    if path.lag:
+        size = layer.left_out_in_all / path.lag
+        return {"left_out": tuple(size * v for v in _unit(n, path.valve + 1))}, {}
+    height, rate, floor = layer.left_out(path.step)
+    most, first = height + floor, int(path.part > 0)
+    fading = Fading(entry=_unit(n, 1), first=first, height=height / most, rate=rate, floor=floor / most)
+    return {"left_out": tuple(most * v for v in _unit(n, n - 1))}, {"left_out": fading}
 
 
-def _events(
-    law: LinearLaw, authority: Fraction, names: tuple[str, ...], valve: int, between: bool
-) -> tuple[Matrix, Matrix]:
+def _events(law: LinearLaw, authority: Fraction, path: _Path) -> tuple[Matrix, Matrix]:
     """The sample, with one more column for w, and the arrival of a pressure between samples, if that is where it is."""
-    own, first, zero = range(2, 2 + len(law.states)), 2 + len(law.states), Fraction(0)
-    n = len(names)
-    jump = [[Fraction(i == j) for j in range(n + 1)] for i in range(n)]
+    n, valve, first, zero = path.size, path.valve, 2 + path.own, Fraction(0)
+    jump = [list(_unit(n + 1, i)) for i in range(n)]
     asked = [zero] * (n + 1)
     asked[0], asked[1] = (authority * v for v in law.feedback[:2])
     asked[n] = authority * sum(law.feedback[2:], zero)
-    for i, fed, kept in zip(own, law.measured, law.update, strict=True):
+    for i, fed, kept in zip(range(2, first), law.measured, law.update, strict=True):
         jump[i] = [*fed[:2], *kept, *[zero] * (n - first), sum(fed[2:], zero)]
         asked[i] = authority * law.output[i - 2]
-    line = [*range(first, valve), *([] if between else [valve])]
+    line = [*range(first, valve), *([] if path.part else [valve])]
     for place, before in zip(reversed(line), [*reversed(line[:-1]), None], strict=True):
-        jump[place] = asked if before is None else [Fraction(j == before) for j in range(len(asked))]
-    arrival = [[Fraction(j == (valve - 1 if i == valve else i)) for j in range(n)] for i in range(n)]
-    if between:
-        return tuple(map(tuple, jump)), _stepped(arrival, valve, names)
-    return _stepped(jump, valve, names), ()
+        jump[place] = asked if before is None else list(_unit(n + 1, before))
+    arrival = [list(_unit(n, valve - 1 if i == valve else i)) for i in range(n)]
+    if path.part:
+        return tuple(map(tuple, jump)), _stepped(arrival, path)
+    return _stepped(jump, path), ()
 
 
-def _stepped(jump: list[list[Fraction]], valve: int, names: tuple[str, ...]) -> Matrix:
+def _stepped(jump: list[list[Fraction]], path: _Path) -> Matrix:
     """What follows the valve's pressure at once stays where it is while that jumps; its step is kept."""
-    step = [v - (j == valve) for j, v in enumerate(jump[valve])]
-    for place in range(valve + 1, len(names)):
-        if names[place] == "stepped":
+    step = [v - (j == path.valve) for j, v in enumerate(jump[path.valve])]
+    for place, name in enumerate(path.behind, path.valve + 1):
+        if name == "stepped":
             jump[place] = step
-        elif names[place] == "behind" or "behind" not in names:
+        elif name == "behind" or not path.lag:
             jump[place] = [v - w for v, w in zip(jump[place], step, strict=True)]
     return tuple(map(tuple, jump))
