@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
+from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.fault import Fault
@@ -111,18 +112,24 @@ class Answer:
 def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> Answer:
     """A guarantee beside the worst that a search finds on its loop; about a second.
 
-    One with a slow input gain whose bounds a course with stick leaves makes way for that with any gain, if that is
-    wider than the course.
+    Where a course with stick leaves a claim of a slow input gain, that of any gain takes its place if it is wider than
+    the course.
     """
     if isinstance(found, NoGuarantee):
         return Answer(fault=fault, found=found)
     seen = Answer(fault=fault, found=found, worst=worst_found(found), worst_with_stick=worst_found(found, sticks=True))
-    if found.slow_gain is None or not seen.leaves_with_stick:
+    return seen if found.slow_gain is None or not seen.leaves_with_stick else _with_room(seen, found)
+
+
+def _with_room(seen: Answer, found: Guarantee) -> Answer:
+    anyhow, worst = guarantee(found.task, found.held), seen.worst_with_stick
+    if isinstance(anyhow, NoGuarantee) or worst is None:
         return seen
-    wider = replace(seen, found=guarantee(found.task, found.held))
-    if not wider.proved or wider.leaves_with_stick:
-        return seen
-    return attacked(fault, wider.found)
+    left = ["slip_error"] if worst.slip_error > found.claims.slip_error else []
+    left += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate_error > found.claims.slip_rate_error else []
+    claims = replace(found.claims, **{name: getattr(anyhow.claims, name) for name in left})
+    wider = replace(seen, found=replace(found, claims=claims))
+    return seen if wider.leaves_with_stick or wider.found.check() is not Verdict.PROVED else wider
 
 
 def _seen(worst: WorstFound | None) -> dict[str, float] | None:

@@ -1,6 +1,6 @@
 """The default designs of a fault: for its own T_s, else for the longest T_s that has a guarantee."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Unpack
 
@@ -18,6 +18,7 @@ from quakedesign.synthesis.guaranteed.reach import (
     reached_delay,
     reached_step,
 )
+from quakedesign.synthesis.guaranteed.slowly import tightened
 
 REACH = frozenset({"sampling_time", "delay"})
 """Premises of a guarantee, see `SampledDesign.premises`."""
@@ -121,11 +122,12 @@ def sampled_sliding_mode(
         made = careful(longest.held.step) if isinstance(made.found, NoGuarantee) else made
     if isinstance(made.found, NoGuarantee):
         return made, SampledDesign(step=step, runs=None, reason=reason)
-    held = made.found.held
+    runs = tightened(made.found)
+    held = runs.held
     delayed = reached_delay(held.step, lambda delay: careful(held.step, delay).found, held.step / 8)
-    return made, SampledDesign(
+    return replace(made, found=runs), SampledDesign(
         step=step,
-        runs=made.found,
+        runs=runs,
         reason=reason,
         longest_step=max(held.step, longest.held.step if longest else held.step),
         longest_delay=delayed.held.delay if delayed else Fraction(0),

@@ -56,7 +56,9 @@ def first_held(
         reached, x = _search(cost, start, enough=_FAILED / 2, evaluations=_EVALUATIONS if near is None else _FEW)
         if reached < _FAILED / 2 or _HOPELESS * _FAILED < reached < 9 * _FAILED:
             break
-    return _proved(task, replace(template, law=family.law(x))), x
+    held = replace(template, law=family.law(x))
+    # through a layer a guarantee needs a slow input gain; elsewhere one with any gain is much sooner found
+    return best_guarantee(task, held) if held.diffusion else guarantee(task, held), x
 
 
 def design_held(
@@ -122,12 +124,7 @@ def design_held(
         limit = (room or family.room) * float(found.bounds.slip_rate_error)
         starts = (best[1], family.starts[1])
         best = min((_search(lambda x: _drift_cost(seen(x), limit), start) for start in starts), key=lambda f: f[0])
-    return _proved(task, replace(template, law=family.law(best[1])))
-
-
-def _proved(task: Task, held: Held) -> Guarantee | NoGuarantee:
-    """Through a layer a guarantee needs a slow input gain; elsewhere one with any gain is much sooner found."""
-    return best_guarantee(task, held) if held.diffusion else guarantee(task, held)
+    return best_guarantee(task, replace(template, law=family.law(best[1])))
 
 
 def _unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:

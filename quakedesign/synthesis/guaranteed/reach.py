@@ -11,6 +11,7 @@ from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.synthesis.guaranteed.design import MOST_DELAY, design_held, first_held
 from quakedesign.synthesis.guaranteed.families import MEASURED
+from quakedesign.synthesis.guaranteed.slowly import tightened
 
 Search = Callable[[Fraction, np.ndarray | None], tuple[Guarantee | NoGuarantee, np.ndarray | None]]
 Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
@@ -61,7 +62,7 @@ def design_at(task: Task, longest: Guarantee, objective: str) -> Guarantee:
     held = longest.held
     measured = MEASURED[held.law.of_slip_alone]
     found = design_held(task, held.step, objective=objective, measured=measured, **held.around)
-    return found if isinstance(found, Guarantee) else longest
+    return found if isinstance(found, Guarantee) else tightened(longest)
 
 
 def longest_delay(

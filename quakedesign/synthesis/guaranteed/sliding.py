@@ -11,6 +11,7 @@ from quakedesign.controllers import SlidingMode
 from quakedesign.errors import ParameterError
 from quakedesign.loop.schemes import schemes
 from quakedesign.synthesis.guaranteed.compensated import GUARANTEED, Compensation, compensated, design_compensated
+from quakedesign.synthesis.guaranteed.slowly import tightened
 
 
 def guarantee_of(task: Task, law: SlidingMode) -> Guarantee | NoGuarantee:
@@ -23,7 +24,7 @@ def guarantee_of(task: Task, law: SlidingMode) -> Guarantee | NoGuarantee:
     if not {"weight", "authority"} <= settings.keys():
         reason = f"the scheme {GUARANTEED} has a guarantee with a weight and an authority. Give both in its settings"
         return NoGuarantee(reason=reason, small_gain=None)
-    return compensated(task, law, settings["weight"], settings["authority"], own.step)
+    return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step))
 
 
 def sliding_mode(
@@ -63,7 +64,8 @@ def sliding_mode(
     if scheme != GUARANTEED:
         return NoGuarantee(reason=_why_none(task, law, scheme, step), small_gain=None)
     known = replace(base, gains=dict(base.gains), divisor=task.authority)
-    return design_compensated(task, known, step, objective=objective, **around)
+    made = design_compensated(task, known, step, objective=objective, **around)
+    return replace(made, found=tightened(made.found))
 
 
 def _why_none(task: Task, law: type[SlidingMode], scheme: str, step: Fraction) -> str:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from fractions import Fraction
 from math import log
+from typing import overload
 
 import numpy as np
 from scipy.linalg import expm
@@ -25,6 +26,10 @@ def best_guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
     return anyhow if isinstance(anyhow, Guarantee) else found
 
 
+@overload
+def tightened(found: Guarantee) -> Guarantee: ...
+@overload
+def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee: ...
 def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee:
     """A guarantee with a slow input gain in place of one with any, where there is one."""
     if isinstance(found, NoGuarantee) or found.slow_gain is not None:

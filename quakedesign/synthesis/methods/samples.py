@@ -3,11 +3,12 @@
 from typing import ClassVar
 
 from quakedesign.certificates import Certificate
-from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, task_of
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.premises import Domain, Premise
 from quakedesign.fault import Fault
 from quakedesign.loop import SampledController
+from quakedesign.synthesis.guaranteed import best_guarantee
 from quakedesign.synthesis.methods.base import Designed, Method, Problem
 
 
@@ -29,4 +30,4 @@ class Samples(Method[SampledController]):
 
     def guarantee(self, fault: Fault, controller: SampledController, noise: Around) -> Guarantee | NoGuarantee:
         """At its own T_s."""
-        return guarantee(task_of(fault), Held(law=controller.law, step=controller.step, **noise))
+        return best_guarantee(task_of(fault), Held(law=controller.law, step=controller.step, **noise))

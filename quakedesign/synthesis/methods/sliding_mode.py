@@ -30,7 +30,6 @@ from quakedesign.synthesis.guaranteed import (
     attacked,
     guarantee_of,
     sampled_sliding_mode,
-    tightened,
 )
 from quakedesign.synthesis.guaranteed.compensated import GUARANTEED
 from quakedesign.synthesis.guaranteed.sliding import sliding_mode
@@ -107,7 +106,7 @@ class SlidingModes(Method[SlidingMode]):
         made = sliding_mode(task, law, step, **options, **wanted.around)
         if isinstance(made, NoGuarantee):
             return Answer(fault=fault, found=made)
-        return replace(attacked(fault, tightened(made.found)), compensation=made)
+        return replace(attacked(fault, made.found), compensation=made)
 
 
 def _proved_base(fault: Fault, law: type[SlidingMode]) -> tuple[BaseGains[SlidingMode], Certificate | None]:

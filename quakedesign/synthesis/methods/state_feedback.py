@@ -10,7 +10,6 @@ from quakedesign.certificates.guarantee import (
     Held,
     NoGuarantee,
     Task,
-    guarantee,
     task_of,
 )
 from quakedesign.certificates.guarantee.statement import Around
@@ -28,7 +27,6 @@ from quakedesign.synthesis.guaranteed import (
     certified_peaks,
     design_held,
     sampled_design,
-    tightened,
 )
 from quakedesign.synthesis.guaranteed.reach import design_at, longest_step
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
@@ -75,7 +73,9 @@ class StateFeedback(Method[ExtendedLQR]):
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
             return super().guarantee(fault, controller, noise)
         step = rational(fault.sampling_time)
-        return guarantee(task_of(fault), Held(law=summed_integrals(tuple(controller.gains.values()), step), step=step))
+        return best_guarantee(
+            task_of(fault), Held(law=summed_integrals(tuple(controller.gains.values()), step), step=step)
+        )
 
     def certified_peaks(
         self, fault: Fault, controller: ExtendedLQR, disturbance_class: str
@@ -99,7 +99,7 @@ class StateFeedback(Method[ExtendedLQR]):
         told: Any = {"measured": wanted.measured, **wanted.around}
         found = design_held(task, step, objective=wanted.objective, **told)
         if isinstance(found, Guarantee):
-            return attacked(fault, tightened(found))
+            return attacked(fault, found)
         longest = longest_step(task, step, **told)
         return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest, wanted.objective))
 

@@ -12,7 +12,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Held:
-    """Numbers of a loop: matrices of the law, b, ranges of s, w and β, T_s, delay, bounds of φ and noise, all in SI."""
+    """Numbers of a loop: matrices of the law, b, ranges of s, w and β, T_s, delay, bounds of φ and noise, all in SI.
+
+    For a friction of the slip alone: how much β changes per slip at most, and the reference's rate.
+    """
 
     F: np.ndarray
     G: np.ndarray
@@ -27,6 +30,8 @@ class Held:
     force: float
     ends: object = None
     noise: tuple = (0.0, 0.0)
+    slope: float = 0.0
+    pace: float = 0.0
 
 
 def middle(ends):
@@ -96,6 +101,19 @@ def aligned(held, response, sign=1.0, lag=0):
         )
 
     return choose
+
+
+def slowly(held, pieces, choose):
+    """The same with β a function of the slip: from either end of its range on, with the slip or against it."""
+
+    def slow(k, e, v):
+        s, w, _, phi = choose(k, e, v)
+        course = np.arange(e.shape[1])
+        slip = e[0] + held.pace * k * held.step / pieces
+        beta = np.take(held.beta, course % 2) + held.slope * np.where(course // 2 % 2, slip, -slip)
+        return s, w, np.clip(beta, *held.beta), phi
+
+    return slow
 
 
 def heard(held, response):

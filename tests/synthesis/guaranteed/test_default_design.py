@@ -14,6 +14,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.synthesis import answer, assess
 from quakedesign.synthesis.guaranteed import design_held, reached
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
@@ -50,6 +51,14 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     assert all(p.holds for p in design.premises)
     assert premises(design)["sampling_time"].certified >= F("0.6")
     assert premises(design)["delay"].certified >= F("0.4")
+
+
+def test_a_law_has_one_bound_however_it_is_asked_for(monkeypatch):
+    found = designed("real").guarantee
+    assert found.slow_gain is not None
+    assert found.claims.slip_rate_error < guarantee(found.task, found.held).claims.slip_rate_error * F(3, 4)
+    monkeypatch.setattr("quakedesign.synthesis.guaranteed.answer.worst_found", lambda *_, **__: None)
+    assert answer(REAL).found == assess(REAL, designed("real").controller).guarantee == found
 
 
 def test_both_objectives_are_what_they_are_called(unreached):
@@ -96,8 +105,11 @@ def test_an_independent_simulator_does_not_leave_the_guarantee_of_the_shorter_st
         step=float(claim.held.step),
         delay=0.0,
         force=float(task.amplitude + task.reference_force),
+        slope=float(task.friction.weakening * task.area_per_mass[1] / task.authority),
+        pace=float(task.reference_rates[0]),
     )
-    largest, _ = attacker.run(held, 40, 6, attacker.switching(held, 2_000, 240, seed=8), 2_000)
+    choose = attacker.slowly(held, 6, attacker.switching(held, 2_000, 240, seed=8))
+    largest, _ = attacker.run(held, 40, 6, choose, 2_000)
     assert 0 < largest[0].max() <= claim.claims.slip_error
     assert 0 < largest[1].max() <= claim.claims.slip_rate_error
 

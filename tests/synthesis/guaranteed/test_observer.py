@@ -55,6 +55,8 @@ def numbers(claim):
         delay=float(held.delay),
         force=float(task.amplitude + task.reference_force),
         noise=(float(held.slip_noise), float(held.rate_noise)),
+        slope=float(task.friction.weakening * task.area_per_mass[1] / task.authority),
+        pace=float(task.reference_rates[0]),
     )
 
 
@@ -77,7 +79,7 @@ def test_no_course_of_ten_thousand_with_noise_violates_a_guarantee(name, sticks)
     claim, courses = designed(name), 4_000 if sticks else 10_000
     held, back = numbers(claim), float(claim.task.reference_rates[0]) if sticks else None
     hear = attacker.noisy(held, courses, PERIODS * PIECES, seed=8)
-    choose = attacker.switching(held, courses, PERIODS * PIECES, seed=3)
+    choose = attacker.slowly(held, PIECES, attacker.switching(held, courses, PERIODS * PIECES, seed=3))
     largest, _ = attacker.run(held, PERIODS, PIECES, choose, courses, back=back, hear=hear)
     assert within(largest, claim)
     assert largest[1].max() > 0.3 * float(claim.claims.slip_rate_error)  # the courses do hurt
@@ -101,9 +103,9 @@ def test_noise_along_the_nominal_response_comes_close_and_the_worst_found_is_no_
     held = numbers(claim)
     for k in (0, 1):
         ends, off = nominal_response(held, k)
-        choose = attacker.aligned(held, ends)
-        largest, _ = attacker.run(held, PERIODS, PIECES, choose, 1, hear=attacker.heard(held, off))
-        quiet, _ = attacker.run(held, PERIODS, PIECES, choose, 1)
+        choose = attacker.slowly(held, PIECES, attacker.aligned(held, ends))
+        largest, _ = attacker.run(held, PERIODS, PIECES, choose, 4, hear=attacker.heard(held, off))
+        quiet, _ = attacker.run(held, PERIODS, PIECES, choose, 4)
         assert largest[k].max() > 1.02 * quiet[k].max()
         assert within(largest, claim)
         seen.append(largest[k].max())

@@ -1,0 +1,66 @@
+"""A guarantee beside what was seen: claims that a course with stick leaves make way, one by one."""
+
+from fractions import Fraction as F
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee import guarantee
+from quakedesign.certificates.guarantee.files import parse_guarantee
+from quakedesign.fault import load_fault
+from quakedesign.synthesis.guaranteed import WorstFound, attacked
+
+MODULE = import_module("quakedesign.synthesis.guaranteed.answer")
+FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_real-fault.json"
+SLOW = parse_guarantee(FILE.read_text())
+WIDE = guarantee(SLOW.task, SLOW.held)
+ANYHOW = WIDE.claims
+
+
+def between(name, share=F(1, 2)):
+    """A number between the claims of both proofs."""
+    return float(getattr(SLOW.claims, name) * (1 - share) + getattr(ANYHOW, name) * share)
+
+
+def stuck(monkeypatch, slip, rate):
+    """Answer where a search on the sticking fault ends at these errors."""
+    seen = WorstFound(slip_error=slip, slip_rate_error=rate)
+    quiet = WorstFound(slip_error=0.0, slip_rate_error=0.0)
+    monkeypatch.setattr(MODULE, "worst_found", lambda _, sticks=False: seen if sticks else quiet)
+    return attacked(load_fault("real-fault"), SLOW)
+
+
+def test_claims_that_no_course_leaves_stay(monkeypatch):
+    inside = (float(v) * (1 - 1e-9) for v in (SLOW.claims.slip_error, SLOW.claims.slip_rate_error))
+    assert stuck(monkeypatch, *inside).found == SLOW
+
+
+@pytest.mark.parametrize(
+    ("slip", "rate", "left"),
+    [
+        (between("slip_error"), 0.0, {"slip_error"}),
+        (0.0, between("slip_rate_error"), {"slip_rate_error", "peak_slip_rate"}),
+    ],
+)
+def test_a_claim_that_a_course_with_stick_leaves_is_that_of_any_gain(monkeypatch, slip, rate, left):
+    found = stuck(monkeypatch, slip, rate)
+    assert not found.leaves_with_stick
+    assert (found.found.check(), found.found.slow_gain) == (Verdict.PROVED, SLOW.slow_gain)
+    for name in ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure"):
+        assert getattr(found.found.claims, name) == getattr(ANYHOW if name in left else SLOW.claims, name)
+
+
+def test_a_course_beyond_both_is_said_and_the_narrow_claims_stay(monkeypatch):
+    found = stuck(monkeypatch, between("slip_error", F(2)), 0.0)
+    assert found.found == SLOW
+    assert "leaves the bounds" in found.lines()[-1]
+
+
+def test_what_is_widened_is_proved_or_not_said(monkeypatch):
+    monkeypatch.setattr(MODULE, "guarantee", lambda *_: SLOW)
+    assert stuck(monkeypatch, between("slip_error"), 0.0).found == SLOW
+    monkeypatch.setattr(type(SLOW), "check", lambda _: Verdict.UNDECIDED)
+    monkeypatch.setattr(MODULE, "guarantee", lambda *_: WIDE)
+    assert stuck(monkeypatch, between("slip_error"), 0.0).found == SLOW
