@@ -17,7 +17,7 @@ from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop import Power
-from quakedesign.synthesis.guaranteed import compensated, design_compensated, guarantee_of, worst_found
+from quakedesign.synthesis.guaranteed import compensated, design_compensated, guarantee_of, tightened, worst_found
 from quakedesign.synthesis.guaranteed.implicit_pull import implicit_pull
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
@@ -243,5 +243,5 @@ def test_the_guarantee_of_a_law_of_samples_is_that_of_its_own_numbers():
     made, (weight, authority) = law("cta", CTA, 1), SETTINGS
     settings = ("weight", weight), ("authority", authority)
     sampled = replace(made, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="compensated", settings=settings))
-    assert guarantee_of(TASK, sampled) == compensated(TASK, made, *SETTINGS, STEP)
-    assert guarantee_of(TASK, designed("cta").controller) == designed("cta").found
+    assert guarantee_of(TASK, sampled) == tightened(compensated(TASK, made, *SETTINGS, STEP))
+    assert guarantee_of(TASK, designed("cta").controller) == tightened(designed("cta").found)
