@@ -229,7 +229,7 @@ def test_what_decides_knows_no_solver_and_no_floating_point_library(path):
 @pytest.mark.parametrize("path", sorted((PACKAGE / "report").glob("*.py")), ids=module_name)
 def test_what_shows_results_computes_none(path):
     """Derivations, runs and searches are asked of `quakedesign.studies` and what stands below."""
-    assert third_party(path) <= {"numpy", "matplotlib", "jinja2", "rich"}
+    assert third_party(path) <= {"numpy", "matplotlib", "jinja2", "markupsafe", "latex2mathml", "rich"}
     assert not [n for n in imports(path) if re.match(r"quakedesign\.(sos|loop)\b|.*\.(simulate|ClosedLoop)$", n)]
 
 

@@ -1,10 +1,12 @@
 """The command line: answers, exit codes, one-line refusals, whole folders."""
 
 import json
+import re
 import subprocess
 import sys
 from fractions import Fraction
 
+import browser
 import pytest
 
 from quakedesign.cli import main
@@ -32,9 +34,40 @@ def test_the_folder_is_complete(main_job):
     _, folder, results = main_job
     found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
     names = ("uncontrolled", "states", "pressure", "errors", "metrics")
-    assert {f"figures/{n}.png" for n in names} | {"results.json", "report.html", "certificates/cta.json"} <= found
+    assert {f"figures/{n}.svg" for n in names} | {"results.json", "report.html", "certificates/cta.json"} <= found
     assert json.loads((folder / "results.json").read_text()) == results
     assert [p.name for p in folder.parent.iterdir()] == [folder.name]
+
+
+def test_the_report_holds_everything_and_asks_for_nothing(main_job, tmp_path, capsys):
+    _, folder, _ = main_job
+    page = folder / "report.html"
+    text = page.read_text(encoding="utf-8")
+    assert len(text) < 1_000_000
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#)|url\((?!#)|@import|https?://|proved\*""", text)
+    assert "default-src 'none'" in text
+    assert set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text)) <= {
+        pair for name in re.findall(r'\bid="([^"]+)"', text) for pair in ((name, ""), ("", name))
+    }
+    figures = [f"figure-{name}" for name in ("uncontrolled", "states", "pressure", "errors", "metrics")]
+    assert re.findall(r'<figure id="([^"]+)"', text) == figures
+    if browser.CHROMIUM is None:
+        with capsys.disabled():
+            print("no Chromium was found: the report was read, but not opened")
+        return
+    for width, media in ((1200, ""), (500, ""), (browser.WIDTH, "print")):
+        found, console, asked = browser.opened(page, tmp_path, width=width, media=media)
+        assert (console, asked) == ([], set())
+        assert [name for name, *_ in found["figures"]] == figures
+        assert all(wide > 400 and high > 150 and paths > 40 for _, wide, high, paths, _ in found["figures"])
+        assert all(buttons == 3 for *_, buttons in found["figures"])
+        assert min(found["equations"]) > 0
+        assert found["widest"] <= width
+        before, after = (list(map(float, box.split())) for box in found["zoomed"])
+        assert after[2:] == pytest.approx([0.6 * side for side in before[2:]])
+        if media:
+            assert max(found["tables"]) < browser.HEIGHT  # each may stay on one page
+    assert browser.printed_pages(page, tmp_path) <= 6
 
 
 def test_the_keys_promised_are_there(main_job):
@@ -174,7 +207,13 @@ def test_derive_prints_equations(capsys):
     code, out, _ = run(capsys, "derive", "real-fault", "--json")
     assert code == 0
     assert {"error_dynamics", "jacobian", "instability"} <= set(json.loads(out))
-    assert "\\hat{k}" in run(capsys, "derive", "real-fault", "--latex")[1]
+    assert "Derivative" not in out
+    first, *others = run(capsys, "derive", "real-fault", "--latex")[1].splitlines()
+    assert first == r"\dot e_1 = e_2, \quad \dot e_2 = \beta (\nu + h)"
+    assert [line.split(" ")[0] for line in others] == [r"\beta", "h", "J(0,", r"\text{unstable}", "%"]
+    assert "\\hat{k}" in others[1]
+    assert r"\ddot r" in others[1]
+    assert not any(r"\frac{d}" in line or "r{" in line for line in others)
 
 
 @pytest.mark.parametrize(("lipschitz", "verdict", "code"), [("1", "proved", 0), ("1.25", "refuted", 1)])

@@ -23,7 +23,7 @@ from quakedesign.cli import (
     start,
     synthesis,
 )
-from quakedesign.cli.shared import app
+from quakedesign.cli.shared import app, typed
 from quakedesign.errors import QuakedesignError
 from quakedesign.interruption import ending
 from quakedesign.text import one_line
@@ -59,6 +59,7 @@ def main(arguments: list[str] | None = None) -> None:
     if arguments is None and not sys.warnoptions:
         _without_warnings()
     try:
+        typed(sys.argv[1:] if arguments is None else arguments)
         with ending():
             code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.exit(code if isinstance(code, int) else 0)

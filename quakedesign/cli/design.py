@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Output
-from quakedesign.cli.shared import ExactMetres, ExactMetresPerSecond, app, console, print_lines, progress
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output
+from quakedesign.cli.shared import ExactMetres, ExactMetresPerSecond, app, command_line, console, print_lines, progress
 from quakedesign.errors import ParameterError, UnknownNameError
 
 
@@ -76,6 +76,7 @@ def design(
     options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     out: Path | None = None,
+    format: Formats = ("svg",),
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
@@ -107,7 +108,7 @@ def design(
 
     with progress() as tell:
         comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
-        results = write_folder(comparison, folder, force=force, tell=tell)
+        results = write_folder(comparison, folder, force=force, formats=format, command=command_line(), tell=tell)
 
     def said() -> None:
         from quakedesign.report.terminal import print_comparison

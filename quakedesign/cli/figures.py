@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from quakedesign.cli.design import DesignOptions, controllers, positive
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Output
-from quakedesign.cli.shared import app, console, print_json, print_lines, progress
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output
+from quakedesign.cli.shared import app, command_line, console, print_json, print_lines, progress
 
 _AS_USUAL = DesignOptions()
 
@@ -62,6 +62,7 @@ def figures(
     options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     out: Path | None = None,
+    format: Formats = ("svg",),
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
@@ -76,14 +77,14 @@ def figures(
     published_scheme
         Of the runs of published gains, see --scheme.
     out
-        Folder to write; ./quakedesign-FAULT unless given.
+        Folder to write; ./quakedesign-FAULT-figures unless given.
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare, write_folder
 
     names, found = controllers(controller), load_fault(fault, box=box)
     told = options.told(names)
-    folder = out or Path(f"quakedesign-{found.name}")
+    folder = out or Path(f"quakedesign-{found.name}-figures")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.numbers import printed_lines
@@ -93,7 +94,9 @@ def figures(
     with progress() as tell:
         comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
         study = paper_study(comparison, progress=tell)
-        results = write_folder(comparison, folder, force=force, study=study, tell=tell)
+        results = write_folder(
+            comparison, folder, force=force, study=study, formats=format, command=command_line(), tell=tell
+        )
     if output.json:
         print_json(results)
         return 0

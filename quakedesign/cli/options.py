@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -29,6 +29,10 @@ FaultName = Annotated[
     ),
 ]
 Box = Annotated[str | None, Parameter(help="Uncertainty box: paper or ten-percent.")]
+Formats = Annotated[
+    tuple[Literal["svg", "pdf", "png"], ...],
+    Parameter(consume_multiple=True, negative="", help="Of the figures, one or several: svg, pdf, png."),
+]
 Force = Annotated[bool, Parameter(negative="", help="Replace what an earlier run has written.")]
 
 

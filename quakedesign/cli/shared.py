@@ -2,8 +2,10 @@
 
 import json
 import os
+import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -92,6 +94,19 @@ ExactMetres = Annotated[str, Parameter(converter=_exact_reader("m"))]
 ExactMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m/s"))]
 Whole = Annotated[int, Parameter(converter=_whole)]
 Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
+
+_typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
+
+
+def typed(arguments: Sequence[str]) -> None:
+    """Keep what was typed, for `command_line`."""
+    _typed.set(tuple(arguments))
+
+
+def command_line() -> str:
+    """Command that runs, as it was typed; empty outside one."""
+    return shlex.join(("quakedesign", *_typed.get())) if _typed.get() else ""
+
 
 app = App(
     name="quakedesign",

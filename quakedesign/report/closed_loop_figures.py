@@ -44,7 +44,7 @@ def states(comparison: "Compared") -> Any:
     """
     laws, origins, found = grid(comparison)
     rows = 1 + len(laws)
-    drawing, axes = figure(rows, 1.0 + 1.45 * rows, len(origins), sharex=True, sharey="row")
+    drawing, axes = figure(rows, 0.95 + 1.1 * rows, len(origins), sharex=True, sharey="row")
     runs = [run for _, run in runs_of(comparison.entries)]
     divisor, unit = clock(max(float(run.time[-1]) for run in runs))
     size, name = length(float(known(runs[0].reference).max()))
@@ -130,7 +130,9 @@ def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None
         Short runs by label of the entry.
     """
     laws, origins, found = grid(comparison)
-    drawing, axes = figure(len(laws), 0.9 + 2.1 * len(laws), len(origins), sharex=True, sharey=True)
+    drawing, axes = figure(
+        len(laws), 0.9 + (2.1 if close_ups else 1.15) * len(laws), len(origins), sharex=True, sharey=True
+    )
     runs = [run for _, run in runs_of(comparison.entries)]
     divisor, unit = clock(max(float(run.time[-1]) for run in runs))
     size, name = scaled(comparison.fault.effective_normal_stress / 10, "Pa")

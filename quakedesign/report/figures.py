@@ -42,7 +42,7 @@ def figures(comparison: "Compared") -> dict[str, Any]:
 def uncontrolled(comparison: "Compared") -> Any:
     """Slip and slip rate of the natural earthquake, and where the statics let it rest."""
     run, fault = comparison.uncontrolled, comparison.fault
-    drawing, ((slip,), (rate,)) = figure(2, 4.2)
+    drawing, ((slip,), (rate,)) = figure(2, 3.2)
     size, unit = length(float(run.slip.max()))
     last = end(run)
     divisor, name = clock(last)
@@ -65,7 +65,7 @@ def end(*runs: "Trajectory") -> float:
 
 def errors(comparison: "Compared") -> Any:
     """Size of both tracking errors over time, as envelopes."""
-    drawing, ((slip,), (rate,)) = figure(2, 5.2)
+    drawing, ((slip,), (rate,)) = figure(2, 3.9)
     runs = runs_of(comparison.entries)
     divisor, unit = clock(max(float(run.time[-1]) for _, run in runs))
     for entry, run in runs:
@@ -91,7 +91,7 @@ _SHOWN = {
 
 def metrics(comparison: "Compared") -> Any:
     """Bars of four metrics in their units."""
-    drawing, axes = figure(2, 4.8, columns=2, sharey=True)
+    drawing, axes = figure(2, 3.7, columns=2, sharey=True)
     settled = [(e, run) for e, run in runs_of(comparison.entries) if run.metrics.max_slip_error is not None]
     for axis, (name, title) in zip(axes.ravel(), _SHOWN.items(), strict=True):
         values = [getattr(run.metrics, name) for _, run in settled]

@@ -2,10 +2,11 @@
 
 import json
 import os
-from collections.abc import Callable
-from importlib.metadata import version
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup
 
 from quakedesign.certificates import certificate_text
 from quakedesign.certificates.guarantee import Guarantee
@@ -13,17 +14,19 @@ from quakedesign.certificates.guarantee.files import guarantee_text, save_guaran
 from quakedesign.errors import OutputError
 from quakedesign.fault import fault_toml
 from quakedesign.output import require_room, whole_folder
+from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.comparison import Comparison
+from quakedesign.report.figure_files import DEFAULT, figure_bytes
 from quakedesign.report.numbers import csv_text
 from quakedesign.report.page import page_html
 from quakedesign.report.paper_figures import PAPER
-from quakedesign.studies.facts import fault_dict, fault_sentences
+from quakedesign.report.reproduction import reproduction, versions
+from quakedesign.report.vector import inline_svg
+from quakedesign.studies.facts import fault_dict
 from quakedesign.studies.paper_numbers import printed, table
 
 if TYPE_CHECKING:
     from quakedesign.report.paper_study import PaperStudy
-
-_PACKAGES = ("quakedesign", "sympy", "cvxpy", "clarabel", "casadi", "numpy", "scipy", "control", "python-flint")
 
 
 def prepare(out: Path, *, force: bool) -> None:
@@ -61,11 +64,11 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
                 told["certificate"] = told["certificate"] or path
             for kind in entry.peaks:
                 told["peaks"][kind]["certificate"] = f"certificates/{entry.design.name}-peaks-{kind}.json"
-    found["versions"] = {package: version(package) for package in _PACKAGES}
+    found["versions"] = versions()
     return found
 
 
-def study_results(study: "PaperStudy") -> dict[str, Any]:
+def study_results(study: "PaperStudy", formats: Sequence[str] = DEFAULT) -> dict[str, Any]:
     """Results of the comparison, and of a study: ``induced``, ``figures``, ``numbers`` and ``printed``."""
     induced = study.induced
     told = {
@@ -74,7 +77,7 @@ def study_results(study: "PaperStudy") -> dict[str, Any]:
         "events": dict(induced.events),
         "run": dict(induced.provenance),
     }
-    drawn = {name: {"file": f"figures/{name}.png", "paper": PAPER.get(name)} for name in study.figures()}
+    drawn = {name: {"file": f"figures/{name}.{formats[0]}", "paper": PAPER.get(name)} for name in study.figures()}
     compared = study.comparison
     return {
         **results(compared),
@@ -95,6 +98,8 @@ def write_folder(
     *,
     force: bool,
     study: "PaperStudy | None" = None,
+    formats: Sequence[str] = DEFAULT,
+    command: str = "",
     tell: Callable[[str, float], None] = lambda _what, _done: None,
 ) -> dict[str, Any]:
     """Write certificates, figures, results and the page into a folder that appears whole.
@@ -107,6 +112,10 @@ def write_folder(
         Replace a folder of earlier results.
     study : PaperStudy, optional
         Of the same comparison: its figures instead of the comparison's, and ``numbers.csv``.
+    formats : sequence of str
+        Of the figures beside the page, see `quakedesign.report.figure_files.FORMATS`.
+    command : str
+        With which the report is made, for its readers.
     tell : callable
         Progress.
 
@@ -120,24 +129,22 @@ def write_folder(
     OutputError
     """
     prepare(out, force=force)
-    found = study_results(study) if study else results(comparison)
+    found = study_results(study, formats) if study else results(comparison)
     drawn = study.figures() if study else comparison.figures()
     with whole_folder(out) as partial:
-        _fill(partial, comparison, found, drawn, tell)
+        _write_certificates(partial, comparison)
+        inside = _write_figures(partial, drawn, formats, tell)
+        page = page_html(comparison, inside, reproduction(comparison.fault, command))
+        (partial / "report.html").write_text(page, encoding="utf-8")
+        (partial / "fault.toml").write_text(fault_toml(comparison.fault), encoding="utf-8")
+        (partial / "results.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         if study:
             (partial / "numbers.csv").write_text(csv_text(found["numbers"]), encoding="utf-8")
     return found
 
 
-def _fill(
-    folder: Path,
-    comparison: Comparison,
-    found: dict[str, Any],
-    drawn: dict[str, Any],
-    tell: Callable[[str, float], None],
-) -> None:
-    for name in ("certificates", "figures"):
-        (folder / name).mkdir()
+def _write_certificates(folder: Path, comparison: Comparison) -> None:
+    (folder / "certificates").mkdir()
     for entry in comparison.entries:
         if entry.design.certificate is not None:
             path = folder / "certificates" / _file(entry.origin, entry.design.name)
@@ -147,10 +154,19 @@ def _fill(
         for kind, peaks in entry.peaks.items():
             path = folder / "certificates" / f"{entry.design.name}-peaks-{kind}.json"
             path.write_text(guarantee_text(peaks), encoding="utf-8")
+
+
+def _write_figures(
+    folder: Path, drawn: dict[str, Any], formats: Sequence[str], tell: Callable[[str, float], None]
+) -> dict[str, Markup]:
+    """Write every figure in every format; return what the page holds of it, drawn with its SVG file at once."""
+    (folder / "figures").mkdir()
+    inside = {}
     for i, (name, drawing) in enumerate(drawn.items()):
         tell(f"figure {name}", i / len(drawn))
-        drawing.savefig(folder / "figures" / f"{name}.png", metadata={"Software": None})
-    page = page_html(comparison, fault_sentences(comparison.fault), drawn)
-    (folder / "report.html").write_text(page, encoding="utf-8")
-    (folder / "fault.toml").write_text(fault_toml(comparison.fault), encoding="utf-8")
-    (folder / "results.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        vector = figure_bytes(drawing, "svg", name)
+        for kind in formats:
+            data = vector if kind == "svg" else figure_bytes(drawing, kind, name)
+            (folder / "figures" / f"{name}.{kind}").write_bytes(data)
+        inside[name] = inline_svg(vector.decode(), drawing, name, CAPTIONS[name])
+    return inside

@@ -24,6 +24,11 @@ def guarantee_lines(entry: "Entry") -> list[str]:
     return [*too_long, f"guarantee: {first.removeprefix('proved: ')}", *rest, *_reach(entry)]
 
 
+def limit_lines(entry: "Entry") -> list[str]:
+    """Those of `guarantee_lines` that say what cannot be had: by no controller, and by designs of this kind."""
+    return [] if entry.answer is None else [*entry.answer.limit_lines(), *_reach(entry)]
+
+
 def _reach(entry: "Entry") -> list[str]:
     """How long T_s and a delay may be for designs of the same kind."""
     certified = {p.name: p.certified for p in entry.design.premises if p.name in ("sampling_time", "delay")}

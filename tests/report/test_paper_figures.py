@@ -278,7 +278,7 @@ def test_the_folder_holds_figures_and_numbers_and_appears_whole(study, tmp_path,
     out = tmp_path / "results"
     found = write_folder(study.comparison, out, force=False, study=study)
     assert found == study_results(study)
-    assert {p.name for p in (out / "figures").iterdir()} == {f"{name}.png" for name in study.figures()}
+    assert {p.name for p in (out / "figures").iterdir()} == {f"{name}.svg" for name in study.figures()}
     assert {p.name for p in out.iterdir()} == {
         "certificates",
         "fault.toml",
@@ -287,7 +287,7 @@ def test_the_folder_holds_figures_and_numbers_and_appears_whole(study, tmp_path,
         "report.html",
         "results.json",
     }
-    assert found["figures"]["earthquakes"] == {"file": "figures/earthquakes.png", "paper": "fig:sim"}
+    assert found["figures"]["earthquakes"] == {"file": "figures/earthquakes.svg", "paper": "fig:sim"}
     with pytest.raises(OutputError, match="--force"):
         write_folder(study.comparison, out, force=False, study=study)
     monkeypatch.setattr("quakedesign.report.folder.csv_text", lambda _rows: 1 / 0)

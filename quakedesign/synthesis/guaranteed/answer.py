@@ -54,14 +54,20 @@ class Answer:
                 said.append(
                     f"{name}: slip error {seen.slip_error:.3g} m, slip-rate error {seen.slip_rate_error:.3g} m/s"
                 )
-        limit = self.limit
-        if limit is not None:
-            both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
-            errors = f"the slip-rate error below {limit.slip_rate_error:.3g} m/s{both}"
-            said.append(f"no controller held over this T_s keeps {errors}")
+        said += self.limit_lines()
         if self.leaves_with_stick:
             said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
         return said if self.compensation is None else [*said, self.compensation.sentence()]
+
+    def limit_lines(self) -> list[str]:
+        """What no controller can do at the same T_s, for people; empty where that is not known."""
+        limit = self.limit
+        if limit is None:
+            return []
+        both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
+        return [
+            f"no controller held over this T_s keeps the slip-rate error below {limit.slip_rate_error:.3g} m/s{both}"
+        ]
 
     @property
     def limit(self) -> SmallestPeak | None:

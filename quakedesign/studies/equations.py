@@ -1,0 +1,50 @@
+"""Equations of a fault and of its laws in LaTeX, as their expressions are."""
+
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.controllers import Controller, Signals
+from quakedesign.fault import Fault
+from quakedesign.symbolic import plant
+
+_LONG = 100  # numerators and denominators of more are written as decimals
+
+
+def plant_latex(fault: Fault) -> list[str]:
+    """Plant of a fault whose friction has no state, and its friction law."""
+    friction = plant.mu(plant.x1, plant.x2)
+    acceleration = plant.shifted_acceleration().subs(friction, sp.Symbol("mu"))
+    law = sp.sympify(fault.friction.symbolic().coefficient(plant.x1, plant.x2))
+    motion = rf"\dot x_1 = x_2, \qquad \dot x_2 = {sp.latex(acceleration)}"
+    return [motion, rf"\mu = {sp.latex(law)}"]
+
+
+def law_latex(law: Controller | None) -> list[str]:
+    """Pressure that a law asks for and the rates of its states, with its numbers to four digits; none of no law."""
+    if law is None:
+        return []
+    states = sp.symbols([f"z_{i}" for i in range(1, len(law.integral_units) + 1)], real=True)
+    signals = Signals(
+        slip=plant.x1,
+        slip_rate=plant.x2,
+        slip_error=plant.e1,
+        slip_rate_error=plant.e2,
+        integrals=tuple(states),
+        reference_acceleration=plant.reference(plant.t).diff(plant.t, 2),
+    )
+    rates = zip(states, law.integral_rates(signals), strict=True)
+    named = [("p", law.pressure(signals)), *((rf"\dot {{{z}}}", rate) for z, rate in rates)]
+    return [f"{name} = {_written(expression)}" for name, expression in named]
+
+
+def _written(expression: Any) -> str:
+    """LaTeX with numbers of many digits to four of them."""
+    sums = sp.expand(sp.sympify(expression))
+    numbers = {part for part in sums.atoms(sp.Pow) if part.is_number}
+    numbers |= {n for n in sums.atoms(sp.Rational) if max(abs(n.p), n.q) > _LONG}
+    short = sums.xreplace({number: number.evalf(4) for number in numbers})
+    whole = sp.Add(
+        *(sp.Mul(*(f.evalf(4) if f.is_Float else f for f in sp.Mul.make_args(t))) for t in sp.Add.make_args(short))
+    )
+    return str(sp.latex(whole))
