@@ -1,6 +1,5 @@
 """Commands about the fault itself: what it is, its equations, its scaling, the paper's errata."""
 
-import re
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -27,11 +26,6 @@ def fault(fault: FaultName, /, *, box: Box = None, output: Output = PLAIN) -> in
     return 0
 
 
-def _plain(expression: Any) -> str:
-    """Text of a SymPy expression with its LaTeX names made plain, such as k_hat."""
-    return re.sub(r"\\hat\{\\?(\w+)\}", r"\1_hat", str(expression)).replace("\\", "")
-
-
 @app.command
 def derive(
     fault: FaultName, /, *, latex: Annotated[bool, Parameter(negative="")] = False, output: Output = PLAIN
@@ -43,22 +37,28 @@ def derive(
     latex
         Print LaTeX instead of plain text.
     """
-    import sympy as sp
-
     from quakedesign.fault import load_fault
     from quakedesign.symbolic import derive as derive_model
+    from quakedesign.symbolic.notation import latex as in_latex
+    from quakedesign.symbolic.notation import plain
 
     model = derive_model(load_fault(fault))
-    write = sp.latex if latex else _plain
+    write = in_latex if latex else plain
     found: dict[str, Any] = {
         "error_dynamics": {"beta": write(model.error_dynamics.beta), "h": write(model.error_dynamics.h)},
         "jacobian": write(model.jacobian),
         "instability": write(model.instability),
         "unstable": model.unstable,
     }
-    dynamics = [f"{name} = {found['error_dynamics'][name]}" for name in ("beta", "h")]
-    others = [f"{name}: {found[name]}" for name in ("jacobian", "instability", "unstable")]
-    output.show(found, ["e1' = e2, e2' = beta (nu + h)", *dynamics, *others])
+    beta, h = found["error_dynamics"].values()
+    lines = [
+        r"\dot e_1 = e_2, \quad \dot e_2 = \beta (\nu + h)" if latex else "e_1' = e_2, e_2' = beta*(nu + h)",
+        rf"\beta = {beta}" if latex else f"beta = {beta}",
+        f"h = {h}",
+        rf"J(0, 0) = {found['jacobian']}" if latex else f"jacobian = {found['jacobian']}",
+        rf"\text{{unstable}} \iff {found['instability']}" if latex else f"unstable if {found['instability']}",
+    ]
+    output.show(found, [*lines, f"{'% ' if latex else ''}this fault is {'unstable' if model.unstable else 'stable'}"])
     return 0
 
 
