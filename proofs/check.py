@@ -22,6 +22,7 @@ IMPORTS = {
     "equilibrium": ("exact_numbers", "loop", "cells"),
     "polynomials": ("exact_numbers", "squares"),
     "functionals": ("exact_numbers", "squares", "polynomials"),
+    "attraction": ("exact_numbers", "polynomials"),
     "guarantee_reading": ("exact_numbers",),
     "guarantee_task": ("guarantee_reading",),
     "guarantee_numbers": ("guarantee_reading",),
@@ -92,6 +93,9 @@ def check(text: str) -> Result:
     need(type(version) is int and version == 1, "format", "the integer 1", version)
     if "polynomial" in document:
         return check_polynomial(document)
+    if document.get("kind") == "attraction":
+        verdict, lines = beside("attraction").decide(document)
+        return Result(verdict, tuple(lines))
     if "kind" in document:
         return check_guarantee(document)
     if "inputs" in document:

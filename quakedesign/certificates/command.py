@@ -23,6 +23,9 @@ from quakedesign.certificates.premises import (
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.fault import Fault, load_fault
 from quakedesign.sos import Answer, Positivity
+from quakedesign.sos.exact.attraction_files import is_about_attraction
+from quakedesign.sos.exact.attraction_files import read as read_attraction
+from quakedesign.sos.exact.attraction_words import claim_words
 from quakedesign.sos.exact.files import is_about_polynomial
 from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.words import sentences
@@ -54,6 +57,9 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
         raw = read_json(path)
         if is_guarantee(raw):
             return _guarantee(raw, fault)
+        if is_about_attraction(raw):
+            verdict_of, said = _attraction(raw)
+            return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
         if is_about_polynomial(raw):
             verdict_of, said = _polynomial(raw)
             return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
@@ -88,6 +94,14 @@ def _polynomial(raw: Any) -> tuple[str, list[str]]:
         raise CertificateError("the proof does not decide the statement")
     kind = "proved" if answer.verdict is Positivity.SOS else "refuted"
     return kind, [line for line in sentences(answer) if not line.endswith("exact arithmetic")]
+
+
+def _attraction(raw: Any) -> tuple[str, list[str]]:
+    """Verdict on a file about a region of attraction."""
+    claim = read_attraction(raw)
+    if not claim.check():
+        raise CertificateError("the proof does not decide the claim")
+    return claim.verdict, claim_words(claim)
 
 
 def _covers(certificate: Certificate, fault: Fault) -> list[str]:

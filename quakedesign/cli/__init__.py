@@ -9,6 +9,7 @@ import warnings
 from cyclopts import CycloptsError
 
 from quakedesign.cli import (
+    attraction,
     campaign,
     design,
     figures,
@@ -30,6 +31,7 @@ from quakedesign.text import one_line
 
 __all__ = [
     "app",
+    "attraction",
     "campaign",
     "design",
     "figures",

@@ -6,6 +6,8 @@ from quakedesign.faces import face
 
 if TYPE_CHECKING:
     from quakedesign.sos.exact.answer import Answer, Positivity
+    from quakedesign.sos.exact.attraction import Attraction, Region
+    from quakedesign.sos.exact.attraction_files import save_attraction
     from quakedesign.sos.exact.polynomial import Polynomial
     from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares, holds
     from quakedesign.sos.exact.statement import Statement, statement
@@ -15,12 +17,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Answer",
+    "Attraction",
     "Functional",
     "Membership",
     "Point",
     "Polynomial",
     "Positivity",
     "Program",
+    "Region",
     "Square",
     "Statement",
     "SumOfSquares",
@@ -29,6 +33,9 @@ __all__ = [
     "largest",
     "prove",
     "read_gram",
+    "region_of_attraction",
+    "save_attraction",
+    "stability",
     "statement",
     "verify",
 ]
@@ -41,6 +48,8 @@ face(
     Program=f"{_SEARCH}.program",
     largest=f"{_SEARCH}.program",
     Membership=f"{_SEARCH}.membership",
+    stability=f"{_SEARCH}.attraction",
+    region_of_attraction=f"{_SEARCH}.attraction",
     verify=f"{_SEARCH}.verification",
     read_gram=f"{_SEARCH}.gram_files",
 )

@@ -24,6 +24,7 @@ def module(name, path):
 
 LOOPS = module("loops_in_a_folder", Path(__file__).with_name("test_check.py"))
 POLYNOMIALS = module("polynomials_in_a_folder", Path(__file__).with_name("test_check_polynomials.py"))
+ATTRACTIONS = module("attractions_in_a_folder", Path(__file__).with_name("test_check_attraction.py"))
 NAMES = tuple(LOOPS.checker.IMPORTS)
 LOOP = {"exact_numbers", "loop", "cells"}
 FORGED = 'raise SystemExit("another module")\n'
@@ -40,6 +41,7 @@ KINDS = {
     "negative": (POLYNOMIALS.POINTS[0], {"exact_numbers", "squares", "polynomials"}),
     "not-sos": (POLYNOMIALS.FUNCTIONALS[0], {"exact_numbers", "squares", "polynomials", "functionals"}),
     "guarantee": (guarantee, {"exact_numbers", *(name for name in NAMES if name.startswith("guarantee"))}),
+    "attraction": (ATTRACTIONS.cubic, {"exact_numbers", "squares", "polynomials", "attraction"}),
 }
 
 
@@ -75,7 +77,7 @@ def test_modules_of_the_working_directory_are_not_taken(folder, tmp_path, option
     files = written(planted, *KINDS)
     result = run(folder / "check.py", *files, options=options, cwd=planted, PYTHONPATH=str(planted))
     verdicts = [line.split(": ")[1] for line in result.stdout.splitlines() if line[0] != " "]
-    assert verdicts == ["proved", "refuted", "proved", "refuted", "refuted", "invalid"]
+    assert verdicts == ["proved", "refuted", "proved", "refuted", "refuted", "invalid", "proved"]
     assert (result.stderr, result.returncode) == ("", 1)
     assert sorted(folder.rglob("*")) == before
 

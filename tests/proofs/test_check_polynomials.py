@@ -23,7 +23,9 @@ ROOT = Path(__file__).parents[2]
 SPECIFICATION = importlib.util.spec_from_file_location("polynomial_check", ROOT / "proofs" / "check.py")
 checker = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(checker)
-exact_numbers, squares, *_, polynomials, functionals, _ = map(checker.beside, checker.IMPORTS)
+exact_numbers, squares, polynomials, functionals = map(
+    checker.beside, ("exact_numbers", "squares", "polynomials", "functionals")
+)
 
 REMOVED = object()
 

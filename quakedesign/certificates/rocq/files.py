@@ -16,6 +16,7 @@ from quakedesign.certificates.rocq.multipliers import reason
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.output import write_whole
+from quakedesign.sos.exact.attraction_files import is_about_attraction
 from quakedesign.sos.exact.files import is_about_polynomial
 from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.polynomial import evaluate
@@ -149,10 +150,10 @@ def _nonnegative(asked: Statement, proof: SumOfSquares) -> Iterator[str]:
 
 
 def _loop(raw: Any) -> Iterator[str]:
-    if is_guarantee(raw) or (isinstance(raw, dict) and "refutation" in raw):
+    if is_guarantee(raw) or is_about_attraction(raw) or (isinstance(raw, dict) and "refutation" in raw):
         raise UnsupportedError(
             "a certificate for coqc must be sos, negative or a proof for a closed loop. "
-            f"Received a {'guarantee' if is_guarantee(raw) else 'refutation'}. Use check.py."
+            f"Received a {raw.get('kind', 'refutation')}. Use check.py."
         )
     evidence = evidence_of(raw)
     names = []

@@ -24,7 +24,7 @@ from quakedesign.sos.exact.strict import (
 
 _STATEMENT = {"format", "variables", "polynomial", "inequalities", "equalities", "products", "degree", "multiplier"}
 _KINDS = ("sos", "not-sos", "negative")
-_TERMS, _VARIABLES, _CONSTRAINTS, _PRODUCTS, _BASIS, _SQUARES = 20_000, 16, 32, 1024, 400, 4096
+TERMS, _VARIABLES, _CONSTRAINTS, _PRODUCTS, _BASIS, _SQUARES = 20_000, 16, 32, 1024, 400, 4096
 
 
 def is_about_polynomial(raw: Any) -> bool:
@@ -43,10 +43,15 @@ def read(raw: Any) -> tuple[Statement, Proof]:
     kind = next((k for k in _KINDS if isinstance(raw, dict) and k in raw), "sos")
     with_keys(raw, _STATEMENT | {kind})
     need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
+    asked = _statement(raw, read_names(raw))
+    return asked, read_proof(raw[kind], kind, asked)
+
+
+def read_names(raw: dict[str, Any]) -> tuple[str, ...]:
+    """Variables of a file."""
     names = listed(raw["variables"], "variables", _VARIABLES)
     need(all(isinstance(n, str) and NAME.fullmatch(n) for n in names) and names != [], "variables must be names")
-    asked = _statement(raw, tuple(names))
-    return asked, _proof(raw[kind], kind, asked)
+    return tuple(names)
 
 
 def load(text: str) -> tuple[Statement, Proof]:
@@ -58,7 +63,7 @@ def _statement(raw: dict[str, Any], names: tuple[str, ...]) -> Statement:
     size = len(names)
 
     def polynomials(key: str) -> Any:
-        return tuple(read_polynomial(p, key, size, _TERMS) for p in listed(raw[key], key, _CONSTRAINTS))
+        return tuple(read_polynomial(p, key, size, TERMS) for p in listed(raw[key], key, _CONSTRAINTS))
 
     products = [listed(s, "a product", _CONSTRAINTS) for s in listed(raw["products"], "products", _PRODUCTS)]
     need(all(type(i) is int for s in products for i in s), "products must be lists of integers")
@@ -68,30 +73,31 @@ def _statement(raw: dict[str, Any], names: tuple[str, ...]) -> Statement:
     try:
         return Statement(
             variables=names,
-            polynomial=read_polynomial(raw["polynomial"], "polynomial", size, _TERMS),
+            polynomial=read_polynomial(raw["polynomial"], "polynomial", size, TERMS),
             inequalities=inequalities,
             equalities=equalities,
             products=tuple(tuple(s) for s in products),
             degree=raw["degree"],
-            multiplier=read_polynomial(raw["multiplier"], "multiplier", size, _TERMS),
+            multiplier=read_polynomial(raw["multiplier"], "multiplier", size, TERMS),
         )
     except PolynomialError as error:
         raise CertificateError(str(error)) from None
 
 
-def _proof(raw: Any, kind: str, asked: Statement) -> Proof:
+def read_proof(raw: Any, kind: str, asked: Statement) -> Any:
+    """Proof of a kind, as it stands under it."""
     size = len(asked.variables)
     if kind == "negative":
         entries = listed(with_keys(raw, {"point"})["point"], "point", length=size)
         return Point(coordinates=tuple(read_rational(v) for v in entries))
     if kind == "not-sos":
         values = with_keys(raw, {"functional"})["functional"]
-        return Functional(values=read_polynomial(values, "functional", size, _TERMS))
+        return Functional(values=read_polynomial(values, "functional", size, TERMS))
     with_keys(raw, {"squares", "cofactors", "multiplier"})
     cofactors = listed(raw["cofactors"], "cofactors", length=len(asked.equalities))
     return SumOfSquares(
         squares=_squares(raw["squares"], asked),
-        cofactors=tuple(read_polynomial(q, "a cofactor", size, _TERMS) for q in cofactors),
+        cofactors=tuple(read_polynomial(q, "a cofactor", size, TERMS) for q in cofactors),
         multiplier=_squares(raw["multiplier"], asked),
     )
 
@@ -117,7 +123,7 @@ def _square(raw: Any, asked: Statement) -> Square:
 def _element(raw: Any, variables: int) -> Element:
     if isinstance(raw, list):
         return read_exponents(raw, variables, 999)
-    polynomial = read_polynomial(raw, "a basis element", variables, _TERMS)
+    polynomial = read_polynomial(raw, "a basis element", variables, TERMS)
     need(polynomial != {} and (len(polynomial) > 1 or 1 not in polynomial.values()), "a basis element is not canonical")
     return polynomial
 

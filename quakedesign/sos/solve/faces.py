@@ -213,14 +213,14 @@ def simplest(value: float, tolerance: float) -> Fraction:
     exact = Fraction(value)
     width = abs(exact) * Fraction(tolerance)
     low, high = exact - width, exact + width
-    return -_between(-high, -low) if exact < 0 else _between(low, high)
+    return -simplest_between(-high, -low) if exact < 0 else simplest_between(low, high)
 
 
-def _between(low: Fraction, high: Fraction) -> Fraction:
+def simplest_between(low: Fraction, high: Fraction) -> Fraction:
     """Fraction of smallest denominator in [low, high], 0 < low (continued fractions)."""
     whole = low.numerator // low.denominator
     if whole == low:
         return Fraction(whole)
     if whole + 1 <= high:
         return Fraction(whole + 1)
-    return whole + 1 / _between(1 / (high - whole), 1 / (low - whole))
+    return whole + 1 / simplest_between(1 / (high - whole), 1 / (low - whole))

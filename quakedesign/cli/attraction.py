@@ -1,0 +1,69 @@
+"""The command about polynomial fields: stability, and regions of attraction."""
+
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from quakedesign.cli.options import PLAIN, Force, Output
+from quakedesign.cli.shared import app, new_file
+
+
+@app.command
+def attraction(
+    field: Path,
+    /,
+    *,
+    everywhere: Annotated[bool, Parameter(negative="")] = False,
+    relative: float = 1e-4,
+    out: Path | None = None,
+    above: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Prove the largest level of a Lyapunov function below which all solutions tend to the origin.
+
+    Exit code 0 if one is proved.
+
+    Parameters
+    ----------
+    field
+        TOML file: in [field] the rate of every state, such as x = "-y" and y = "x + (x^2 - 1)*y", polynomials that
+        vanish at the origin; before it V = "..." if V is given. Unless it is, V = x'Px with A'P + PA = -1 for the
+        linearised field, or one of degree 2 or 4 that is searched (--everywhere).
+    everywhere
+        Prove that the solutions from everywhere do, or refute V (without one, all V) by a point.
+    relative
+        Width of the last step of the bisection.
+    out
+        File for the proof (proofs/FORMAT.md); for the refutation where nothing is proved, unless --above is given.
+    above
+        File for the point that refutes all levels above that of V there.
+    """
+    from quakedesign.sos import Region, region_of_attraction, save_attraction, stability
+    from quakedesign.sos.exact.attraction_words import region_facts, region_words
+    from quakedesign.sos.exact.field_files import read_field
+
+    began = perf_counter()
+    for path, what in ((out, "proof file"), (above, "refutation file")):
+        new_file(path, what, force=force)
+    rates, function = read_field(field)
+    if everywhere:
+        found = Region.of(stability(rates, function))
+    else:
+        found = region_of_attraction(rates, function, relative=relative)
+    files = {
+        "file": (out, found.proved or (None if above else found.refuted)),
+        "file_above": (above, found.refuted),
+    }
+    for path, claim in files.values():
+        if path is not None and claim is not None:
+            save_attraction(claim, path)
+    written = {
+        key: str(path) if path is not None and claim is not None else None for key, (path, claim) in files.items()
+    }
+    seconds = perf_counter() - began
+    lines = [*region_words(found), f"{seconds:.2f} s; checked in exact arithmetic"]
+    output.show({**region_facts(found), **written, "seconds": seconds}, lines)
+    return 0 if found.proved is not None else 1

@@ -1,0 +1,213 @@
+"""Regions of attraction by a Lyapunov function: what is claimed of a polynomial field, and whether its proof holds.
+
+V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite. Where a pure power of every state is
+in a basis of the squares of V, V is positive and grows without bound; where one is in a basis of σ_0 or σ_1, V̇ < 0
+where V < level, but at the origin. Then {V < level} is bounded, is never left, and every solution in it tends to zero.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from quakedesign.errors import PolynomialError
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination, constant, degree, evaluate, product
+from quakedesign.sos.exact.proofs import Point, SumOfSquares, holds
+from quakedesign.sos.exact.squares import Square
+from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.work import limited
+
+
+@dataclass(frozen=True, kw_only=True)
+class LyapunovProof:
+    """Squares of V and of −V̇.
+
+    Attributes
+    ----------
+    positive, decrease : SumOfSquares
+    """
+
+    positive: SumOfSquares
+    decrease: SumOfSquares
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attraction:
+    """That V̇ < 0 where V < level, but at the origin, for x' = field(x): proved by squares, or refuted by a point.
+
+    Attributes
+    ----------
+    variables : tuple of str
+    field : tuple of Polynomial
+        One for every variable.
+    lyapunov : Polynomial
+        V.
+    level : Fraction or None
+        None: everywhere.
+    multiplier : Polynomial
+        μ.
+    proof : LyapunovProof, Point or None
+        A point refutes: V < level there, and V <= 0 or V̇ >= 0, though it is not the origin.
+    """
+
+    variables: tuple[str, ...]
+    field: tuple[Polynomial, ...]
+    lyapunov: Polynomial
+    level: Fraction | None
+    multiplier: Polynomial
+    proof: LyapunovProof | Point | None = None
+
+    def __post_init__(self) -> None:
+        size = len(self.variables)
+        origin = (0,) * size
+        if len(self.field) != size:
+            raise PolynomialError(f"a field of {size} states needs {size} polynomials. Received {len(self.field)}.")
+        if origin in self.lyapunov or any(origin in f for f in self.field):
+            raise PolynomialError("V and the field must vanish at the origin. Received a constant term. Shift them.")
+        if self.level is not None and self.level <= 0:
+            raise PolynomialError(f"a level must be positive. Received {self.level}.")
+
+    @cached_property
+    def derivative(self) -> dict[Exponents, Fraction]:
+        """V̇ along the field."""
+        return along(self.field, self.lyapunov)
+
+    @cached_property
+    def positive(self) -> Statement:
+        """That V is a sum of squares."""
+        return _statement(self.variables, self.lyapunov, constant(len(self.variables)), ())
+
+    @cached_property
+    def decrease(self) -> Statement:
+        """That −V̇ is one where V is at most the level."""
+        falling = combination([(Fraction(-1), self.derivative)])
+        size = len(self.variables)
+        below = (
+            () if self.level is None else (combination([(self.level, constant(size)), (Fraction(-1), self.lyapunov)]),)
+        )
+        return _statement(self.variables, falling, self.multiplier, below)
+
+    @property
+    def verdict(self) -> str:
+        """``proved``, ``refuted`` or ``undecided``."""
+        if self.proof is None:
+            return "undecided"
+        return "refuted" if isinstance(self.proof, Point) else "proved"
+
+    @property
+    def height(self) -> Fraction | None:
+        """V at the point of a refutation; None without one."""
+        return evaluate(self.lyapunov, self.proof.coordinates) if isinstance(self.proof, Point) else None
+
+    @property
+    def equilibrium(self) -> bool:
+        """Whether the point of a refutation is one where the field vanishes, so that no other V helps."""
+        return isinstance(self.proof, Point) and not any(evaluate(f, self.proof.coordinates) for f in self.field)
+
+    def check(self) -> bool:
+        """Whether the proof decides, in exact arithmetic and without a solver; an undecided claim is True.
+
+        Raises
+        ------
+        WorkError
+            When that takes more work than a check may.
+        """
+        with limited():
+            if self.proof is None:
+                return True
+            return self.refuted_by(self.proof) if isinstance(self.proof, Point) else self._proves(self.proof)
+
+    def _proves(self, proof: LyapunovProof) -> bool:
+        parts = ((self.positive, proof.positive), (self.decrease, proof.decrease))
+        size = len(self.variables)
+        return all(vanishes_at_origin_only(found.squares, size) and holds(asked, found) for asked, found in parts)
+
+    def refuted_by(self, point: Point) -> bool:
+        """Whether V is below the level at a point other than the origin, and is not positive or does not fall there."""
+        x = point.coordinates
+        if len(x) != len(self.variables) or not any(x):
+            return False
+        value = evaluate(self.lyapunov, x)
+        inside = self.level is None or value < self.level
+        return inside and (value <= 0 or evaluate(self.derivative, x) >= 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """What is proved of {V < level}, and what refutes more.
+
+    Attributes
+    ----------
+    proved : Attraction or None
+        The largest level that is proved.
+    refuted : Attraction or None
+        By a point where V is not positive or does not fall; so is every level above the value of V there.
+    remark : str
+        Why nothing was proved; empty otherwise.
+    """
+
+    proved: Attraction | None
+    refuted: Attraction | None
+    remark: str = ""
+
+    @staticmethod
+    def of(claim: Attraction) -> "Region":
+        """Region of a single claim, about everywhere."""
+        proved, refuted = (claim if claim.verdict == verdict else None for verdict in ("proved", "refuted"))
+        remark = "" if proved or refuted else "neither a proof nor a counterexample was found"
+        return Region(proved=proved, refuted=refuted, remark=remark)
+
+    @property
+    def verdict(self) -> str:
+        """``proved``, ``refuted`` (no level at all can be proved with this V, or this field) or ``undecided``."""
+        if self.proved is not None:
+            return "proved"
+        return "refuted" if self.refuted is not None and self.refuted.level is None else "undecided"
+
+    @property
+    def level(self) -> Fraction | None:
+        """Proved level; None if nothing is proved, or everything."""
+        return None if self.proved is None else self.proved.level
+
+    @property
+    def refuted_above(self) -> Fraction | None:
+        """V at the point that refutes; None without one."""
+        return None if self.refuted is None else self.refuted.height
+
+
+def vanishes_at_origin_only(squares: Iterable[Square], size: int) -> bool:
+    """Whether a pure power of every variable is an element of a basis: then the squares vanish at the origin alone."""
+    pure = {_pure(b) for square in squares for b in square.basis if isinstance(b, tuple)}
+    return pure >= set(range(size))
+
+
+def _pure(exponents: Exponents) -> int | None:
+    """Index of the one variable of a monomial."""
+    used = [i for i, x in enumerate(exponents) if x]
+    return used[0] if len(used) == 1 else None
+
+
+def along(field: Sequence[Polynomial], function: Polynomial) -> dict[Exponents, Fraction]:
+    """Derivative of a function along a field."""
+    slopes = [_partial(function, i) for i in range(len(field))]
+    parts = (product(len(field), (slope, f)) for slope, f in zip(slopes, field, strict=True) if slope and f)
+    return combination((Fraction(1), part) for part in parts)
+
+
+def _partial(polynomial: Polynomial, index: int) -> dict[Exponents, Fraction]:
+    lowered = ((e, c) for e, c in polynomial.items() if e[index])
+    return {(*e[:index], e[index] - 1, *e[index + 1 :]): c * e[index] for e, c in lowered}
+
+
+def _statement(
+    variables: tuple[str, ...], polynomial: Polynomial, multiplier: Polynomial, inequalities: tuple[Polynomial, ...]
+) -> Statement:
+    top = max(degree(multiplier) + degree(polynomial), *map(degree, inequalities), 0)
+    return Statement(
+        variables=variables,
+        polynomial=polynomial,
+        inequalities=inequalities,
+        products=((), *((i,) for i in range(len(inequalities)))),
+        degree=top + top % 2,
+        multiplier=multiplier,
+    )

@@ -1,0 +1,37 @@
+"""A polynomial field and a Lyapunov function from a TOML file."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from quakedesign.errors import PolynomialError
+
+_LARGEST = 1 << 16  # bytes
+
+
+def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
+    """Rates of the states by name, from the table ``field``, and V where the file has one; all as text.
+
+    Raises
+    ------
+    PolynomialError
+        When the file cannot be read, or has other contents.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise PolynomialError(f"{path} must be a file that can be read. Received: {error.strerror}.") from None
+    if len(content) > _LARGEST:
+        raise PolynomialError(f"a field's file must have at most {_LARGEST} bytes. Received {len(content)}.")
+    try:
+        raw: dict[str, Any] = tomllib.loads(content.decode())
+    except (ValueError, RecursionError) as error:
+        reason = str(error).partition("\n")[0]
+        raise PolynomialError(f"{path} must be TOML. Received: {reason}. Quote polynomials.") from None
+    field, function = raw.get("field"), raw.get("V")
+    texts = isinstance(field, dict) and all(isinstance(rate, str) for rate in field.values())
+    if not raw.keys() <= {"field", "V"} or not texts or not isinstance(function, str | None):
+        raise PolynomialError(
+            f'{path} must have a table [field], such as x = "-x + x^3", and at most V = "x^2" before it.'
+        )
+    return dict(field or {}), function

@@ -1,0 +1,206 @@
+"""Regions of attraction: levels of the literature, closed forms, refutations, and the command."""
+
+import json
+import re
+import tomllib
+from fractions import Fraction as F
+from functools import cache
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from quakedesign import sos
+from quakedesign.cli import main
+from quakedesign.errors import PolynomialError
+from quakedesign.sos.exact.attraction_files import load, text
+from quakedesign.sos.exact.field_files import read_field
+from quakedesign.sos.exact.proofs import Point
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs" / "howto" / "region_of_attraction.md").read_text(encoding="utf-8")
+ROWS = {
+    row[0]: row
+    for row in re.findall(r"^\| (?!system)([a-z0-9-]+) \| (.+?) \| (.*?) \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.M)
+}
+SYSTEMS = tomllib.loads((ROOT / "tests" / "sos" / "regions.toml").read_text(encoding="utf-8"))
+TRUTH = {"cubic": 1, "drake-12876": 1 / 20, "hahn": 8 * sqrt(3) / 9, "ahmadi-krstic-parrilo": 27 / 4}  # by hand
+VAN_DER_POL = SYSTEMS["van-der-pol"]["field"]
+
+
+@cache
+def region(name):
+    return sos.region_of_attraction(SYSTEMS[name]["field"], SYSTEMS[name].get("V"))
+
+
+def test_the_table_is_about_all_systems():
+    assert ROWS.keys() == SYSTEMS.keys()
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_the_level_is_proved_and_a_point_just_above_refutes_more(name):
+    found = region(name)
+    *_, published, _, proved, above = ROWS[name]
+    assert (found.verdict, found.proved.verdict, found.refuted.verdict) == ("proved", "proved", "refuted")
+    assert load(text(found.proved)).check()
+    assert load(text(found.refuted)).check()
+    assert F(proved) <= found.level <= found.refuted_above <= F(above)
+    assert found.level >= F(99, 100) * F(published.split("= ")[-1].replace("—", "0"))
+    assert found.refuted_above - found.level < F(1, 10**4) * found.level
+
+
+@pytest.mark.parametrize("name", TRUTH)
+def test_levels_known_by_hand_are_met(name):
+    assert float(region(name).level) == pytest.approx(TRUTH[name], rel=1e-5)
+    assert float(region(name).level) <= TRUTH[name] * (1 + 1e-12)
+
+
+def test_levels_that_are_simple_numbers_are_proved_exactly():
+    exact = {"cubic": 1, "drake-12876": F(1, 20), "ahmadi-krstic-parrilo": F(27, 4), "chesi-1": 4}
+    assert {name: region(name).level for name in exact} == exact
+
+
+@pytest.mark.parametrize("size", [F(1, 10**8), F(10**8)])
+def test_the_size_of_v_does_not_matter(size):
+    scaled = sos.region_of_attraction(SYSTEMS["parrilo"]["field"], f"{size}*(x^2 + y^2)")
+    assert float(scaled.level / size) == pytest.approx(float(region("parrilo").level), rel=1e-4)
+
+
+def test_v_of_the_linearised_field_solves_its_equation():
+    assert region("van-der-pol").proved.lyapunov == {(2, 0): F(3, 2), (1, 1): -1, (0, 2): 1}
+
+
+def test_solutions_from_just_inside_the_proved_region_arrive():
+    claim = region("van-der-pol").proved
+    level = float(claim.level)
+    for angle in np.linspace(0, 6, 7):
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        size = sqrt(level / (1.5 * direction[0] ** 2 - direction[0] * direction[1] + direction[1] ** 2))
+        start = 0.9999 * size * direction
+        end = solve_ivp(lambda t, x: [-x[1], x[0] + (x[0] ** 2 - 1) * x[1]], (0, 60), start, rtol=1e-9).y[:, -1]
+        assert np.abs(end).max() < 1e-6
+
+
+# ---------------------------------------------------------------- everywhere
+
+
+def test_the_example_of_the_manual_of_sostools_is_stable_everywhere():
+    field = {"x": "(-x^3 - x*z^2)*(z^2 + 1)", "y": "(-y - x^2*y)*(z^2 + 1)", "z": "(-z + 3*x^2*z)*(z^2 + 1) - 3*z"}
+    claim = sos.stability(field, "6*x^2 + 4*y^2 + 2*z^2")
+    assert claim.verdict == "proved"
+    assert claim.level is None
+    assert claim.check()
+
+
+def test_a_function_is_searched():
+    claim = sos.stability({"x": "-x^3 + y", "y": "-x - y^3"}, degrees=(2,))
+    assert (claim.verdict, claim.check()) == ("proved", True)
+    assert load(text(claim)).check()
+
+
+def test_another_equilibrium_refutes():
+    claim = sos.stability({"x": "-x + x^3"})
+    assert (claim.verdict, claim.equilibrium, claim.check()) == ("refuted", True, True)
+    assert abs(claim.proof.coordinates[0]) == 1
+
+
+@pytest.mark.parametrize(
+    ("field", "V"),
+    [
+        ({"x": "x"}, "x^2"),
+        ({"x": "-x", "y": "-y"}, "x^2 - y^2"),
+        ({"x": "-x", "y": "-y"}, "x^2 - y^2/1000"),
+        ({"x": "y", "y": "-x"}, "x^2 + y^2"),
+        ({"x": "-x + y^2", "y": "-y"}, "x^2 + y^2"),
+    ],
+)
+def test_a_function_that_does_not_fall_or_is_not_positive_is_refuted(field, V):
+    claim = sos.stability(field, V)
+    assert (claim.verdict, claim.level, claim.check()) == ("refuted", None, True)
+    assert isinstance(claim.proof, Point)
+
+
+def test_what_is_stable_everywhere_has_no_level():
+    found = sos.region_of_attraction({"x": "-x - x^3"})
+    assert (found.verdict, found.level, found.refuted_above) == ("proved", None, None)
+    assert found.proved.check()
+
+
+def test_what_is_not_proved_says_why():
+    assert sos.region_of_attraction({"x": "x"}).remark == "the linearised field has no V = x'Px. Give a V"
+    assert sos.region_of_attraction({"x": "-x", "y": "-y"}, "x^2 - y^2").remark == "V is not positive"
+    found = sos.region_of_attraction({"x": "x"}, "x^2")
+    assert (found.verdict, found.level, found.remark) == ("undecided", None, "no level below was proved")
+    claim = sos.stability(VAN_DER_POL, degrees=())
+    assert (claim.verdict, claim.check()) == ("undecided", True)
+
+
+@pytest.mark.parametrize(
+    ("field", "V", "said"),
+    [
+        ({}, None, "a rate for every state"),
+        ({"x": "-x + 1"}, None, "vanish at the origin"),
+        ({"x": "-x"}, "x^2 + 1", "vanish at the origin"),
+        ({"x": "-y"}, None, "y"),
+        ({"x": "-x"}, "y^2", "y"),
+    ],
+)
+def test_another_field_is_refused(field, V, said):
+    with pytest.raises(PolynomialError, match=said):
+        sos.region_of_attraction(field, V)
+
+
+# ---------------------------------------------------------------- the command, and the page
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(list(map(str, arguments)))
+    return ended.value.code, *capsys.readouterr()
+
+
+def test_the_command_proves_refutes_and_writes_both(tmp_path, capsys):
+    (tmp_path / "field.toml").write_text('V = "x^2"\n[field]\nx = "-x + x^3"\n')
+    files = [tmp_path / "proof.json", tmp_path / "above.json"]
+    line = ["attraction", tmp_path / "field.toml", "--out", files[0], "--above", files[1]]
+    code, out, _ = run(capsys, *line, "--json")
+    facts = json.loads(out)
+    assert (code, facts["verdict"], facts["level"], facts["refuted_above"]) == (0, "proved", "1", "1")
+    assert facts["equilibrium"]
+    assert run(capsys, *line)[0] == 2
+    code, out, _ = run(capsys, *line, "--force")
+    assert "every solution that starts where V < 1 (1 rounded down) tends to the origin" in out
+    assert "another equilibrium, so that no V helps beyond: x = " in out
+    code, out, _ = run(capsys, "check", *files)
+    assert (code, out.count(": proved"), out.count(": refuted")) == (1, 1, 1)
+
+
+def test_the_command_says_what_is_not_so_everywhere(tmp_path, capsys):
+    (tmp_path / "field.toml").write_text('V = "x^2"\n[field]\nx = "-x + x^3"\n')
+    code, out, _ = run(capsys, "attraction", tmp_path / "field.toml", "--everywhere", "--out", tmp_path / "no.json")
+    assert (code, out.splitlines()[0]) == (1, "refuted")
+    assert run(capsys, "check", tmp_path / "no.json")[1].startswith(f"{tmp_path / 'no.json'}: refuted")
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["[field", "x = 1", "[field]\nx = 1", 'V = 2\n[field]\nx = "-x"', '[field]\nx = "-x"\n[more]', "\x00" * 70_000],
+)
+def test_another_file_is_refused_in_one_line(tmp_path, content):
+    (tmp_path / "field.toml").write_text(content)
+    with pytest.raises(PolynomialError) as refused:
+        read_field(tmp_path / "field.toml")
+    assert "\n" not in str(refused.value)
+    with pytest.raises(PolynomialError, match="No such file"):
+        read_field(tmp_path / "none.toml")
+
+
+def test_everything_on_the_page_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for block in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL):
+        exec(compile(block, "region_of_attraction.md", "exec"), {})
+    assert capsys.readouterr().out.endswith("True True\nproved\n")
+    (tmp_path / "field.toml").write_text(re.search(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)[1])
+    assert read_field(tmp_path / "field.toml") == (SYSTEMS["parrilo"]["field"], SYSTEMS["parrilo"]["V"])
