@@ -13,11 +13,12 @@ from quakedesign.loop import NOISES, PeriodicLoop, Segment
 from quakedesign.loop.implicit_root import root_of
 from quakedesign.loop.periodic import Row
 
-_PERIODS = 64
+_PERIODS, _MOST_PERIODS = 64, 512
+_FORGOTTEN = 100  # a course is over when what was at first is down to the hundredth part
 _PIECES = 6
 _SWEEPS = 8
 _MANY, _FEW = 512, 2  # courses that switch after random times, and their sweeps: where the fault sticks, sweeps stall
-_COURSES = 24  # for each of the two outputs
+_COURSES, _LEAST_COURSES = 24, 8  # for each of the two outputs; fewer where they are longer
 _SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
 _SEED = 7
 
@@ -41,11 +42,11 @@ class WorstFound:
 def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> WorstFound:
     """Adversarial courses of disturbance, friction slope, damping and input gain, all at their ends.
 
-    Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64
-    periods long; in continuous time a period is that of the fastest pole, 1/|λ|. With `sticks` the fault does not
-    slide backward: friction holds it wherever the loop would, along the reference at its largest rate and at a
-    twentieth of that, and courses that switch after random times are tried as well. Noise is at its ends too. An
-    implicit step ends where its equation says, inside its lines or not.
+    Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64 to 512
+    periods long, as the loop forgets; in continuous time a period is that of the fastest pole, 1/|λ|. With `sticks` the
+    fault does not slide backward: friction holds it wherever the loop would, along the reference at its largest rate
+    and at a twentieth of that, and courses that switch after random times are tried as well. Noise is at its ends too.
+    An implicit step ends where its equation says, inside its lines or not.
     """
     searches = [_Search(claim, sticks, 2 * _COURSES)]
     searches[0].follow(searches[0].random(), _SWEEPS)
@@ -88,6 +89,8 @@ class _Search:
         self.parts = [
             _pieces(vertices, inputs, _widened(s.jump, self.size), float(s.duration) / _PIECES) for s in segments
         ]
+        periods = _periods_to_forget(self.parts, len(loop.states))
+        courses = 2 * max(courses // 2 * _PERIODS // periods, _LEAST_COURSES)
         paces = np.where(np.arange(courses) // 2 % 2, 1, _SLOW)
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.allowed = np.ones((courses, len(vertices)), dtype=bool)
@@ -97,7 +100,7 @@ class _Search:
             self.allowed[::2, :half] = self.allowed[1::2, half:] = False
         self.aim = np.zeros((courses, self.size))
         self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
-        self.steps = _PERIODS * len(self.parts) * _PIECES
+        self.steps = periods * len(self.parts) * _PIECES
         self.largest = (0.0, 0.0)
 
     def follow(self, costates: np.ndarray, sweeps: int) -> None:
@@ -223,6 +226,16 @@ def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, jump: np.ndarray, le
         steps.append(found[:size, :size])
         added.append(found[:size, size:])
     return _Pieces(jump, np.array(steps), np.array(added), length)
+
+
+def _periods_to_forget(parts: list[_Pieces], size: int) -> int:
+    """How many periods a loop of so many states remembers at the vertex that forgets last, within limits."""
+    maps = np.eye(parts[0].jump.shape[0])[None]
+    for part in parts:
+        maps = np.linalg.matrix_power(part.steps, _PIECES) @ part.jump @ maps
+    kept = np.abs(np.linalg.eigvals(maps[:, :size, :size])).max()
+    pace = -np.log(np.clip(kept, 1e-9, 1 - 1e-9))
+    return int(np.clip(np.ceil(np.log(_FORGOTTEN) / pace), _PERIODS, _MOST_PERIODS))
 
 
 def _widened(jump: Any, size: int) -> np.ndarray:

@@ -109,6 +109,17 @@ def test_no_course_of_ten_thousand_violates_a_guarantee(row):
     assert largest[1].max() > 0.3 * float(claim.claims.slip_rate_error)  # the courses do hurt
 
 
+def test_the_worst_found_is_no_less_than_what_a_disturbance_does_to_the_plant_that_forgets_last():
+    """Friction that falls as fast as it may, at its least: a linear loop, and a disturbance along its own response."""
+    claim = designed("real peak")
+    held, periods, pieces = numbers(claim), 350, 2
+    plant = replace(held, s=2 * held.s[1:], w=2 * held.w[1:], beta=2 * held.beta[:1])
+    response = attacker.responses(plant, periods, pieces)[0]
+    largest, _ = attacker.run(plant, periods, pieces, attacker.aligned(plant, response), 1)
+    found = worst_found(claim).slip_error
+    assert largest[0].max() <= found <= claim.claims.slip_error
+
+
 @pytest.mark.parametrize("row", ROWS)
 def test_courses_along_the_nominal_response_come_close_and_stay_below(row):
     claim = designed(row)
