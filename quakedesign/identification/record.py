@@ -62,6 +62,9 @@ class Record:
     normal: "np.ndarray"
     normal_unit: str
 
+    def __repr__(self) -> str:
+        return f"Record({self.name!r}: {self.time.size} samples in {self.time[-1] - self.time[0]:.4g} s)"
+
     @property
     def stiffness_unit(self) -> str:
         """Unit of a stiffness that goes with the normal stress or force."""

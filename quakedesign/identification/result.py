@@ -97,6 +97,11 @@ class Identification:
     notes: tuple[str, ...]
     seed: int
 
+    def __repr__(self) -> str:
+        ends = {e.name: f"{e.value:.4g} ({e.low:.4g} to {e.high:.4g}) {e.unit}" for e in self.estimates.values()}
+        told = ", ".join(f"{name} {text}".strip() for name, text in ends.items())
+        return f"Identification({self.record.name!r}, {self.law.name}: {told})"
+
     @property
     def identified(self) -> bool:
         """Whether the record tells every parameter."""

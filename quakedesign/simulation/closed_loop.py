@@ -1,6 +1,6 @@
 """Plant, law and reference of one closed loop, from SymPy to CasADi functions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -67,11 +67,26 @@ def matched_perturbation(fault: Fault, divisor: sp.Rational, varied: bool = Fals
     return unmatched / beta
 
 
+def acceleration_with_parameters(fault: Fault, names: Sequence[str]) -> tuple[sp.Expr, list[sp.Symbol]]:
+    """x2' [m/s²] as `acceleration_expression`, and the symbols in it of named parameters of plant and friction."""
+    law = fault.friction
+    free = law.symbols() | {name: sp.Symbol(name, positive=True) for name in plant.PARAMETERS}
+    known = {name: sp.Rational(str(rational(getattr(fault, name)))) for name in plant.PARAMETERS}
+    hatted = plant.hatted_parameters(fault, known | {name: free[name] for name in names if name in known})
+    held = {symbol: value for symbol, value in law.values().items() if symbol not in {free[name] for name in names}}
+    symbols = [free[name] for name in names]
+    return _inserted(plant.shifted_acceleration(), law.symbolic(), hatted).subs(held), symbols
+
+
 def _with_numbers(expression: sp.Expr, fault: Fault, varied: bool) -> sp.Expr:
-    """Insert the law and exact numbers; e^u becomes 1 + (e^u − 1), so that small slips do not drown in rounding."""
+    """Insert the law and exact numbers."""
     law: Any = fault.friction.exact()
-    values: dict[Any, Any] = varied_values(fault) if varied else plant.plant_values(fault)
     law = WeakenedFriction(law, symbol("weakening")) if varied else law
+    return _inserted(expression, law, varied_values(fault) if varied else plant.plant_values(fault))
+
+
+def _inserted(expression: sp.Expr, law: Any, values: Mapping[Any, Any]) -> sp.Expr:
+    """Insert law and values; e^u becomes 1 + (e^u − 1), so that small slips do not drown in rounding."""
     lawful = plant.with_law(expression, law, extended=True)
     numbers = lawful.replace(plant.disturbance, lambda *_: phi).subs(values)
     return sp.expand_mul(numbers.replace(sp.exp, lambda u: 1 + expm1(u)))

@@ -1,5 +1,6 @@
 """The same plant and laws as CasADi Functions and as python-control systems."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -12,32 +13,41 @@ from quakedesign.loop.law_expressions import integral_symbols, law_expressions, 
 from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.loop.steps.control_step import control_step
 from quakedesign.loop.steps.sampled_law import Law
-from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.simulation.closed_loop import ClosedLoop, acceleration_with_parameters, casadi_function
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_numpy
+from quakedesign.text import nearest_name
 
 _SEEN = ("slip", "slip_rate", "r", "r_rate")
 
 
-def to_casadi(fault: Fault, controller: Controller | None = None) -> Any:
+def to_casadi(fault: Fault, controller: Controller | None = None, *, parameters: Sequence[str] = ()) -> Any:
     """Return a CasADi Function of a fault, or of its closed loop.
 
     Parameters
     ----------
     fault : Fault
     controller : Controller, optional
+    parameters : sequence of str, optional
+        Of a fault without a controller: density [kg/m³], shear_modulus [Pa], damping [kg/s], effective_normal_stress
+        [Pa] or a quantity of its friction, such as ``critical_slip`` [m], that shall be free. They become one more
+        input, for sensitivities and estimation.
 
     Returns
     -------
     casadi.Function
-        Without a controller: (t [s], x = [x1 m, x2 m/s], p [Pa]) → dx. With one:
-        (t, x = [x1, x2, ξ…]) → dx, p, h [unit of ν], reference = [r m, r' m/s, r'' m/s²].
+        Without a controller: (t [s], x = [x1 m, x2 m/s], p [Pa]) → dx, with `parameters` as a last input in their
+        order. With one: (t, x = [x1, x2, ξ…]) → dx, p, h [unit of ν], reference = [r m, r' m/s, r'' m/s²].
 
     Raises
     ------
     UnsupportedError
         For a law of samples.
+    ParameterError
+        For a parameter that the fault has not, twice the same, or any beside a controller.
     """
+    if parameters:
+        return _free_plant(fault, controller, tuple(parameters))
     if controller is not None and controller.sampling_time is not None:
         raise UnsupportedError("a law of samples has no loop in continuous time. Use simulate, or export it.")
     loop = ClosedLoop(fault, controller)
@@ -55,6 +65,23 @@ def to_casadi(fault: Fault, controller: Controller | None = None) -> Any:
         ["t", "x"],
         ["dx", "p", "h", "reference"],
     )
+
+
+def _free_plant(fault: Fault, controller: Controller | None, names: tuple[str, ...]) -> Any:
+    """CasADi Function (t, x, p, parameters) → dx."""
+    fault.require_memoryless("free parameters")
+    known = (*plant.PARAMETERS, *fault.friction.quantities())
+    if controller is not None:
+        raise ParameterError("free parameters are those of a fault without a controller. Received one. Leave it out.")
+    for name in names:
+        if name not in known or names.count(name) > 1:
+            raise ParameterError(
+                f"parameters must be different ones of {', '.join(known)}. Received {name!r}"
+                f"{', twice' if name in known else ''}.{nearest_name(name, known) if name not in known else ''}"
+            )
+    acceleration, symbols = acceleration_with_parameters(fault, names)
+    inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p], "parameters": symbols}
+    return casadi_function("plant", inputs, {"dx": [plant.x2, acceleration]}, ClosedLoop(fault).shaking)
 
 
 def to_iosystem(subject: Fault | Controller) -> Any:

@@ -3,14 +3,18 @@
 Nothing here is typed in but the force balance; SymPy derives the rest.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import sympy as sp
 
 from quakedesign.fault import Fault, FrictionLaw
 from quakedesign.rationals import rational
 from quakedesign.symbolic.kept import kept
+
+PARAMETERS = ("density", "shear_modulus", "damping", "effective_normal_stress")
 
 t = sp.Symbol("t", nonnegative=True)
 x1, x2 = sp.symbols("x_1 x_2", real=True)
@@ -131,13 +135,15 @@ def with_disturbance(expression: sp.Expr, fault: Fault) -> sp.Expr:
 
 @cache
 def plant_values(fault: Fault) -> dict[sp.Symbol, sp.Rational]:
-    """Exact nominal value of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] and σ'_n [Pa]; m = nρh³, A = nh², k = nGh (see `Fault`)."""
-    rho, G, h, damping, stress = (
-        sp.Rational(str(rational(v)))
-        for v in (fault.density, fault.shear_modulus, fault.side, fault.damping, fault.effective_normal_stress)
-    )
-    mass = rho * h**3
-    shared = damping / sp.Rational(str(fault.squares))
+    """Exact nominal value of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] and σ'_n [Pa]."""
+    return hatted_parameters(fault, {name: sp.Rational(str(rational(getattr(fault, name)))) for name in PARAMETERS})
+
+
+def hatted_parameters(fault: Fault, values: Mapping[str, Any]) -> dict[sp.Symbol, Any]:
+    """k̂, η̂, N̂ and σ'_n from values or symbols of `PARAMETERS`; m = nρh³, A = nh², k = nGh (see `Fault`)."""
+    rho, G, damping, stress = (values[name] for name in PARAMETERS)
+    h = sp.Rational(str(rational(fault.side)))
+    mass, shared = rho * h**3, damping / sp.Rational(str(fault.squares))
     return {k_hat: G * h / mass, eta_hat: shared / mass, N_hat: h**2 / mass, sigma: stress}
 
 

@@ -43,6 +43,13 @@ def test_outliers_are_named_and_left_out(weak):
         weak.allows({"residual": 0.4, "critical_slip": 2.5e-3})
 
 
+def test_reprs_are_one_line_with_what_was_found(weak):
+    assert repr(weak.record) == "Record('made': 400 samples in 100 s)"
+    assert repr(weak).startswith("Identification('made', exponential-slip-weakening: residual 0.4")
+    assert repr(weak).count(" to ") == 3
+    assert len(repr(weak)) < 250
+
+
 def test_ends_are_those_of_linear_least_squares_where_the_law_is_linear():
     """With a critical slip that is known, friction is linear in the other two: Fisher's ellipsoid in closed form."""
     found = identify(synthetic.weakening().noisy(4), "exponential-slip-weakening")

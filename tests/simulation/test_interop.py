@@ -97,6 +97,48 @@ def derived_jacobian(fault):
     return np.array(model.jacobian.subs(model.values).evalf(30), dtype=float)
 
 
+@pytest.mark.parametrize("fault", [case for case in faults_of_every_law() if not case.values[0].friction.state_names])
+def test_free_parameters_are_those_of_another_fault(fault):
+    """With other values it must be the function of the fault that has them."""
+    draw = np.random.default_rng(3)
+    of_plant = ("density", "shear_modulus", "damping", "effective_normal_stress")
+    names = (*of_plant, *fault.friction.quantities())
+    free = to_casadi(fault, parameters=names)
+    nominal = [getattr(fault if name in of_plant else fault.friction, name) for name in names]
+    for factors in (np.ones(len(names)), draw.uniform(0.8, 1.25, len(names))):
+        values = np.multiply(nominal, factors)
+        told = dict(zip(names, map(float, values), strict=True))
+        law = replace(fault.friction, **{name: told.pop(name) for name in fault.friction.quantities()})
+        other = to_casadi(replace(fault, friction=law, **told))
+        for slip, rate, pressure in draw.normal(size=(20, 3)) * [3e-3, 1e-2, 1e5]:
+            expected = other(0.1, [slip, rate], pressure).full().ravel()
+            assert free(0.1, [slip, rate], pressure, values).full().ravel() == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_free_parameter_keeps_its_place_and_the_disturbance():
+    free = to_casadi(LAB, parameters=("critical_slip", "density"))
+    assert free.name_in() == ["t", "x", "p", "parameters"]
+    values = [LAB.friction.critical_slip, LAB.density]
+    assert free(0.3, [1e-3, 1e-3], 1e3, values).full() == pytest.approx(to_casadi(LAB)(0.3, [1e-3, 1e-3], 1e3).full())
+    theta = ca.MX.sym("theta", 2)
+    slope = ca.Function("S", [theta], [ca.jacobian(free(0.3, [1e-3, 1e-3], 1e3, theta), theta)])(values).full()
+    assert slope[0] == pytest.approx([0, 0])
+    assert np.abs(slope[1]).min() > 0
+
+
+@pytest.mark.parametrize(
+    ("parameters", "controller", "named"),
+    [
+        (("densty",), None, "Received 'densty'. Did you mean density"),
+        (("drop", "drop"), None, "Received 'drop', twice"),
+        (("drop",), published("lab-fault")["elqr"], "without a controller"),
+    ],
+)
+def test_parameters_that_are_not_free_are_refused(parameters, controller, named):
+    with pytest.raises(ParameterError, match=named):
+        to_casadi(LAB, controller, parameters=parameters)
+
+
 @pytest.mark.parametrize("fault", list(faults_of_every_law()))
 def test_derivatives_at_the_equilibrium_are_those_that_are_derived(fault):
     """From rest motion goes to slip > 0 and slip rate > 0; rate and state are carried as logarithms (chain rule)."""

@@ -1,0 +1,149 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#       format_version: '1.3'
+#       jupytext_version: 1.19.6
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # The control toolbox
+#
+# **Can a controller be designed with the tools that every control engineer knows, and what is then guaranteed of it on a fault?** This page takes the fault
+# into python-control, designs a discrete-time LQR with `dlqr`, reads its margins, proves bounds in m/s for it, and puts the nonlinear fault and the law
+# into a diagram of python-control.
+
+# %%
+from fractions import Fraction
+
+import control
+import matplotlib.pyplot as plt
+import numpy as np
+
+# %matplotlib inline
+import quakedesign as qd
+from quakedesign.controllers.elqr import ExtendedLQR
+from quakedesign.synthesis import answer
+
+fault = qd.load_fault("real-fault")
+period = fault.sampling_time  # T_s [s]
+
+# %% [markdown]
+# ## The plant, once a sample
+# `to_statespace` linearises the fault at rest at a slip, with the pressure [Pa] as input and slip [m] and slip rate [m/s] as outputs. One pole lies in the right
+# half-plane. A pressure that is held from sample to sample gives the exact discrete-time plant.
+
+# %%
+plant = qd.to_statespace(fault)
+sampled = control.sample_system(plant, period, method="zoh")
+print("poles [1/s]:", np.round(plant.poles(), 4), " held:", np.round(sampled.poles(), 4))
+
+# %% [markdown]
+# ## A discrete-time LQR with two integrals
+# The e-LQR feeds back slip error, slip-rate error and two sums, which are formed once per sample: $\xi_1^+ = \xi_1 + T_s e_1$, $\xi_2^+ = \xi_2 + T_s \xi_1^+$. The
+# weights follow Bryson's rule: one over the square of what would be acceptable, here 10 µm, 100 µm/s, 10 µm s, 10 µm s² and 1 MPa.
+
+# %%
+sums = np.array([[period, 0], [period**2, 0]]), np.array([[1, 0], [period, 1]])
+A = np.block([[sampled.A, np.zeros((2, 2))], [sums[0], sums[1]]])
+B = np.vstack([sampled.B, np.zeros((2, 1))])
+acceptable = np.array([1e-5, 1e-4, 1e-5, 1e-5])
+K, _, poles = control.dlqr(A, B, np.diag(acceptable**-2.0), [[1e6**-2]])
+gains = dict(zip(("k1", "k2", "k3", "k4"), (f"{k:.3e}" for k in K[0]), strict=True))
+print(gains, "closed-loop poles:", np.round(np.abs(poles), 3))
+
+# %% [markdown]
+# ## Margins
+# The loop opened at the pressure, as it runs: sampled, summed and held. `loop_transfer` does the same for a law of the package; this law has a pressure that acts at once
+# until a scheme samples it, and then tolerates less.
+
+# %%
+law = ExtendedLQR(gains={name: Fraction(value) for name, value in gains.items()})
+opened = control.ss(A, B, K, 0, period)
+lower, phase = control.stability_margins(opened)[:2]
+at_once_lower, at_once_phase = control.stability_margins(qd.loop_transfer(fault, law))[:2]
+print(f"sampled: stable down to {lower:.3f} of the input gain, phase margin {phase:.0f} degrees")
+print(f"at once: stable down to {at_once_lower:.3f} of the input gain, phase margin {at_once_phase:.0f} degrees")
+control.bode_plot(opened, dB=True, Hz=True, title="Open loop, real fault")
+plt.gcf().set_size_inches(7, 5)
+plt.tight_layout()
+
+# %% [markdown]
+# Margins are about one linear plant at one slip. The friction of the fault weakens as it slips, its parameters are known within a box, and tides and neighbours push.
+
+# %% [markdown]
+# ## What is guaranteed
+# One call proves, in exact arithmetic, how far slip and slip rate of the loop as it runs can be from the reference, whatever the friction law, the parameters and the
+# disturbance inside the box; beside it stands the worst that a search for bad courses finds. From the command line: `quakedesign guarantee real-fault --gains …`.
+
+# %%
+found = answer(fault, gains=tuple(gains.values()))
+guarantee = found.found
+print(guarantee.sentence())
+print(f"worst found: {found.worst.slip_rate_error:.3g} m/s, {found.worst.slip_error:.3g} m")
+
+# %% [markdown]
+# ## The nonlinear loop as a diagram
+# Fault and law as systems of python-control: `interconnect` joins them, with the pressure acting at once as in the paper. The package's simulation samples and holds. Both
+# follow the reference; 200 s of it.
+
+# %%
+duration = 200.0
+time = np.linspace(0, duration, 801)
+stage = time / fault.reference.operation_time
+r = fault.reference.target_slip * fault.reference.shape(stage)
+r_rate = fault.reference.target_slip / fault.reference.operation_time * 30 * stage**2 * (1 - stage) ** 2
+loop = control.interconnect(
+    [qd.to_iosystem(fault), qd.to_iosystem(law)],
+    connections=[["elqr.slip", "real-fault.slip"], ["elqr.slip_rate", "real-fault.slip_rate"], ["real-fault.p", "elqr.p"]],
+    inplist=["elqr.r", "elqr.r_rate"],
+    outlist=["real-fault.slip", "elqr.p"],
+    outputs=["slip", "p"],
+)
+at_once = control.input_output_response(loop, time, [r, r_rate], solve_ivp_method="LSODA", solve_ivp_kwargs={"rtol": 1e-8, "atol": 1e-12})
+run = qd.simulate(fault, law, scheme="explicit", duration=duration)
+
+fig, (upper, below) = plt.subplots(2, sharex=True, figsize=(7, 5))
+upper.plot(time, 1e6 * (at_once.outputs[0] - r), label="python-control, pressure at once")
+upper.plot(run.time, 1e6 * run.slip_error, label=f"simulate, held over {1e3 * period:g} ms")
+upper.set_ylabel("slip error [µm]"), upper.set_xlim(0, 60), upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+below.plot(time, 1e-3 * at_once.outputs[1])
+below.plot(run.time, 1e-3 * run.pressure)
+below.set_ylabel("pressure [kPa]"), below.set_xlabel("time [s]")
+plt.show()
+
+# %% [markdown]
+# ## Uniform instants
+# `resample` gives a run at uniform instants, for spectra and filters. The pressure answers the disturbance of the fault at its frequency.
+
+# %%
+even = run.resample(0.25)
+later = even.time >= 50  # when the start is over
+spectrum = np.abs(np.fft.rfft((even.pressure[later] - even.pressure[later].mean()) * np.hanning(int(later.sum()))))
+angular = 2 * np.pi * np.fft.rfftfreq(int(later.sum()), 0.25)
+strongest = angular[spectrum.argmax()]
+plt.figure(figsize=(7, 3))
+plt.semilogy(angular, spectrum / spectrum.max())
+plt.axvline(fault.disturbance.frequency, color="k", linestyle=":", label="disturbance")
+plt.xlim(0, 4), plt.ylim(1e-6, 2), plt.xlabel("angular frequency [rad/s]"), plt.ylabel("pressure, relative to its peak [-]"), plt.legend()
+plt.show()
+print(f"strongest at {strongest:.2f} rad/s; the disturbance has {fault.disturbance.frequency} rad/s")
+
+# %% [markdown]
+# **The answer:** yes. Six lines of python-control give an LQR whose slip-rate error stays below 0.2 mm/s for every fault of the box, proved, where the uncontrolled
+# fault reaches an earthquake's slip rate; its margins alone would not have said so.
+
+# %%
+known, proved = found.worst.slip_rate_error, guarantee.claims.slip_rate_error
+assert str(guarantee.check()) == "proved" and known < proved < Fraction(2, 10**4)
+assert np.abs(poles).max() < 1 < np.abs(sampled.poles()).max() and lower < 1 and 20 < phase < at_once_phase
+assert np.abs(run.slip_error).max() < guarantee.claims.slip_error
+assert np.abs(at_once.outputs[0] - r).max() < guarantee.claims.slip_error
+assert abs(strongest - fault.disturbance.frequency) < 2 * (angular[1] - angular[0])
