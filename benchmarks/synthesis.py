@@ -16,7 +16,7 @@ from time import perf_counter
 import quakedesign as qd
 from quakedesign.synthesis.gains.improvements import improvements
 from quakedesign.synthesis.gains.objectives import OBJECTIVES
-from quakedesign.synthesis.gains.sampled_objective import sampling, synthesise_sampled
+from quakedesign.synthesis.gains.simulated_error import sampling, synthesise_sampled
 
 DEGREES = {
     ("cta", "norm"): (5, 6),

@@ -123,7 +123,7 @@ def _sampled(
 ) -> tuple["Synthesis | None", dict[str, Any]]:  # fmt: skip
     """Gains whose sampled run errs least, and how they were tried."""
     from quakedesign.fault import load_fault
-    from quakedesign.synthesis.gains.sampled_objective import sampling, synthesise_sampled
+    from quakedesign.synthesis.gains.simulated_error import sampling, synthesise_sampled
 
     if fault is None:
         raise ParameterError(

@@ -9,7 +9,7 @@ from rich.table import Table
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells
 from quakedesign.simulation import Study
-from quakedesign.simulation.sampling_study import QUANTITIES
+from quakedesign.simulation.sensitivity import QUANTITIES
 from quakedesign.studies.needed_pressure import pressure_extremes
 from quakedesign.studies.sampling import Row, SamplingReport
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         smallest_bound,
     )
     from quakedesign.loop.sensing.measurement import Measurement
+    from quakedesign.simulation.actuated_trajectory import SampledTrajectory
     from quakedesign.simulation.c_source import ControllerStep
     from quakedesign.simulation.earthquake import natural_earthquake
     from quakedesign.simulation.energy import EnergyBudget
@@ -42,8 +43,7 @@ if TYPE_CHECKING:
     from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
     from quakedesign.simulation.perturbation import perturbation
     from quakedesign.simulation.pressure_course import PressureCourse, pressure_course
-    from quakedesign.simulation.sampled_trajectory import SampledTrajectory
-    from quakedesign.simulation.sampling_study import Study, accuracy, gain_sensitivity, noise_sensitivity
+    from quakedesign.simulation.sensitivity import Study, accuracy, gain_sensitivity, noise_sensitivity
     from quakedesign.simulation.simulate import simulate
     from quakedesign.simulation.state_plants import SpringSlider
     from quakedesign.simulation.state_run import simulate_state, velocity_step

@@ -9,10 +9,10 @@ import casadi as ca
 from quakedesign.controllers import Controller
 from quakedesign.errors import SimulationError
 from quakedesign.fault import fault_toml
+from quakedesign.simulation.actuated_trajectory import SampledTrajectory
 from quakedesign.simulation.metrics import events, metrics
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.sampled_trajectory import SampledTrajectory
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.trajectory import Trajectory
 

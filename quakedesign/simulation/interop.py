@@ -12,7 +12,7 @@ from quakedesign.fault import Fault
 from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.loop.steps.control_step import control_step
-from quakedesign.loop.steps.sampled_law import Law
+from quakedesign.loop.steps.discrete_law import Law
 from quakedesign.simulation.closed_loop import ClosedLoop, acceleration_with_parameters, casadi_function
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_numpy

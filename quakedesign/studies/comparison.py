@@ -15,7 +15,7 @@ from quakedesign.simulation.step_stability import amplification
 from quakedesign.studies.on_trajectory import certified_bound
 from quakedesign.synthesis import Design, assess
 from quakedesign.synthesis import design as synthesise
-from quakedesign.synthesis.analysis.sampling_time import largest_sampling_time, on_trajectory
+from quakedesign.synthesis.analysis.lipschitz_on_run import largest_sampling_time, on_trajectory
 from quakedesign.synthesis.guaranteed import CLASSES, Answer, attacked
 from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
 from quakedesign.synthesis.linear.sampled.held import HeldLoop

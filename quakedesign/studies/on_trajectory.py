@@ -8,7 +8,7 @@ from quakedesign.certificates.premises import Premise, certified_lipschitz
 from quakedesign.controllers import Controller
 from quakedesign.simulation import Trajectory
 from quakedesign.synthesis import Design
-from quakedesign.synthesis.analysis.sampling_time import on_trajectory
+from quakedesign.synthesis.analysis.lipschitz_on_run import on_trajectory
 
 
 def certified_bound(design: Design | None) -> Fraction | None:

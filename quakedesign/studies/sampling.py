@@ -11,7 +11,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.simulation import Study, Trajectory, accuracy, gain_sensitivity, noise_sensitivity, simulate
-from quakedesign.simulation.sampling_study import SCHEMES
+from quakedesign.simulation.sensitivity import SCHEMES
 from quakedesign.studies.on_trajectory import certified_bound, trajectory_premise
 from quakedesign.synthesis import Design
 

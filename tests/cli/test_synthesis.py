@@ -62,11 +62,11 @@ def test_people_get_a_table(capsys):
 
 
 def test_the_smallest_sampled_error_on_a_fault(capsys, tmp_path, monkeypatch):
-    from quakedesign.synthesis.gains import sampled_objective as sampled_gains
+    from quakedesign.synthesis.gains import simulated_error
 
-    search = cache(partial(sampled_gains.synthesise_sampled, rounds=2))  # so that the second call is short
-    monkeypatch.setattr(sampled_gains, "synthesise", lambda *_, **__: None)
-    monkeypatch.setattr(sampled_gains, "synthesise_sampled", search)
+    search = cache(partial(simulated_error.synthesise_sampled, rounds=2))  # so that the second call is short
+    monkeypatch.setattr(simulated_error, "synthesise", lambda *_, **__: None)
+    monkeypatch.setattr(simulated_error, "synthesise_sampled", search)
     path = tmp_path / "gains.json"
     asked = ("cta", "real-fault", "--objective", "sampled", "--step", "92 ms", "--degree", "5")
     code, out, _ = run(capsys, *asked, "--out", str(path), "--json")

@@ -10,12 +10,12 @@ import sympy as sp
 from quakedesign.errors import ParameterError
 from quakedesign.loop.compensation import answered, followed
 from quakedesign.loop.schemes.base import Stepped
-from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.backward import backward_euler, inclusion
 from quakedesign.loop.steps.control_step import Decision, slope_of
+from quakedesign.loop.steps.discrete_law import Law, Values
 from quakedesign.loop.steps.inclusion import end_rate
 from quakedesign.loop.steps.sampled import Sampled
-from quakedesign.loop.steps.sampled_law import Law, Values
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,12 +78,12 @@ class Compensated(Sampled):
         """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
         begun, before, ahead_before, estimate, weight = own
         pull, feed_forward, slope = found
-        gain, rate_error = known[sampled_law.step] * known[sampled_law.authority], known[sampled_law.rate_error]
-        pushed = known[sampled_law.held] - ahead_before
+        gain, rate_error = known[discrete_law.step] * known[discrete_law.authority], known[discrete_law.rate_error]
+        pushed = known[discrete_law.held] - ahead_before
         follows = begun > 0 if pull != 0 else False
         estimate = ca.if_else(follows, followed(rate_error, before, pushed, estimate, weight, gain), 0)
         solved = inclusion(pull).solve(known)
-        ahead, share = sampled_law.values((feed_forward, slope), solved)
+        ahead, share = discrete_law.values((feed_forward, slope), solved)
         pressure = answered(rate_error, solved[end_rate], estimate, gain) + ahead
         after = [ca.SX(0) if slope == 0 else -estimate / share for _ in law.integrals]
         return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight])

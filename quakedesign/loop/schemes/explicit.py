@@ -5,10 +5,10 @@ from typing import Any, ClassVar
 
 import sympy as sp
 
-from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.control_step import Decision
+from quakedesign.loop.steps.discrete_law import Law, Values
 from quakedesign.loop.steps.sampled import Sampled
-from quakedesign.loop.steps.sampled_law import Law, Values
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +28,6 @@ class Explicit(Sampled):
     @classmethod
     def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`."""
-        pressure, *rates = sampled_law.values(found, known)
-        after = [known[s] + known[sampled_law.step] * rate for s, rate in zip(law.integrals, rates, strict=True)]
+        pressure, *rates = discrete_law.values(found, known)
+        after = [known[s] + known[discrete_law.step] * rate for s, rate in zip(law.integrals, rates, strict=True)]
         return Decision(pressure, after, [])

@@ -5,12 +5,12 @@ from typing import Any, ClassVar
 
 import sympy as sp
 
-from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.backward import backward_euler, inclusion
 from quakedesign.loop.steps.control_step import Decision
+from quakedesign.loop.steps.discrete_law import Law, Values
 from quakedesign.loop.steps.inclusion import end_rate
 from quakedesign.loop.steps.sampled import Sampled
-from quakedesign.loop.steps.sampled_law import Law, Values
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class Implicit(Sampled):
         pull, feed_forward, *ends = found
         problem = inclusion(pull)
         solved = problem.solve(known)
-        gain = solved[sampled_law.step] * solved[sampled_law.authority]
-        pressure = (solved[end_rate] - solved[sampled_law.rate_error]) / gain
-        ahead, *after = sampled_law.values((feed_forward, *map(problem.selected, ends)), solved)
+        gain = solved[discrete_law.step] * solved[discrete_law.authority]
+        pressure = (solved[end_rate] - solved[discrete_law.rate_error]) / gain
+        ahead, *after = discrete_law.values((feed_forward, *map(problem.selected, ends)), solved)
         return Decision(pressure + ahead, after, [])

@@ -6,12 +6,12 @@ from typing import ClassVar
 import sympy as sp
 
 from quakedesign.loop.schemes.implicit import Implicit
-from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.backward import backward_euler
-from quakedesign.loop.steps.sampled_law import Law
+from quakedesign.loop.steps.discrete_law import Law
 from quakedesign.symbolic import AbsolutePower, SignedPower
 
-_START = {symbol: sp.Dummy(symbol.name, real=True) for symbol in (sampled_law.slip_error, sampled_law.rate_error)}
+_START = {symbol: sp.Dummy(symbol.name, real=True) for symbol in (discrete_law.slip_error, discrete_law.rate_error)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,20 +8,20 @@ from typing import Any, ClassVar
 import casadi as ca
 import sympy as sp
 
-from quakedesign.loop.steps import sampled_law
-from quakedesign.loop.steps.sampled_law import Law, Lifted, Values
+from quakedesign.loop.steps import discrete_law
+from quakedesign.loop.steps.discrete_law import Law, Lifted, Values
 
 SIGNALS = (
-    sampled_law.slip,
-    sampled_law.rate,
-    sampled_law.slip_error,
-    sampled_law.rate_error,
-    sampled_law.acceleration,
-    sampled_law.next_reference,
-    sampled_law.next_reference_rate,
-    sampled_law.step,
-    sampled_law.authority,
-    sampled_law.held,
+    discrete_law.slip,
+    discrete_law.rate,
+    discrete_law.slip_error,
+    discrete_law.rate_error,
+    discrete_law.acceleration,
+    discrete_law.next_reference,
+    discrete_law.next_reference_rate,
+    discrete_law.step,
+    discrete_law.authority,
+    discrete_law.held,
 )
 
 
@@ -95,7 +95,7 @@ def control_step(kind: type[Decided], law: Law) -> ControlStep:
     split = len(lifted.expressions) - len(slopes)
     decision = kind.decide(lifted.expressions[:split], law, known, ca.vertsplit(own) if kind.own_size else [])
     changes = (after - known[s] for s, after in zip(law.integrals, decision.integrals, strict=True))
-    slope = sampled_law.values(lifted.expressions[split:], known)
+    slope = discrete_law.values(lifted.expressions[split:], known)
     push = sum((k * change for k, change in zip(slope, changes, strict=True)), start=ca.SX(0))
     results = [decision.pressure, _column(decision.integrals), _column(decision.own), push]
     names = ["pressure", "integrals", "own", "push"]

@@ -11,9 +11,9 @@ from quakedesign.loop.actuators.base import FLOWS
 from quakedesign.loop.schemes.base import Scheme, Stepped
 from quakedesign.loop.sensing.base import Sensor
 from quakedesign.loop.sensing.measurement import EXACT
-from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.control_step import SIGNALS, ControlStep, Decided, control_step
-from quakedesign.loop.steps.sampled_law import Law, Values
+from quakedesign.loop.steps.discrete_law import Law, Values
 
 MOST_SUBSTEPS = 100
 
@@ -157,7 +157,7 @@ class Sampled(Scheme, Decided):
         part = {name: [next(entries) for _ in values] for name, values in self._parts(loop).items()}
         seen, noise = self.measurement.measure(part["deviation"], part["noise"], state[:2])
         known = self._known(loop, counter, step, seen)
-        known |= {sampled_law.authority: part["authority"][0], sampled_law.held: part["held"][0]}
+        known |= {discrete_law.authority: part["authority"][0], discrete_law.held: part["held"][0]}
         signals = ca.vertcat(*(known[symbol] for symbol in SIGNALS))
         before = state[2 : 2 + count]
         given = signals, before, ca.vertcat(*part["law"]), ca.vertcat(*part["own"])
@@ -174,12 +174,12 @@ class Sampled(Scheme, Decided):
         """Values of the signals of one sample."""
         now, later = loop.reference(counter * step), loop.reference((counter + 1) * step)
         return {
-            sampled_law.slip: seen[0],
-            sampled_law.rate: seen[1],
-            sampled_law.slip_error: seen[0] - now[0],
-            sampled_law.rate_error: seen[1] - now[1],
-            sampled_law.acceleration: now[2],
-            sampled_law.next_reference: later[0],
-            sampled_law.next_reference_rate: later[1],
-            sampled_law.step: ca.SX(step),
+            discrete_law.slip: seen[0],
+            discrete_law.rate: seen[1],
+            discrete_law.slip_error: seen[0] - now[0],
+            discrete_law.rate_error: seen[1] - now[1],
+            discrete_law.acceleration: now[2],
+            discrete_law.next_reference: later[0],
+            discrete_law.next_reference_rate: later[1],
+            discrete_law.step: ca.SX(step),
         }

@@ -9,9 +9,9 @@ from quakedesign.controllers import Controller
 from quakedesign.errors import UnsupportedError
 from quakedesign.loop import Power
 from quakedesign.loop.schemes.compensated import Compensated
-from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps import discrete_law
+from quakedesign.loop.steps.discrete_law import Law
 from quakedesign.loop.steps.inclusion import end_rate, end_slip
-from quakedesign.loop.steps.sampled_law import Law
 from quakedesign.rationals import fraction_of, to_sympy
 from quakedesign.symbolic import SignedPower
 
@@ -37,7 +37,7 @@ def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -
     pull, feed_forward, _ = _derived(Law.of(controller, 0.0))
     if feed_forward != 0:
         raise UnsupportedError("a law with a feed-forward has no guarantee in an implicit step. Use feedforward none.")
-    numbers = {sampled_law.step: to_sympy(step), sampled_law.authority: to_sympy(authority)}
+    numbers = {discrete_law.step: to_sympy(step), discrete_law.authority: to_sympy(authority)}
     return _terms(-pull.subs(numbers))
 
 

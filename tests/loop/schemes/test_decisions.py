@@ -13,9 +13,9 @@ from quakedesign.fault import load_fault
 from quakedesign.loop.schemes import own_way, schemes, simulation_scheme
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.explicit import Explicit
-from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps import discrete_law
+from quakedesign.loop.steps.discrete_law import Law, acceleration, authority, held, rate_error, slip_error, step
 from quakedesign.loop.steps.inclusion import end_rate, end_slip
-from quakedesign.loop.steps.sampled_law import Law, acceleration, authority, held, rate_error, slip_error, step
 
 ONE, TWO = sp.symbols("xi_1 xi_2", real=True)
 LAW = Law(-2 * slip_error - 3 * rate_error - 5 * ONE, (slip_error + 4 * ONE,), (ONE,))
@@ -147,4 +147,4 @@ def test_a_law_of_samples_runs_as_it_was_designed(scheme, period, received):
 
 
 def test_values_are_those_of_the_expressions():
-    assert numbers(sampled_law.values((slip_error * rate_error, sp.Integer(2)), known())) == [3, 2]
+    assert numbers(discrete_law.values((slip_error * rate_error, sp.Integer(2)), known())) == [3, 2]

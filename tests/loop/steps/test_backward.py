@@ -2,10 +2,10 @@
 
 import sympy as sp
 
-from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.backward import backward_euler, inclusion
+from quakedesign.loop.steps.discrete_law import Law, authority, rate_error, slip_error, step
 from quakedesign.loop.steps.inclusion import end_rate, end_slip
-from quakedesign.loop.steps.sampled_law import Law, authority, rate_error, slip_error, step
 
 ONE, TWO = sp.symbols("xi_1 xi_2", real=True)
 ERRORS = -2 * slip_error - 3 * rate_error
@@ -35,12 +35,12 @@ def test_states_are_replaced_at_once_whatever_they_are_called():
 
 
 def test_slip_and_rate_are_taken_at_the_end_where_the_pressure_never_rises_with_them():
-    falls = Law(ERRORS - 4 * sampled_law.slip - sampled_law.rate, (), ())
-    ahead = -4 * sampled_law.next_reference - sampled_law.next_reference_rate
+    falls = Law(ERRORS - 4 * discrete_law.slip - discrete_law.rate, (), ())
+    ahead = -4 * discrete_law.next_reference - discrete_law.next_reference_rate
     assert same(backward_euler(falls), (step * authority * (-6 * end_slip - 4 * end_rate), ahead))
-    rises = Law(ERRORS + 4 * sampled_law.slip, (), ())
+    rises = Law(ERRORS + 4 * discrete_law.slip, (), ())
     pull = step * authority * (-2 * end_slip - 3 * end_rate)
-    assert same(backward_euler(rises), (pull, 4 * sampled_law.slip))
+    assert same(backward_euler(rises), (pull, 4 * discrete_law.slip))
     flat = Law(sp.Integer(6), (), ())
     assert same(backward_euler(flat), (0, 6))
 

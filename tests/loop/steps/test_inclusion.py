@@ -10,10 +10,10 @@ import sympy as sp
 
 from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
-from quakedesign.loop.steps import sampled_law
+from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.backward import backward_euler, inclusion
+from quakedesign.loop.steps.discrete_law import Law
 from quakedesign.loop.steps.inclusion import direction, end_rate, end_slip
-from quakedesign.loop.steps.sampled_law import Law
 from quakedesign.symbolic import SignedPower
 
 STEP = 0.184
@@ -78,11 +78,11 @@ def step_function(name, scale):
     pull, feed_forward, end = backward_euler(law)
     assert feed_forward == 0
     e1, e2, xi = ca.SX.sym("e1"), ca.SX.sym("e2"), ca.SX.sym("xi")
-    known = {sampled_law.slip_error: e1, sampled_law.rate_error: e2, law.integrals[0]: xi}
-    known |= {sampled_law.step: ca.SX(STEP), sampled_law.authority: ca.SX(1)}
+    known = {discrete_law.slip_error: e1, discrete_law.rate_error: e2, law.integrals[0]: xi}
+    known |= {discrete_law.step: ca.SX(STEP), discrete_law.authority: ca.SX(1)}
     problem = inclusion(pull)
     solved = problem.solve(known)
-    after = sampled_law.values((problem.selected(end),), solved)[0]
+    after = discrete_law.values((problem.selected(end),), solved)[0]
     return ca.Function("step", [e1, e2, xi], [(solved[end_rate] - e2) / STEP, after])
 
 

@@ -7,7 +7,7 @@ import pytest
 from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import load_fault
-from quakedesign.simulation.sampling_study import accuracy, gain_sensitivity, noise_sensitivity
+from quakedesign.simulation.sensitivity import accuracy, gain_sensitivity, noise_sensitivity
 
 REAL = load_fault("real-fault")
 LAW = control_law("cta").from_values(("7", "5", "2.3", "1.1"), scale="1/4000", divisor="2353/125000000000")

@@ -7,7 +7,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.errors import ParameterError, UnknownNameError
-from quakedesign.synthesis.gains.sampled_objective import sampling, synthesise_sampled
+from quakedesign.synthesis.gains.simulated_error import sampling, synthesise_sampled
 
 
 @pytest.fixture(scope="module")
@@ -48,10 +48,10 @@ def test_what_is_given_takes_the_place_of_what_the_fault_needs(fault):
 
 
 def test_gains_from_the_literature_are_returned_where_nothing_is_better(fault, monkeypatch):
-    from quakedesign.synthesis.gains import sampled_objective as sampled_gains
+    from quakedesign.synthesis.gains import simulated_error
 
-    monkeypatch.setattr(sampled_gains, "synthesise", lambda *_, **__: None)
-    monkeypatch.setattr(sampled_gains, "_tried", lambda *_: {})
+    monkeypatch.setattr(simulated_error, "synthesise", lambda *_, **__: None)
+    monkeypatch.setattr(simulated_error, "_tried", lambda *_: {})
     trial = sampling(fault, duration=400 * fault.sampling_time)
     kept = synthesise_sampled(trial, degrees=(5,))
     assert tuple(kept.gains.values()) in {tuple(c.gains.values()) for c in kept.compared}

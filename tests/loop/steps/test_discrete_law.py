@@ -6,8 +6,8 @@ import pytest
 import sympy as sp
 
 from quakedesign.controllers import Signals
-from quakedesign.loop.steps import sampled_law
-from quakedesign.loop.steps.sampled_law import Law, Lifted, rate_error, slip_error
+from quakedesign.loop.steps import discrete_law
+from quakedesign.loop.steps.discrete_law import Law, Lifted, rate_error, slip_error
 from quakedesign.symbolic import SignedPower
 
 ONE = sp.Symbol("xi_1", real=True)
@@ -20,12 +20,12 @@ class Told:
 
     def pressure(self, told):
         assert told == Signals(
-            slip=sampled_law.slip,
-            slip_rate=sampled_law.rate,
+            slip=discrete_law.slip,
+            slip_rate=discrete_law.rate,
             slip_error=slip_error,
             slip_rate_error=rate_error,
             integrals=(ONE,),
-            reference_acceleration=sampled_law.acceleration,
+            reference_acceleration=discrete_law.acceleration,
         )
         return (
             2 * told.slip_error + 3 * told.slip_rate_error + 5 * ONE + 7 * told.slip + 11 * told.reference_acceleration
@@ -38,7 +38,7 @@ class Told:
 def test_a_law_is_told_the_signals_of_a_sample():
     law = Law.of(Told(), 0.0)
     assert (law.rates, law.integrals) == ((slip_error,), (ONE,))
-    assert law.feed_forward == 7 * sampled_law.slip + 11 * sampled_law.acceleration
+    assert law.feed_forward == 7 * discrete_law.slip + 11 * discrete_law.acceleration
     assert Law.of(None, 5.5) == Law(sp.Float(5.5), (), ())
 
 
