@@ -69,16 +69,16 @@ class Bound(Fraction):
         ValueError
             For any other.
         """
-        found = _SPEC.fullmatch(spec)
-        if found is None:
+        match = _SPEC.fullmatch(spec)
+        if match is None:
             raise ValueError(f"a format of a bound must be one of e, f, g or %, as '.3g'. Received {spec!r}.")
-        digits = int(found["digits"]) if found["digits"] else 6
-        kind = found["kind"].lower() or "g"
+        digits = int(match["digits"]) if match["digits"] else 6
+        kind = match["kind"].lower() or "g"
         text = {"e": self._scientific, "f": self._fixed, "g": self._general, "%": self._percent}[kind](digits)
-        sign = "-" if text.startswith("-") else found["sign"].replace("-", "")
+        sign = "-" if text.startswith("-") else match["sign"].replace("-", "")
         text = sign + text.removeprefix("-")
-        text = text.upper() if found["kind"].isupper() else text
-        return format(text, f"{found['align'] or '>'}{found['width']}")
+        text = text.upper() if match["kind"].isupper() else text
+        return format(text, f"{match['align'] or '>'}{match['width']}")
 
     def _significant(self, digits: int) -> tuple[Decimal, int]:
         """Outer decimal of so many digits, and the power of ten of its first."""

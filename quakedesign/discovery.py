@@ -28,14 +28,14 @@ def discovered(package: str, kind: type, shared: Collection[str] | None = None) 
     ImportError
         For another module that defines none, so that a file does not go unheard.
     """
-    found: dict[str, Any] = {}
+    kinds: dict[str, Any] = {}
     for info in iter_modules(import_module(package).__path__):
         module = import_module(f"{package}.{info.name}")
         own = [item for item in vars(module).values() if isinstance(item, type) and issubclass(item, kind)]
         if shared is not None and info.name not in shared and all(i.__module__ != module.__name__ for i in own):
             raise ImportError(f"{module.__name__} defines no {kind.__name__}")
-        found |= {item.name: item for item in own if hasattr(item, "name") and not isabstract(item)}
-    return found
+        kinds |= {item.name: item for item in own if hasattr(item, "name") and not isabstract(item)}
+    return kinds
 
 
 def named(name: str, known: Mapping[str, type[Kind]], kind: type, what: str) -> type[Kind]:

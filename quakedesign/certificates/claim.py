@@ -209,11 +209,11 @@ def sympy_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:
 def full_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:
     """Vector field of a loop with every nested power written out."""
     symbols = loop.symbols
-    found = sympy_field(loop)
+    field = sympy_field(loop)
     for lift, terms in reversed(list(loop.lifts.items())):
         argument = from_terms(terms, symbols)
-        found = {state: rate.subs(symbols[lift], argument) for state, rate in found.items()}
-    return found
+        field = {state: rate.subs(symbols[lift], argument) for state, rate in field.items()}
+    return field
 
 
 def error_units(loop: Loop, model: LoopField | None = None) -> dict[str, Range]:
@@ -235,13 +235,13 @@ def unit_ranges(loop: Loop, units: Mapping[str, sp.Expr]) -> dict[str, Range]:
         For a unit that is not positive.
     """
     values = {**{n: (v, v) for n, v in loop.parameters.items()}, **{n: ends for n, (_, ends) in loop.roots.items()}}
-    found: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))
+    ranges: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))
     for state, unit in units.items():
         ball = enclose(unit, {s: values[str(s)] for s in unit.free_symbols})
         low, high = (fraction_of(end.fmpq()) for end in (ball.lower(), ball.upper()))
         require(low > 0, f"the unit of {state} must be positive. Received {unit}.")
-        found[state] = (low, high)
-    return found
+        ranges[state] = (low, high)
+    return ranges
 
 
 def require(condition: bool, reason: str) -> None:

@@ -149,7 +149,7 @@ def _witness(raw: dict[str, Any], loop: Loop) -> Witness:
 
 
 def _squares(raw: Any, variables: int, loop: Loop, condition: tuple[int, ...]) -> list[Square]:
-    found = []
+    squares = []
     for entry in listed(raw, "squares", 1 << variables):
         square = with_keys(entry, {"times", "basis", "gram"})
         times = read_exponents(square["times"], variables, 1 if loop.domain == "cells" else 0)
@@ -158,14 +158,14 @@ def _squares(raw: Any, variables: int, loop: Loop, condition: tuple[int, ...]) -
         basis = tuple(read_exponents(b, variables, 999) for b in listed(square["basis"], "basis", LIMITS["basis"]))
         size = len(basis)
         need(0 < size == len(set(basis)), "a basis must be a list of different exponents")
-        found.append(
+        squares.append(
             Square(
                 product=(*(i for i, x in enumerate(times) if x), *condition),
                 basis=basis,
                 gram=tuple(listed(gram, "gram", length=size * (size + 1) // 2)),
             )
         )
-    return found
+    return squares
 
 
 def _equilibrium(raw: Any) -> Equilibrium:

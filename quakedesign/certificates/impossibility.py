@@ -120,14 +120,14 @@ def smallest_peak(task: Task, step: Fraction, delay: Fraction = _ZERO) -> Smalle
     """
     _require(step > 0 and delay >= 0, "a step above 0 and a delay of at least 0", step, delay)
     with ctx.workprec(_BITS):
-        found = [
+        peaks = [
             SmallestPeak(
                 slip_rate_error=LowerBound(_surprise(plant, step, delay, task.amplitude)),
                 slip_error=None if plant.reach is None else UpperBound(plant.reach),
             )
             for plant in _surprised(task)
         ]
-    best = max(found, key=lambda one: one.slip_rate_error)
+    best = max(peaks, key=lambda one: one.slip_rate_error)
     return best if best.slip_rate_error > 0 else None
 
 
@@ -165,17 +165,17 @@ def smallest_withdrawal(task: Task, step: Fraction) -> LowerBound | None:
     """P [Pa] below which no controller holds the fault with samples T apart; None where none is proved."""
     _require(step >= 0, "a step of at least 0", step)
     with ctx.workprec(_BITS):
-        found = [
+        withdrawals = [
             _lower(_ball(task.amplitude / plant.authority) * (plant.pole * _ball(step)).exp())
             for plant in _pushed(task)
         ]
-    return LowerBound(max(found)) if found else None
+    return LowerBound(max(withdrawals)) if withdrawals else None
 
 
 def _least(task: Task, value: Callable[[_Pushed], Any]) -> UpperBound | None:
     with ctx.workprec(_BITS):
-        found = [_upper(value(plant)) for plant in _pushed(task)]
-    return UpperBound(min(found)) if found else None
+        bounds = [_upper(value(plant)) for plant in _pushed(task)]
+    return UpperBound(min(bounds)) if bounds else None
 
 
 def _corners(task: Task) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
@@ -186,11 +186,11 @@ def _corners(task: Task) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
 
 def _pushed(task: Task) -> list[_Pushed]:
     law = task.friction
-    found = [
+    plants = [
         _Pushed(area * law.weakening * task.normal_stress - kappa, w, area * law.static)
         for kappa, w, area in _corners(task)
     ]
-    return [plant for plant in found if plant.slip > 0 and law.static > law.least and task.amplitude]
+    return [plant for plant in plants if plant.slip > 0 and law.static > law.least and task.amplitude]
 
 
 def _surprised(task: Task) -> Iterator[_Surprised]:

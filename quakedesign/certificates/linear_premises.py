@@ -144,10 +144,10 @@ def rest_pressure(
     step, ends = (slip[1] - slip[0]) / pieces, list[Fraction]()
     for n in range(pieces if step else 1):
         part = (slip[0] + n * step, slip[0] + (n + 1) * step)
-        found = enclose(expression, box | {_r: part, _mu: _friction_at(fault, part)})
-        if not found.is_finite():
+        pressures = enclose(expression, box | {_r: part, _mu: _friction_at(fault, part)})
+        if not pressures.is_finite():
             raise ParameterError("no finite pressure at rest was found. Positive friction is expected. Narrow the box.")
-        ends += [_end(found.lower()), _end(found.upper())]
+        ends += [_end(pressures.lower()), _end(pressures.upper())]
     return min(ends), max(ends)
 
 

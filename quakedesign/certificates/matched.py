@@ -34,8 +34,8 @@ class Errors:
 
 def friction_range(fault: Fault) -> Range:
     """μ_res and μ_max [-], exact, confirmed by enclosure of the law."""
-    found = friction_bounds(fault.friction)
-    return found.least, found.most
+    bounds = friction_bounds(fault.friction)
+    return bounds.least, bounds.most
 
 
 def plant_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
@@ -87,7 +87,7 @@ def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedFo
     force = sp.Function("f_v", real=True)(plant.e1, plant.e2)
     h = _insert(plant.error_dynamics().h, value, force)
     added = feedforward.acceleration(plant.e1, plant.e2, sp.Integer(0))
-    found = []
+    expressions = []
     slopes = ((plant.e1, plant.slip_slope, plant.phi_1), (plant.e2, plant.rate_slope, plant.phi_2))
     for error, slope, growth in slopes:
         bent = h.diff(error).subs({value.diff(error): slope, force.diff(error): growth})
@@ -97,8 +97,8 @@ def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedFo
         # apart, so that N̂ cancels where it can and occurs once elsewhere
         stressed = sp.simplify(part.coeff(plant.sigma)) * plant.sigma
         part = stressed + sp.factor(part.coeff(plant.sigma, 0))
-        found.append(_with_known(slope * part + straight, fault, divisor))
-    return found[0], found[1]
+        expressions.append(_with_known(slope * part + straight, fault, divisor))
+    return expressions[0], expressions[1]
 
 
 def _insert(h: sp.Expr, value: sp.Expr, force: sp.Expr) -> sp.Expr:

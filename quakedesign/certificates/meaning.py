@@ -27,9 +27,9 @@ def require_degree_of_slip(loop: Loop) -> None:
     """
     first, *_ = loop.states
     control = loop.symbols.get(_CONTROL, sp.Dummy())
-    found = relative_degree(loop.symbols[first], sympy_field(loop), control)
-    if found != slip_degree():
+    degree = relative_degree(loop.symbols[first], sympy_field(loop), control)
+    if degree != slip_degree():
         raise CertificateError(
-            f"{loop.law} acts on derivative {found} of its first state, the pressure on derivative {slip_degree()} of "
+            f"{loop.law} acts on derivative {degree} of its first state, the pressure on derivative {slip_degree()} of "
             "the slip: the certificate is about another plant than a fault"
         )

@@ -329,7 +329,7 @@ def with_decay(obligations: Obligations, cell: Cell, one: Obligation, rate: Frac
 
 def less(polynomial: Polynomial, factor: Fraction, other: Polynomial) -> dict[Exponents, Fraction]:
     """Polynomial − factor · other, without zero coefficients."""
-    found = dict(polynomial)
+    difference = dict(polynomial)
     for e, c in other.items():
-        found[e] = found.get(e, Fraction(0)) - factor * c
-    return {e: c for e, c in found.items() if c}
+        difference[e] = difference.get(e, Fraction(0)) - factor * c
+    return {e: c for e, c in difference.items() if c}

@@ -99,8 +99,8 @@ class _Cells:
         """∂V/∂e2."""
         symbols = self.loop.symbols
         second = symbols[list(self.loop.states)[_PUSHED]]
-        found = lie_derivative(from_terms(self.lyapunov, symbols), {second: sp.Integer(1)})
-        return to_terms(found, [symbols[s] for s in self.loop.states])
+        derivative = lie_derivative(from_terms(self.lyapunov, symbols), {second: sp.Integer(1)})
+        return to_terms(derivative, [symbols[s] for s in self.loop.states])
 
     def push(self, slope: tuple[Term, ...], index: int, signs: dict[str, int], beta: Fraction) -> Form:
         """β·∂V/∂e2·|e_i| on a cell, e_i at most a unit times the state; e2 is a unit times its state, too."""
@@ -139,16 +139,16 @@ def robustness(certificate: Certificate, model: LoopField | None = None) -> Robu
     except (CertificateError, KinkError):
         return None
     try:
-        found = [largest_ratio(_against_decrease(cells, slope, index)) for index in (0, _PUSHED)]
+        ratios = [largest_ratio(_against_decrease(cells, slope, index)) for index in (0, _PUSHED)]
         source = "bisection of the cells"
     except (CertificateError, KinkError):
         kappa = _claimed(certificate)
         if kappa is None:
             return None
         largest = [largest_ratio(_against_function(cells, slope, index)) for index in (0, _PUSHED)]
-        found = [None if v is None else v / kappa for v in largest]
+        ratios = [None if v is None else v / kappa for v in largest]
         source = "claimed decay"
-    slip, rate = found
+    slip, rate = ratios
     if slip is None or rate is None:
         return None
     return Robustness(slip=slip, rate=rate, slip_power=cells.power(0), rate_power=cells.power(_PUSHED), source=source)
@@ -187,15 +187,15 @@ def decay(certificate: Certificate) -> Decay:
         return Decay(rate=claimed, source="claimed")
     cells = _Cells(certificate)
     powers = (Fraction(cells.fallen, cells.m), Fraction(-1))
-    found = largest_ratio(
+    ratio = largest_ratio(
         [
             ((function, decrease), powers)
             for signs, function in cells.functions()
             for _, decrease in cells.decreases(signs)
         ]
     )
-    if found is not None:
-        return Decay(rate=1 / found, source="bisection of the cells")
+    if ratio is not None:
+        return Decay(rate=1 / ratio, source="bisection of the cells")
     return Decay(rate=decay_by_norms(certificate), source="chain of norms")
 
 

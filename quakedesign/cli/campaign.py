@@ -81,13 +81,13 @@ def campaign(
 
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
-    found = load_fault(fault, box=box)
-    chosen = law.choose(found)
+    loaded = load_fault(fault, box=box)
+    chosen = law.choose(loaded)
     controller = chosen.controller if chosen else None
     way, step, own = own_way(controller, scheme, run.step)
-    period = found.sampling_time if step is None else step
+    period = loaded.sampling_time if step is None else step
     problem = campaign_problem(
-        found,
+        loaded,
         controller,
         scheme=sampled_scheme(way, run.substeps, actuator.build(period), sensors.build(period), **own),
         step=step,
@@ -99,7 +99,7 @@ def campaign(
         initial_slip_rate=initial_rate,
         seed=seed,
     )
-    folder = out or Path(f"quakedesign-{found.name}-campaign")
+    folder = out or Path(f"quakedesign-{loaded.name}-campaign")
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
     remedy(f"the same command goes on from {folder}")
     with progress() as tell:

@@ -58,16 +58,16 @@ def identify(
     around = load_fault(fault)
     record = read_record(data, normal_stress=normal_stress)
     spring = None if stiffness is None else in_unit(stiffness, record.stiffness_unit, "stiffness")
-    found = fitted(record, law, stiffness=spring, seed=seed)
-    written = [path for path in (figure, out if found.identified else None) if path is not None]
+    identification = fitted(record, law, stiffness=spring, seed=seed)
+    written = [path for path in (figure, out if identification.identified else None) if path is not None]
     if figure is not None:
-        save_figure(found, figure)
-    if out is not None and found.identified:
-        save_fault(found, around, out)
+        save_figure(identification, figure)
+    if out is not None and identification.identified:
+        save_fault(identification, around, out)
     told = [f"written: {', '.join(map(str, written))}"] if written else []
-    if out is not None and not found.identified:
+    if out is not None and not identification.identified:
         told.append(f"not written: {out}, which needs every parameter")
-    places = {"figure": figure, "file": out if found.identified else None}
-    facts = found.to_dict() | {name: None if path is None else str(path) for name, path in places.items()}
-    output.show(facts, [*identification_lines(found), *told])
-    return 0 if found.identified else 1
+    places = {"figure": figure, "file": out if identification.identified else None}
+    facts = identification.to_dict() | {name: None if path is None else str(path) for name, path in places.items()}
+    output.show(facts, [*identification_lines(identification), *told])
+    return 0 if identification.identified else 1

@@ -34,7 +34,7 @@ def limits(
     """
     from quakedesign.fault import load_fault
 
-    found = load_fault(fault, box=box)
+    loaded = load_fault(fault, box=box)
     if out is not None:
         from quakedesign.report.folder import prepare
 
@@ -42,7 +42,7 @@ def limits(
     from quakedesign.report.limits import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits
 
-    answer = all_limits(found, pressure=pressure, diffusivity=diffusivity)
+    answer = all_limits(loaded, pressure=pressure, diffusivity=diffusivity)
     if out is not None:
         write_limits(answer, out)
     written = [] if out is None else [f"written: {out}/ (limits.png, results.json)"]

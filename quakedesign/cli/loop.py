@@ -74,18 +74,18 @@ def simulate(
     from quakedesign.studies.single import run_single
 
     new_file(out, "output file", force=force)
-    found = load_fault(fault)
-    if found.friction.state_names:
-        return show_state_run(found, simulate, options)
-    require_no_state_options(state, found)
-    chosen, load = law.choose(found), run.load()
+    loaded = load_fault(fault)
+    if loaded.friction.state_names:
+        return show_state_run(loaded, simulate, options)
+    require_no_state_options(state, loaded)
+    chosen, load = law.choose(loaded), run.load()
     way, step, _ = own_way(chosen.controller if chosen else None, scheme, run.step, "continuous")
-    period = found.sampling_time if step is None else step
+    period = loaded.sampling_time if step is None else step
     chain, told = actuator.build(period), sensors.build(period, seed)
     with progress() as tell:
         tell("compiling", 0.0)
         trajectory, premises = run_single(
-            found,
+            loaded,
             chosen,
             tell=lambda done: tell("simulation", done),
             duration=run.duration,
@@ -102,9 +102,9 @@ def simulate(
     if out is not None:
         trajectory.save(out)
     if output.json:
-        print_json(_answer(trajectory, found, premises))
+        print_json(_answer(trajectory, loaded, premises))
     else:
-        _print_run(trajectory, found, premises)
+        _print_run(trajectory, loaded, premises)
     return 0
 
 
@@ -179,17 +179,17 @@ def sampling(
     from quakedesign.studies.single import CONTINUOUS, DESIGNED, chosen_controller
     from quakedesign.synthesis import design
 
-    found = load_fault(fault)
-    folder = out or Path(f"quakedesign-{found.name}-sampling")
+    loaded = load_fault(fault)
+    folder = out or Path(f"quakedesign-{loaded.name}-sampling")
     prepare(folder, force=force)
     with progress() as tell:
         tell("gains", 0.0)
         law = (
-            design(found, controller, continuous=True)
+            design(loaded, controller, continuous=True)
             if gains in (DESIGNED, CONTINUOUS)
-            else chosen_controller(found, controller, gains)
+            else chosen_controller(loaded, controller, gains)
         )
-        report = sampling_report(found, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
+        report = sampling_report(loaded, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
         results = write_sampling(report, folder)
 
     def told() -> None:
@@ -231,13 +231,13 @@ def export(
     from quakedesign.report.exporting import export_lines
     from quakedesign.studies.exporting import export_answer
 
-    found = load_fault(fault)
-    chosen = law.choose(found)
+    loaded = load_fault(fault)
+    chosen = law.choose(loaded)
     if chosen is None:
         raise ParameterError("export needs a controller. Received none. Give --controller.")
-    folder = out or Path(f"quakedesign-{found.name}-{chosen.controller.name}")
+    folder = out or Path(f"quakedesign-{loaded.name}-{chosen.controller.name}")
     answer = export_answer(
-        found,
+        loaded,
         chosen.controller,
         folder,
         step=step,

@@ -14,14 +14,14 @@ def fault(fault: FaultName, /, *, box: Box = None, output: Output = PLAIN) -> in
     from quakedesign.fault import load_fault
     from quakedesign.studies.facts import fault_dict, fault_sentences
 
-    found = load_fault(fault, box=box)
+    loaded = load_fault(fault, box=box)
     if output.json:
-        print_json(fault_dict(found))
+        print_json(fault_dict(loaded))
         return 0
     screen = console()
-    screen.print(found.name, style="bold", end=" ")
-    screen.print(f"({found.source})")
-    for line in fault_sentences(found):
+    screen.print(loaded.name, style="bold", end=" ")
+    screen.print(f"({loaded.source})")
+    for line in fault_sentences(loaded):
         screen.print(f"  {line}")
     return 0
 
@@ -109,12 +109,12 @@ def errata(*rows: int, output: Output = PLAIN) -> int:
     from quakedesign.studies.errata import errata_rows, run_rows
 
     numbers = list(rows) or [row.number for row in errata_rows()]
-    found = []
+    checked = []
     with progress() as tell:
         for i, number in enumerate(numbers):
             tell(f"row {number}", i / len(numbers))
-            found += run_rows([number])
-    output.show({"errata": found}, (line for row in found for line in _row_lines(row)))
+            checked += run_rows([number])
+    output.show({"errata": checked}, (line for row in checked for line in _row_lines(row)))
     return 0
 
 

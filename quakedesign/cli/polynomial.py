@@ -67,7 +67,7 @@ def sos(
         answer = prove(polynomial, on=on, multiplier=multiplier, margin=margin, degree_bound=degree, products=products)
     if out is not None and answer.proof is not None:
         answer.save(out)
-    found: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "verdict": str(answer.verdict),
         "variables": list(answer.statement.variables),
         "degree": answer.statement.degree,
@@ -78,5 +78,5 @@ def sos(
         "seconds": answer.seconds,
         "versions": dict(answer.versions),
     }
-    output.show(found, sentences(answer, verbose=verbose))
-    return 0 if found["verdict"] == "sos" else 1
+    output.show(facts, sentences(answer, verbose=verbose))
+    return 0 if facts["verdict"] == "sos" else 1

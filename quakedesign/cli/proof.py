@@ -118,14 +118,14 @@ def _certify_on_fault(
     controller = ExtendedLQR.from_values(gains, feedback=feedback)
     judged = judge(load_fault(fault, box=box), controller, step=step, peaks=peaks)
     files = judged.save(out, force=force) if out is not None else {}
-    found = {
+    facts = {
         **judged.to_dict(),
         "certificate": files.get("stability"),
         "certificates": files,
         "seconds": perf_counter() - began,
     }
-    output.show(found, verdict_lines(judged))
-    return 0 if found["verdict"] == "proved" and (peaks is None or found["peaks"] is not None) else 1
+    output.show(facts, verdict_lines(judged))
+    return 0 if facts["verdict"] == "proved" and (peaks is None or facts["peaks"] is not None) else 1
 
 
 @app.command

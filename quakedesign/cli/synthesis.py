@@ -134,48 +134,50 @@ def _sampled(
     return synthesise_sampled(trial, degrees=degree or None), {"fault": fault, **tried}
 
 
-def _facts(found: "Synthesis | None") -> dict[str, Any]:
+def _facts(synthesis: "Synthesis | None") -> dict[str, Any]:
     """Answer as JSON: gains and ranges as texts, measured values as numbers."""
-    if found is None:
+    if synthesis is None:
         return {"verdict": "undecided", "gains": None, "value": None, "compared": []}
-    ranges = found.certificate.loop.uncertain
+    ranges = synthesis.certificate.loop.uncertain
     return {
         "verdict": "proved",
-        "objective": found.objective,
-        "gains": {name: str(k) for name, k in found.gains.items()},
+        "objective": synthesis.objective,
+        "gains": {name: str(k) for name, k in synthesis.gains.items()},
         "lipschitz": str(ranges["d"][1]),
         "gain_range": [str(v) for v in ranges["beta"]] if "beta" in ranges else None,
-        "value": found.value,
-        "unit": found.unit,
-        "norm": found.norm,
+        "value": synthesis.value,
+        "unit": synthesis.unit,
+        "norm": synthesis.norm,
         "compared": [
             {"gains": {n: str(k) for n, k in c.gains.items()}, "value": c.value, "norm": c.norm, "ratio": c.ratio}
-            for c in found.compared
+            for c in synthesis.compared
         ],
     }
 
 
-def _print(law: str, found: "Synthesis | None", more: Mapping[str, Any]) -> None:
+def _print(law: str, synthesis: "Synthesis | None", more: Mapping[str, Any]) -> None:
     from rich.table import Table
     from rich.text import Text
 
     out = console()
-    if found is None:
+    if synthesis is None:
         out.print(f"undecided: no gains of {law} were proved")
         return
-    gains = ", ".join(f"{name} = {k}" for name, k in found.gains.items())
-    ranges = found.certificate.loop.uncertain
+    gains = ", ".join(f"{name} = {k}" for name, k in synthesis.gains.items())
+    ranges = synthesis.certificate.loop.uncertain
     beta = f", β in [{ranges['beta'][0]}, {ranges['beta'][1]}]" if "beta" in ranges else ""
     out.print(f"proved: {law} with {gains} for |h'| <= {ranges['d'][1]}{beta}")
     if more:
         of_run = "{scheme} run on {fault} with scale {scale}, T_s = {step:.4g} s, over {duration:.4g} s"
-        out.print(f"measured, not proved: {found.objective} of one {of_run.format(**more)}")
+        out.print(f"measured, not proved: {synthesis.objective} of one {of_run.format(**more)}")
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    unit = "" if found.unit == "-" else f" [{found.unit}]"
-    for column in ("gains", f"{found.objective}{unit}", "norm", "better by"):
+    unit = "" if synthesis.unit == "-" else f" [{synthesis.unit}]"
+    for column in ("gains", f"{synthesis.objective}{unit}", "norm", "better by"):
         table.add_column(Text(column))
-    rows: list[tuple[str, float | None, float, float | None]] = [("these", found.value, found.norm, None)]
-    rows += [(" ".join(f"{float(k):.4g}" for k in c.gains.values()), c.value, c.norm, c.ratio) for c in found.compared]
+    rows: list[tuple[str, float | None, float, float | None]] = [("these", synthesis.value, synthesis.norm, None)]
+    rows += [
+        (" ".join(f"{float(k):.4g}" for k in c.gains.values()), c.value, c.norm, c.ratio) for c in synthesis.compared
+    ]
     for name, value, norm, ratio in rows:
         shown = "not proved" if value is None else f"{value:.4g}"
         table.add_row(name, shown, f"{norm:.4g}", "" if ratio is None else f"{ratio:.3g}")

@@ -95,12 +95,12 @@ def published(fault_name: str) -> dict[str, Controller]:
     """
     data = tomllib.loads((files(__name__) / "published.toml").read_text(encoding="utf-8"))
     sets = {name: entry for name, entry in data.items() if isinstance(entry, dict)}
-    found: dict[str, Controller] = {}
+    controllers: dict[str, Controller] = {}
     for name, entry in sets.get(fault_name, {}).items():
         more = {k: v for k, v in entry.items() if k != "gains"}
         printed = control_law(name).for_authority(tuple(entry["gains"]), rational(data["divisor"]))
-        found[name] = replace(printed, gains=dict(printed.gains), **more)
-    return found
+        controllers[name] = replace(printed, gains=dict(printed.gains), **more)
+    return controllers
 
 
 def family(name: str) -> tuple[BaseGains[Law], ...]:

@@ -154,8 +154,8 @@ def law_dimensions(controller: Controller) -> LawDimensions:
         left = {name: Fraction(1), "time": Fraction(-per_time)}
         conditions.append(_minus(_form(sp.sympify(expression), known, conditions), left))
     unknown = (*symbols, *integrals)
-    found = _solved(conditions, unknown, controller.name)
-    return LawDimensions(gains={n: found[n] for n in symbols}, integrals={n: found[n] for n in integrals})
+    solution = _solved(conditions, unknown, controller.name)
+    return LawDimensions(gains={n: solution[n] for n in symbols}, integrals={n: solution[n] for n in integrals})
 
 
 def _equations(law: Controller, signals: Signals, integrals: Mapping[str, Any]) -> Iterator[tuple[Any, str, int]]:
@@ -234,11 +234,11 @@ def _solved(conditions: list[Form], unknown: tuple[str, ...], law: str) -> dict[
         raise ParameterError(
             f"the terms of {law} leave the unit of {', '.join(free)} open. Every gain must appear alone."
         )
-    found = {}
+    forms = {}
     for row, pivot in enumerate(pivots):
         values = {base: reduced[row, len(unknown) + i] for i, base in enumerate(BASES)}
-        found[unknown[pivot]] = {base: -fraction_of(v) for base, v in values.items() if v}
-    return found
+        forms[unknown[pivot]] = {base: -fraction_of(v) for base, v in values.items() if v}
+    return forms
 
 
 @cache

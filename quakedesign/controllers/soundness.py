@@ -80,8 +80,8 @@ def sound_field(
 
 def _signed(rate: sp.Expr) -> sp.Expr:
     """sign(x) as ⌈x⌋⁰ and |x|^a as one power."""
-    found = rate.replace(sp.sign, lambda x: SignedPower(x, 0)).replace(sp.Abs, lambda x: AbsolutePower(x, 1))
-    return found.replace(
+    signed = rate.replace(sp.sign, lambda x: SignedPower(x, 0)).replace(sp.Abs, lambda x: AbsolutePower(x, 1))
+    return signed.replace(
         lambda e: e.is_Pow and isinstance(e.base, AbsolutePower) and e.exp.is_Rational,
         lambda e: AbsolutePower(e.base.args[0], e.base.args[1] * e.exp),
     )

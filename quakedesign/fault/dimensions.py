@@ -97,12 +97,12 @@ def dimension(unit: str) -> tuple[Fraction, ...]:
         For a unit that cannot be read.
     """
     try:
-        found = dict(_registry().parse_units(unit).dimensionality)
+        exponents = dict(_registry().parse_units(unit).dimensionality)
     except Exception:
         raise UnitError(
             f"a unit in kg, s, slip_m (or m), fault_m, normal_m, Pa is needed. Received {unit!r}. Check its spelling."
         ) from None
-    return tuple(Fraction(found.get(f"[{base}]", 0)).limit_denominator(1000) for base in BASES)
+    return tuple(Fraction(exponents.get(f"[{base}]", 0)).limit_denominator(1000) for base in BASES)
 
 
 def dimensional_matrix(units: Sequence[str]) -> "sp.Matrix":

@@ -236,12 +236,12 @@ def _law_schema(law: type[FrictionLaw]) -> dict[str, Any]:
         **_quantities(units, said),
         **{key: {"type": "string", "description": said.get(key, "")} for key in sorted(options)},
     }
-    found = _table(properties, ("law",))
-    found["patternProperties"] = {
+    schema = _table(properties, ("law",))
+    schema["patternProperties"] = {
         _pattern(law.quantities()[key].metadata["symbol"]): entry for key, entry in properties.items() if key in units
     }
-    found["allOf"] = [_one_of(law, key) for key in units if key not in _optional(law)]
-    return found
+    schema["allOf"] = [_one_of(law, key) for key in units if key not in _optional(law)]
+    return schema
 
 
 def _pattern(symbol: str) -> str:

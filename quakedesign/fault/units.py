@@ -34,9 +34,9 @@ _WRITTEN = re.compile(r"([+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d{1,3})?)(?: ([A-Za-z1][
 
 def _plain(quantity: Any, unit: str) -> Decimal | None:
     """Value of a number with a usual unit; None for anything else."""
-    found = _WRITTEN.fullmatch(quantity) if isinstance(quantity, str) and len(quantity) <= 100 else None
-    size = _PLAIN.get(unit, {}).get(found[2] or "") if found else None
-    return Decimal(found[1]) * Decimal(size) if found and size else None
+    match = _WRITTEN.fullmatch(quantity) if isinstance(quantity, str) and len(quantity) <= 100 else None
+    size = _PLAIN.get(unit, {}).get(match[2] or "") if match else None
+    return Decimal(match[1]) * Decimal(size) if match and size else None
 
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.])\s*((?![*^]).*)", re.ASCII | re.DOTALL)

@@ -77,7 +77,7 @@ def _decimal(value: Fraction, *, up: bool) -> Fraction:
     return Fraction(context.divide(Decimal(value.numerator), Decimal(value.denominator)))
 
 
-def identified_fault(found: Identification, fault: Fault) -> Fault:
+def identified_fault(identification: Identification, fault: Fault) -> Fault:
     """A fault with the friction of a record in place of its own.
 
     For a law that weakens with slip, friction and box together hold every law of the record's box, so that `guarantee`
@@ -85,7 +85,7 @@ def identified_fault(found: Identification, fault: Fault) -> Fault:
 
     Parameters
     ----------
-    found : Identification
+    identification : Identification
         Of a record that tells every parameter.
     fault : Fault
         That gives everything but friction.
@@ -99,13 +99,19 @@ def identified_fault(found: Identification, fault: Fault) -> Fault:
     RecordError
         When the record does not tell every parameter.
     """
-    if not found.identified:
-        raise RecordError(f"a fault file needs every parameter. Received {found.record.name}: {found.untold()[0]}.")
-    held = cover(found.law, found.box, fault.box) if covers(found.law) else Cover(law=found.law, box=fault.box)
+    if not identification.identified:
+        raise RecordError(
+            f"a fault file needs every parameter. Received {identification.record.name}: {identification.untold()[0]}."
+        )
+    held = (
+        cover(identification.law, identification.box, fault.box)
+        if covers(identification.law)
+        else Cover(law=identification.law, box=fault.box)
+    )
     return replace(
         fault,
         name=f"{fault.name[:40].rstrip()} identified",
-        source=f"friction identified from {found.record.name}; everything else: {fault.source}",
+        source=f"friction identified from {identification.record.name}; everything else: {fault.source}",
         friction=held.law,
         box=held.box,
         assumed=(),
@@ -117,12 +123,12 @@ def covers(law: FrictionLaw) -> bool:
     return set(law.quantities()) == _WEAKENING
 
 
-def save_fault(found: Identification, fault: Fault, path: str | Path) -> None:
+def save_fault(identification: Identification, fault: Fault, path: str | Path) -> None:
     """Write `identified_fault` to a TOML file, best fit and ranges as remarks at its head; whole or not at all.
 
     Parameters
     ----------
-    found : Identification
+    identification : Identification
     fault : Fault
     path : str or Path
 
@@ -133,21 +139,22 @@ def save_fault(found: Identification, fault: Fault, path: str | Path) -> None:
     OutputError
         When it cannot be written.
     """
-    whole = identified_fault(found, fault)
-    remarks = "".join(f"# {line}\n" for line in _remarks(found, fault))
+    whole = identified_fault(identification, fault)
+    remarks = "".join(f"# {line}\n" for line in _remarks(identification, fault))
     write_whole(Path(path), remarks + fault_toml(whole))
 
 
-def _remarks(found: Identification, fault: Fault) -> list[str]:
+def _remarks(identification: Identification, fault: Fault) -> list[str]:
     said = (
         "friction and uncertainty below hold every law of the boxes"
-        if covers(found.law)
+        if covers(identification.law)
         else "friction below is the best fit: a fault file holds no ranges of this law"
     )
     return [
-        f"Friction identified from {found.record.name!r} as {found.law.name}; everything else is {fault.name}'s.",
+        f"Friction identified from {identification.record.name!r} as {identification.law.name}; "
+        f"everything else is {fault.name}'s.",
         f"Best fit (95 % alone; box of all together); {said}.",
-        *(_remark(estimate) for estimate in found.estimates.values()),
+        *(_remark(estimate) for estimate in identification.estimates.values()),
     ]
 
 

@@ -153,12 +153,12 @@ def fit(experiment: Experiment, measured: "np.ndarray", *, seed: int, search: Se
         )
     everything = np.ones(len(measured), dtype=bool)
     experiment, starts = _starts(experiment, measured, seed, how)
-    found: list[tuple[np.ndarray, float]] = []
+    minima: list[tuple[np.ndarray, float]] = []
     for start in starts:
-        found.append(minimised(experiment, measured, everything, start, steps=how.coarse))
-        best_q, best = min(found, key=lambda pair: pair[1])
-        agreeing = sum(squares <= best * (1 + how.agreement) for _, squares in found)
-        if len(found) >= how.least and agreeing > 1:
+        minima.append(minimised(experiment, measured, everything, start, steps=how.coarse))
+        best_q, best = min(minima, key=lambda pair: pair[1])
+        agreeing = sum(squares <= best * (1 + how.agreement) for _, squares in minima)
+        if len(minima) >= how.least and agreeing > 1:
             break
     fit = Fit(
         experiment=experiment,
@@ -166,7 +166,7 @@ def fit(experiment: Experiment, measured: "np.ndarray", *, seed: int, search: Se
         measured=measured,
         kept=everything,
         agreeing=agreeing,
-        starts=len(found),
+        starts=len(minima),
     )
     return settled(fit, how)
 
@@ -212,14 +212,14 @@ def minimised(
         return full
 
     def residuals(part: "np.ndarray") -> "np.ndarray":
-        found: np.ndarray = (experiment.friction(at(part)) - measured)[kept]
-        return found
+        solution: np.ndarray = (experiment.friction(at(part)) - measured)[kept]
+        return solution
 
     first = residuals(whole[free])
     if not np.all(np.isfinite(first)):
         return whole, np.inf
     size = max(float(np.sqrt(np.mean(first**2))), 1e-300)
-    found = least_squares(
+    solution = least_squares(
         lambda part: residuals(part) / size,
         np.clip(whole[free], np.nextafter(low, high)[free], np.nextafter(high, low)[free]),
         jac=lambda part: _finite(experiment.slopes(at(part)))[kept][:, free] / size,
@@ -230,13 +230,13 @@ def minimised(
         gtol=1e-12,
         max_nfev=steps,
     )
-    return at(found.x), float(2 * found.cost * size**2)
+    return at(solution.x), float(2 * solution.cost * size**2)
 
 
 def _finite(slopes: "np.ndarray") -> "np.ndarray":
     """Slopes with nothing where they leave the floats, as those of transients that no sample sees can."""
-    found: np.ndarray = np.where(np.isfinite(slopes), slopes, 0.0)
-    return found
+    finite: np.ndarray = np.where(np.isfinite(slopes), slopes, 0.0)
+    return finite
 
 
 def settled(fit: Fit, how: Search) -> Fit:
@@ -261,7 +261,7 @@ def outliers(residuals: "np.ndarray", longest: int) -> "np.ndarray":
     size = np.median(np.abs(residuals - middle)) / stats.norm.ppf(0.75)
     far = np.abs(residuals - middle) > size * stats.norm.isf((1 - CONFIDENCE) / 2 / len(residuals))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], far.astype(int), [0]])))
-    found = np.zeros(len(residuals), dtype=bool)
+    outlying = np.zeros(len(residuals), dtype=bool)
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        found[begin:end] = end - begin <= longest
-    return found
+        outlying[begin:end] = end - begin <= longest
+    return outlying

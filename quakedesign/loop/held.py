@@ -176,10 +176,10 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
             "a law must be able to ask for a constant pressure without errors. Received one that cannot. "
             "Give it an integral or an estimate of the disturbance."
         )
-    found = [Fraction(0)] * n
+    solution = [Fraction(0)] * n
     for column, pivot in reversed(pivots):
-        found[column] = pivot[n] - sum((v * f for v, f in zip(pivot, found, strict=False)), Fraction(0))
-    return tuple(found)
+        solution[column] = pivot[n] - sum((v * f for v, f in zip(pivot, solution, strict=False)), Fraction(0))
+    return tuple(solution)
 
 
 def _push(path: _Path) -> Row:

@@ -31,8 +31,8 @@ def grade(entry: "Entry") -> str:
     return f"{reach}; UNSTABLE if p is held over T_s" if _unstable_if_held(entry) else reach
 
 
-def _guaranteed(found: Guarantee) -> str:
-    claims = found.claims
+def _guaranteed(guarantee: Guarantee) -> str:
+    claims = guarantee.claims
     return f"guaranteed: slip rate <= {claims.peak_slip_rate:.3g} m/s, slip error <= {claims.slip_error:.3g} m"
 
 

@@ -18,19 +18,19 @@ _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _MOST_OUTLIERS = 8
 
 
-def identification_lines(found: Identification) -> list[str]:
+def identification_lines(identification: Identification) -> list[str]:
     """For people, within 80 columns: what was not told first."""
-    fit = found.fit
-    verdict = "every parameter identified" if found.identified else "not every parameter is identifiable"
-    head = [f"{found.record.name}: {found.law.name}, {verdict}", *found.untold(), ""]
+    fit = identification.fit
+    verdict = "every parameter identified" if identification.identified else "not every parameter is identifiable"
+    head = [f"{identification.record.name}: {identification.law.name}, {verdict}", *identification.untold(), ""]
     columns = f"{'parameter':24}{'value':>12}{'95 %: from':>14}{'to':>12}  unit"
-    shown = [*found.estimates.values(), *([found.difference] if found.difference else [])]
+    shown = [*identification.estimates.values(), *([identification.difference] if identification.difference else [])]
     tail = [
         f"noise {fit.noise:.3g} of friction in {int(fit.kept.sum())} samples; {fit.agreeing} of {fit.starts} searches "
-        f"end in this fit (seed {found.seed})",
-        *_warnings(found),
-        *_outliers(found),
-        f"assumed: {'; '.join(found.notes)}",
+        f"end in this fit (seed {identification.seed})",
+        *_warnings(identification),
+        *_outliers(identification),
+        f"assumed: {'; '.join(identification.notes)}",
     ]
     return [*_wrapped(head), columns, *map(_row, shown), "", *_wrapped(tail)]
 
@@ -45,25 +45,25 @@ def _row(estimate: Estimate) -> str:
     return f"{name:24}{estimate.value:>12.5g}{low:>14}{high:>12}  {estimate.unit or '-'}"
 
 
-def _warnings(found: Identification) -> list[str]:
+def _warnings(identification: Identification) -> list[str]:
     told = []
-    if found.fit.correlation > 2:
+    if identification.fit.correlation > 2:
         told.append(
-            f"residuals are correlated over {found.fit.correlation:.1f} samples: law or machine explain the record "
-            "only in part; regions are widened by that, as if there were fewer samples"
+            f"residuals are correlated over {identification.fit.correlation:.1f} samples: law or machine explain the "
+            "record only in part; regions are widened by that, as if there were fewer samples"
         )
     return told
 
 
-def _outliers(found: Identification) -> list[str]:
-    if not found.outliers:
+def _outliers(identification: Identification) -> list[str]:
+    if not identification.outliers:
         return []
-    told = ", ".join(f"{o.size:+.3g} at {o.time:.6g} s" for o in found.outliers[:_MOST_OUTLIERS])
-    more = len(found.outliers) - _MOST_OUTLIERS
+    told = ", ".join(f"{o.size:+.3g} at {o.time:.6g} s" for o in identification.outliers[:_MOST_OUTLIERS])
+    more = len(identification.outliers) - _MOST_OUTLIERS
     return [f"outliers left out: {told}{f', and {more} smaller' if more > 0 else ''}"]
 
 
-def identification_figure(found: Identification) -> Any:
+def identification_figure(identification: Identification) -> Any:
     """Measured and simulated friction, and what is left of the noise, over time.
 
     Returns
@@ -71,15 +71,17 @@ def identification_figure(found: Identification) -> Any:
     matplotlib.figure.Figure
     """
     drawing, ((above,), (below,)) = figure(2, 4.6, gridspec_kw={"height_ratios": (2, 1)})
-    size, unit = clock(float(found.record.time[-1]))
-    time, fit = found.record.time[found.used] / size, found.fit
+    size, unit = clock(float(identification.record.time[-1]))
+    time, fit = identification.record.time[identification.used] / size, identification.fit
     above.plot(time, fit.measured, ".", color=_MEASURED, markersize=2, label="measured")
-    above.plot(time, fit.measured - fit.residuals, color=_FITTED, linewidth=1.2, label=f"fitted: {found.law.name}")
+    above.plot(
+        time, fit.measured - fit.residuals, color=_FITTED, linewidth=1.2, label=f"fitted: {identification.law.name}"
+    )
     above.set_ylabel("friction [-]", fontsize=SMALL)
     below.plot(time[fit.kept], fit.residuals[fit.kept], ".", color=_MEASURED, markersize=2)
     for level in (-2 * fit.noise, 0.0, 2 * fit.noise):
         below.axhline(level, color=NATURAL, linewidth=0.6, linestyle="solid" if level == 0 else (0, (4, 2)))
-    if found.outliers:
+    if identification.outliers:
         places = np.flatnonzero(~fit.kept)
         above.plot(time[places], fit.measured[places], "x", color=_OUTLIER, markersize=5, label="left out")
         inside = 8 * fit.noise
@@ -87,7 +89,7 @@ def identification_figure(found: Identification) -> Any:
     below.set_ylabel("residual [-]", fontsize=SMALL)
     below.set_xlabel(f"time [{unit}]", fontsize=SMALL)
     note = f"dashed: twice the noise, {fit.noise:.3g}; crosses beyond eight times it stand at its edge"
-    return finish(drawing, f"{found.record.name}: friction and residuals", [], note, legend=above)
+    return finish(drawing, f"{identification.record.name}: friction and residuals", [], note, legend=above)
 
 
 def require_format(path: Path) -> None:
@@ -101,7 +103,7 @@ def require_format(path: Path) -> None:
         raise OutputError(f"a figure must end in {', '.join(FORMATS)}. Received {path}. Write {path.stem}.svg, say.")
 
 
-def save_figure(found: Identification, path: Path) -> None:
+def save_figure(identification: Identification, path: Path) -> None:
     """Write the figure, whole or not at all, without a date so that the same figure is the same file.
 
     Raises
@@ -110,5 +112,5 @@ def save_figure(found: Identification, path: Path) -> None:
     """
     require_format(path)
     drawn, undated = io.BytesIO(), {".svg": {"Date": None}, ".png": {"Software": None}, ".pdf": {"CreationDate": None}}
-    identification_figure(found).savefig(drawn, format=path.suffix[1:], metadata=undated[path.suffix])
+    identification_figure(identification).savefig(drawn, format=path.suffix[1:], metadata=undated[path.suffix])
     write_whole(path, drawn.getvalue())

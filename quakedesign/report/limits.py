@@ -15,9 +15,9 @@ from quakedesign.studies import Limits
 _FORBIDDEN, _PROVED = "#F3C6B2", "#0072B2"
 
 
-def limits_lines(found: Limits) -> list[str]:
+def limits_lines(limits: Limits) -> list[str]:
     """For people, within 80 columns."""
-    task = found.fault
+    task = limits.fault
     head = [
         f"{task.name}: what no controller can do, beside what is proved of designs",
         f"(box {task.box.name}, any disturbance of at most {task.disturbance.largest_explicit:.6g} m/s^2, "
@@ -28,26 +28,26 @@ def limits_lines(found: Limits) -> list[str]:
     rows = [
         f"{limit.title:24}{_beyond(limit.impossible_beyond, limit.unit):>20}"
         f"{_shown(limit.proved_up_to, limit.unit):>16}"
-        for limit in found.named().values()
+        for limit in limits.named().values()
     ]
-    return [*head, *rows, "", *(line for said in _meaning(found) for line in wrap(said, 80, subsequent_indent="  "))]
+    return [*head, *rows, "", *(line for said in _meaning(limits) for line in wrap(said, 80, subsequent_indent="  "))]
 
 
-def _meaning(found: Limits) -> list[str]:
-    if found.peak_slip_rate_error.impossible_beyond is None:
+def _meaning(limits: Limits) -> list[str]:
+    if limits.peak_slip_rate_error.impossible_beyond is None:
         return ["without a disturbance nothing is impossible"]
-    within = "bounded" if found.slip_error is None else f"within {found.slip_error.quantity('m')}"
+    within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
     told = [
         "impossible for every controller, linear or not, for some friction of the box",
         "slip-rate error: even with slip, slip rate and disturbance known up to the sample, if the slip error stays "
         f"{within}; slip rates may be negative, as in the guarantees",
     ]
-    if found.largest_step.impossible_beyond is None:
+    if limits.largest_step.impossible_beyond is None:
         return [*told, "the others: none is known, since friction's weakening alone does not make this fault unstable"]
     return [
         *told,
-        f"the others: withdrawal of at most {UpperBound(found.withdrawal).quantity('Pa', 4)}, "
-        f"D = {float(found.diffusivity):g} m^2/s; a constant push that begins after a sample makes the fault slip "
+        f"the others: withdrawal of at most {UpperBound(limits.withdrawal).quantity('Pa', 4)}, "
+        f"D = {float(limits.diffusivity):g} m^2/s; a constant push that begins after a sample makes the fault slip "
         "until its friction is lost, even if the controller knows everything from the next sample on",
     ]
 
@@ -62,7 +62,7 @@ def _shown(bound: Bound | None, unit: str) -> str:
     return "-" if bound is None else bound.quantity(unit)
 
 
-def limits_figure(found: Limits) -> Any:
+def limits_figure(limits: Limits) -> Any:
     """Slip-rate errors over T_s: impossible, proved, and the natural earthquake's slip rate.
 
     Returns
@@ -70,35 +70,35 @@ def limits_figure(found: Limits) -> Any:
     matplotlib.figure.Figure
     """
     drawing, axes = figure(1, 4.2)
-    axis, natural = axes[0, 0], found.natural_peak
+    axis, natural = axes[0, 0], limits.natural_peak
     axis.set(xscale="log", yscale="log", xlabel="T_s [s]", ylabel="slip-rate error [m/s]")
-    steps, peaks = np.array([(float(step), float(peak)) for step, peak in found.smallest_peaks()]).reshape(-1, 2).T
+    steps, peaks = np.array([(float(step), float(peak)) for step, peak in limits.smallest_peaks()]).reshape(-1, 2).T
     if len(steps):
         top = 3 * max(natural or 0.0, *peaks)
-        last = found.largest_step.impossible_beyond
+        last = limits.largest_step.impossible_beyond
         axis.fill_between(steps, peaks[0] / 3, peaks, color=_FORBIDDEN, lw=0, label="impossible for every controller")
         if last is not None:
             axis.axvspan(float(last), 2 * steps[-1], color=_FORBIDDEN, lw=0)
         axis.set(xlim=(steps[0], (1 if last is None else 2) * steps[-1]), ylim=(peaks[0] / 3, top))
-    if found.proved:
-        proved = sorted((float(g.held.step), float(g.claims.slip_rate_error)) for g in found.proved)
+    if limits.proved:
+        proved = sorted((float(g.held.step), float(g.claims.slip_rate_error)) for g in limits.proved)
         axis.plot(*zip(*proved, strict=True), "o", color=_PROVED, label="proved of a designed controller")
     if natural:
         axis.axhline(natural, color=NATURAL, linestyle="--", linewidth=1, label="natural earthquake (slip rate)")
-    axis.axvline(found.fault.sampling_time, color="#777777", linewidth=0.8, linestyle=":", label="T_s of the fault")
-    note = f"disturbance of at most {found.fault.disturbance.largest_explicit:.4g} m/s², box {found.fault.box.name}"
-    return finish(drawing, f"{found.fault.name}: what a held pressure can do", [], note, legend=axis)
+    axis.axvline(limits.fault.sampling_time, color="#777777", linewidth=0.8, linestyle=":", label="T_s of the fault")
+    note = f"disturbance of at most {limits.fault.disturbance.largest_explicit:.4g} m/s², box {limits.fault.box.name}"
+    return finish(drawing, f"{limits.fault.name}: what a held pressure can do", [], note, legend=axis)
 
 
-def write_limits(found: Limits, folder: Path) -> dict[str, Any]:
+def write_limits(limits: Limits, folder: Path) -> dict[str, Any]:
     """Write ``limits.png`` and ``results.json`` into a folder that appears whole; return what the latter holds.
 
     Raises
     ------
     OutputError
     """
-    facts = found.to_dict()
+    facts = limits.to_dict()
     with whole_folder(folder) as partial:
-        limits_figure(found).savefig(partial / "limits.png", metadata={"Software": None})
+        limits_figure(limits).savefig(partial / "limits.png", metadata={"Software": None})
         write_whole(partial / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
     return facts

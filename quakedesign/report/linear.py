@@ -40,13 +40,13 @@ def constant_sentence(loops: Mapping[str, ConstantLoop]) -> str:
 def peaks_sentence(peaks: Mapping[str, ContinuousPeaks | NoGuarantee]) -> str:
     """How fast the fault can slip at most in continuous time, for every class of disturbances that was asked for."""
     said = [
-        f"{found.claims.peak_slip_rate:.3g} m/s (slip error {found.claims.slip_error:.3g} m) for "
+        f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
         + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
-        for name, found in peaks.items()
-        if isinstance(found, ContinuousPeaks)
+        for name, proved in peaks.items()
+        if isinstance(proved, ContinuousPeaks)
     ]
     if not said:
-        reasons = {found.reason for found in peaks.values() if isinstance(found, NoGuarantee)}
+        reasons = {proved.reason for proved in peaks.values() if isinstance(proved, NoGuarantee)}
         return "; ".join(["no bound on the slip rate is certified", *sorted(reasons)])
     return "certified from rest, p acting at once: slip rate below " + ", ".join(said)
 
@@ -68,11 +68,11 @@ def verdict_lines(judged: LinearVerdict) -> list[str]:
     return [*lines, f"  {peaks_sentence({judged.asked: judged.peaks})}"]
 
 
-def margin_lines(found: Analysis) -> list[str]:
+def margin_lines(analysis: Analysis) -> list[str]:
     """Decay rate and margins, each beside its limit; or a vertex that is not stable."""
-    lines, decay, slope, span = [], found.decay, found.slope, found.span
-    if found.unstable_at:
-        lines.append(f"not stable {_near(found.unstable_at)}")
+    lines, decay, slope, span = [], analysis.decay, analysis.slope, analysis.span
+    if analysis.unstable_at:
+        lines.append(f"not stable {_near(analysis.unstable_at)}")
     if decay is not None:
         lines.append(
             f"decay rate {decay.certified:.4g} 1/s certified; that of the slowest vertex is {decay.limit:.4g} 1/s"

@@ -20,31 +20,31 @@ def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
 
 def outcome_sentence(run: Trajectory) -> str:
     """Outcome of a run with its peak slip rate."""
-    found = run.outcome
-    if found.peak_slip_rate is None:
-        return f"{found.kind} at {run.events['diverged']:.4g} s"
-    opened = f" at {run.events['opening']:.4g} s (p >= σ')" if found.kind == "opened" else ""
-    return f"{found.kind}{opened}: peak slip rate {found.peak_slip_rate:.3g} m/s, {_beside_natural(run)}"
+    outcome = run.outcome
+    if outcome.peak_slip_rate is None:
+        return f"{outcome.kind} at {run.events['diverged']:.4g} s"
+    opened = f" at {run.events['opening']:.4g} s (p >= σ')" if outcome.kind == "opened" else ""
+    return f"{outcome.kind}{opened}: peak slip rate {outcome.peak_slip_rate:.3g} m/s, {_beside_natural(run)}"
 
 
 def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
     """When the event of a run without control would begin that ends before; None for other runs."""
-    found = waiting(run, fault)
-    if found is None:
+    event = waiting(run, fault)
+    if event is None:
         return None
     said = f"the fault is unstable, but its event has not begun at {run.time[-1]:.4g} s"
-    if found.onset is None:
+    if event.onset is None:
         return f"{said}: nothing has pushed it forward; without --duration it is nudged"
-    return f"{said}: growing by {found.growth:.3g} 1/s it would at about {found.onset:.3g} s"
+    return f"{said}: growing by {event.growth:.3g} 1/s it would at about {event.onset:.3g} s"
 
 
 def outcome_cells(run: Trajectory | None) -> tuple[str, ...]:
     """Texts under `OUTCOME_COLUMNS`; a dash means not applicable or not known."""
     if run is None:
         return ("–", "–", "–")
-    found = run.outcome
-    peak = "–" if found.peak_slip_rate is None else f"{found.peak_slip_rate:.2e}"
-    return found.kind, peak, "–" if found.share_of_natural is None else _percent(found.share_of_natural)
+    outcome = run.outcome
+    peak = "–" if outcome.peak_slip_rate is None else f"{outcome.peak_slip_rate:.2e}"
+    return outcome.kind, peak, "–" if outcome.share_of_natural is None else _percent(outcome.share_of_natural)
 
 
 def pressure_sentence(least: float, largest: float) -> str:

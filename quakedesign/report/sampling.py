@@ -47,13 +47,13 @@ def write_sampling(report: SamplingReport, folder: Path) -> dict[str, Any]:
     ------
     OutputError
     """
-    found = report.to_dict()
+    facts = report.to_dict()
     with whole_folder(folder) as partial:
         (partial / "figures").mkdir()
         for name, drawing in report.figures().items():
             drawing.savefig(partial / "figures" / f"{name}.png", metadata={"Software": None})
-        write_whole(partial / "results.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
-    return found
+        write_whole(partial / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
+    return facts
 
 
 def print_sampling(report: SamplingReport, console: Any) -> None:

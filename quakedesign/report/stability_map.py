@@ -40,25 +40,25 @@ def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | No
     return _drawn(stability_regions(fault, pressure=pressure, loading_rate=loading_rate, inertia=inertia))
 
 
-def _drawn(found: StabilityRegions) -> Any:
+def _drawn(regions: StabilityRegions) -> Any:
     from matplotlib.figure import Figure
 
     drawing = Figure(figsize=(10, 4.8), layout="constrained", dpi=150)
     left, right = drawing.subplots(1, 2, sharey=True)
-    normal = found.fault.effective_normal_stress
-    (size, unit), (high, stiff) = _size(normal), _size(found.stiffness.max())
-    label = f"{found.fault.name}: {found.verdict.outcome.name.lower()}"
-    for axis, plane in ((left, found.over_stress), (right, found.over_pressure)):
-        _region(axis, plane, found.stiffness)
+    normal = regions.fault.effective_normal_stress
+    (size, unit), (high, stiff) = _size(normal), _size(regions.stiffness.max())
+    label = f"{regions.fault.name}: {regions.verdict.outcome.name.lower()}"
+    for axis, plane in ((left, regions.over_stress), (right, regions.over_pressure)):
+        _region(axis, plane, regions.stiffness)
         for limit in plane.limits:
             axis.axvline(limit / size, color="black", linestyle="--", label="damping limit")
-        axis.plot(plane.own / size, found.own / high, "ko", markersize=7, label=label)
-    left.set_xlabel(f"effective normal stress σ' [{unit}] (p = {found.pressure / size:.4g} {unit})")
+        axis.plot(plane.own / size, regions.own / high, "ko", markersize=7, label=label)
+    left.set_xlabel(f"effective normal stress σ' [{unit}] (p = {regions.pressure / size:.4g} {unit})")
     right.set_xlabel(f"injected pressure p [{unit}] (σ' = {normal / size:.4g} {unit}; p < 0 is withdrawal)")
     left.set_ylabel(f"stiffness per area k/A [{stiff}/m]")
-    _annotate(left, found)
+    _annotate(left, regions)
     drawing.legend(*_unique(left, right), loc="outside lower center", ncols=4, fontsize=9)
-    drawing.suptitle(_title(found.fault, found.verdict))
+    drawing.suptitle(_title(regions.fault, regions.verdict))
     return drawing
 
 
@@ -88,16 +88,16 @@ def _region(axis: Any, plane: Plane, stiffness: np.ndarray) -> None:
     axis.set_ylim(stiffness.min() / high, stiffness.max() / high)
 
 
-def _annotate(axis: Any, found: StabilityRegions) -> None:
+def _annotate(axis: Any, regions: StabilityRegions) -> None:
     said = "no critical stiffness"
-    if found.nucleation_length is not None:
-        size, unit = _size(found.critical)
+    if regions.nucleation_length is not None:
+        size, unit = _size(regions.critical)
         said = (
-            f"critical stiffness per area {found.critical / size:.4g} {unit}/m\n"
-            f"nucleation length {_metres(found.nucleation_length)}\nfault length {_metres(found.fault.side)}"
+            f"critical stiffness per area {regions.critical / size:.4g} {unit}/m\n"
+            f"nucleation length {_metres(regions.nucleation_length)}\nfault length {_metres(regions.fault.side)}"
         )
-        wide, high = _size(found.over_stress.own)[0], _size(found.stiffness.max())[0]
-        axis.plot(found.over_stress.own / wide, found.critical / high, "kx", label="critical here")
+        wide, high = _size(regions.over_stress.own)[0], _size(regions.stiffness.max())[0]
+        axis.plot(regions.over_stress.own / wide, regions.critical / high, "kx", label="critical here")
     axis.text(
         0.03, 0.97, said, transform=axis.transAxes, va="top", fontsize=9,
         bbox={"boxstyle": "round", "facecolor": "white", "alpha": 0.85, "edgecolor": "#999999"},
@@ -117,8 +117,8 @@ def _size(largest: float) -> tuple[float, str]:
 
 def _unique(*axes: Any) -> tuple[list[Any], list[str]]:
     """Legend entries of several axes, each label once."""
-    found: dict[str, Any] = {}
+    handles: dict[str, Any] = {}
     for axis in axes:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    return list(found.values()), list(found)
+            handles.setdefault(label, handle)
+    return list(handles.values()), list(handles)

@@ -54,7 +54,7 @@ def trajectory(
         )
     took = {"preparation_seconds": began[1] - began[0], "stepping_seconds": ended - began[1]}
     loop = recorder.loop
-    found = metrics(
+    measured = metrics(
         watched,
         controlled=loop.controller is not None,
         step=setting.step,
@@ -71,7 +71,7 @@ def trajectory(
     return kind(
         **columns,
         moment_per_slip=loop.fault.shear_modulus * loop.fault.area,
-        metrics=found,
+        metrics=measured,
         energy=None if watched["diverged"] >= 0 else recorder.energy(end),
         events=events(watched),
         criterion=criterion,

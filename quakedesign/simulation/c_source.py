@@ -98,23 +98,23 @@ class ControllerStep:
         }
 
 
-def header_text(found: ControllerStep) -> str:
+def header_text(exported: ControllerStep) -> str:
     """Header with the meaning of every number."""
-    measured = (f"measurement[{i}]: {name} [{unit}]" for i, (name, unit) in enumerate(found.measurement.items()))
-    kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(found.start.items()))
-    facts = (f"{name}: {value}" for name, value in found.facts.items())
+    measured = (f"measurement[{i}]: {name} [{unit}]" for i, (name, unit) in enumerate(exported.measurement.items()))
+    kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(exported.start.items()))
+    facts = (f"{name}: {value}" for name, value in exported.facts.items())
     lines = ["A sampled controller for a fault, in SI units.", "", *_wrapped(_USE), "", _COMPILE, "", *measured, *kept]
     comment = _comment([*lines, "", "Where it comes from:", *facts])
-    sizes = {"step": found.step, "measurements": len(found.measurement), "memory": len(found.start)}
+    sizes = {"step": exported.step, "measurements": len(exported.measurement), "memory": len(exported.start)}
     return comment + _HEADER.format(**sizes)
 
 
-def source_text(found: ControllerStep, header: str) -> str:
+def source_text(exported: ControllerStep, header: str) -> str:
     """CasADi's C for the step, followed by the two functions of the header."""
     generator = ca.CodeGenerator("sampled_step.c", {"with_export": False})
-    generator.add(found.function)
-    start = ",\n".join(f"    {value!r}" for value in found.start.values())
-    return generator.dump() + _BODY.format(header=header, start=start, **_sizes(found.function))
+    generator.add(exported.function)
+    start = ",\n".join(f"    {value!r}" for value in exported.start.values())
+    return generator.dump() + _BODY.format(header=header, start=start, **_sizes(exported.function))
 
 
 def _sizes(function: Any) -> dict[str, int]:

@@ -73,16 +73,16 @@ def natural_earthquake(
     setting = Setting.of(nudged, step, _duration(fault, growth), 2000, 0.0)
     recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
     criterion = OutcomeCriterion.of(fault, natural_peak(fault) if pressure else None)
-    found = run(recorder, setting, integrator("dormand-prince"), criterion, progress=progress, compiled=compiled)
+    earthquake = run(recorder, setting, integrator("dormand-prince"), criterion, progress=progress, compiled=compiled)
     if pressure or growth <= 0:
-        return found
-    peak = found.metrics.peak_slip_rate  # none where the run diverges
+        return earthquake
+    peak = earthquake.metrics.peak_slip_rate  # none where the run diverges
     if peak is not None and peak <= STILL * nudge / growth:
         raise SimulationError(
             f"{fault.name} is unstable (eigenvalue {growth:.4g} 1/s), but its simulation does not move: its peak is "
             f"{peak!r} m/s. Rounding may drown its friction; check the numbers of the law."
         )
-    return replace(found, criterion=OutcomeCriterion.of(fault, peak))
+    return replace(earthquake, criterion=OutcomeCriterion.of(fault, peak))
 
 
 def natural_peak(fault: Fault) -> float | None:

@@ -105,15 +105,15 @@ def export_controller(
     """
     target = Path(folder)
     _require_free(target, force)
-    found = controller_step(fault, controller, step=step, scheme=scheme)
-    contents: dict[str, str | bytes] = {HEADER: header_text(found), SOURCE: source_text(found, HEADER)}
+    exported = controller_step(fault, controller, step=step, scheme=scheme)
+    contents: dict[str, str | bytes] = {HEADER: header_text(exported), SOURCE: source_text(exported, HEADER)}
     if fmu:
-        contents[UNIT], platform = model_unit(found)
-        found = replace(found, facts={**found.facts, "fmu": platform})
+        contents[UNIT], platform = model_unit(exported)
+        exported = replace(exported, facts={**exported.facts, "fmu": platform})
     with whole_folder(target) as partial:
         for name, content in contents.items():
             write_whole(partial / name, content)
-    return found
+    return exported
 
 
 def _require_free(folder: Path, force: bool) -> None:
@@ -169,9 +169,9 @@ def _after(loop: ClosedLoop, scheme: Sampled, counter: Any, state: Any, step: fl
 def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, str]:
     gains = {f"gain {n}": f"{v} {controller.gain_units[n]}" for n, v in controller.gains.items()}
     rest = {f.name: _text(getattr(controller, f.name)) for f in fields(controller) if f.name not in _TOLD}
-    found = {"fault": fault.name, "law": controller.title, "source": controller.source, **gains, **rest}
-    found |= {"scheme": scheme.name} | {name: str(value) for name, value in scheme.settings.items()}
-    return found | library_versions("quakedesign", "casadi")
+    facts = {"fault": fault.name, "law": controller.title, "source": controller.source, **gains, **rest}
+    facts |= {"scheme": scheme.name} | {name: str(value) for name, value in scheme.settings.items()}
+    return facts | library_versions("quakedesign", "casadi")
 
 
 def _text(value: Any) -> str:

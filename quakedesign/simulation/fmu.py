@@ -20,7 +20,7 @@ _BEFORE_ZIP = (1980, 1, 1, 0, 0, 0)  # the same bytes whenever it is written
 _PLATFORMS = {"Linux": ("linux64", "so"), "Darwin": ("darwin64", "dylib")}
 
 
-def model_unit(found: ControllerStep) -> tuple[bytes, str]:
+def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
     """Bytes of an FMU of a sampled step, and for which platform it holds a binary or why for none.
 
     Inputs are the measurement, the output ``pressure`` [Pa] is what is held since the last sample; the samples lie
@@ -28,7 +28,7 @@ def model_unit(found: ControllerStep) -> tuple[bytes, str]:
 
     Parameters
     ----------
-    found : ControllerStep
+    exported : ControllerStep
 
     Returns
     -------
@@ -39,10 +39,10 @@ def model_unit(found: ControllerStep) -> tuple[bytes, str]:
     Functional Mock-up Interface for Model Exchange and Co-Simulation, version 2.0.4, sections 2.2 and 4.
     """
     interface = files("quakedesign.simulation").joinpath("fmu.c").read_text(encoding="utf-8")
-    plain = {SOURCE: source_text(found, HEADER), "fmu.c": interface}
-    guid = f"{{{UUID(sha256(''.join([header_text(found), *plain.values()]).encode()).hexdigest()[:32])}}}"
-    sources = plain | {HEADER: f'#define CONTROLLER_GUID "{guid}"\n{header_text(found)}'}
-    members: dict[str, bytes] = {"modelDescription.xml": _description(found, guid)}
+    plain = {SOURCE: source_text(exported, HEADER), "fmu.c": interface}
+    guid = f"{{{UUID(sha256(''.join([header_text(exported), *plain.values()]).encode()).hexdigest()[:32])}}}"
+    sources = plain | {HEADER: f'#define CONTROLLER_GUID "{guid}"\n{header_text(exported)}'}
+    members: dict[str, bytes] = {"modelDescription.xml": _description(exported, guid)}
     members |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     binary, where = _binary(sources)
     return _zipped(members | binary), where
@@ -64,22 +64,22 @@ def _binary(sources: dict[str, str]) -> tuple[dict[str, bytes], str]:
     return {f"binaries/{name}/controller.{suffix}": data}, name
 
 
-def _description(found: ControllerStep, guid: str) -> bytes:
+def _description(exported: ControllerStep, guid: str) -> bytes:
     """``modelDescription.xml``."""
-    told = "; ".join(f"{name}: {value}" for name, value in found.facts.items())
+    told = "; ".join(f"{name}: {value}" for name, value in exported.facts.items())
     root = ET.Element("fmiModelDescription", fmiVersion="2.0", modelName="controller", guid=guid)
-    root.attrib |= {"description": told, "generationTool": f"quakedesign {found.facts['version_quakedesign']}"}
+    root.attrib |= {"description": told, "generationTool": f"quakedesign {exported.facts['version_quakedesign']}"}
     kind = {"modelIdentifier": "controller", "canHandleVariableCommunicationStepSize": "true"}
     kind |= {"canGetAndSetFMUstate": "true", "canNotUseMemoryManagementFunctions": "true"}
     listed = ET.SubElement(ET.SubElement(root, "CoSimulation", kind), "SourceFiles")
     for file in (SOURCE, "fmu.c"):
         ET.SubElement(listed, "File", name=file)
-    signals = dict(found.measurement) | {"pressure": "Pa"}
+    signals = dict(exported.measurement) | {"pressure": "Pa"}
     units = ET.SubElement(root, "UnitDefinitions")
     for unit in dict.fromkeys(signals.values()):
         ET.SubElement(ET.SubElement(units, "Unit", name=unit), "BaseUnit", _UNITS[unit])
     ET.SubElement(ET.SubElement(root, "LogCategories"), "Category", name="logStatusError")
-    ET.SubElement(root, "DefaultExperiment", startTime="0", stepSize=repr(found.step))
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stepSize=repr(exported.step))
     variables = ET.SubElement(root, "ModelVariables")
     for reference, (name, unit) in enumerate(signals.items()):
         is_output = name == "pressure"

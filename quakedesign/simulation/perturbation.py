@@ -44,10 +44,10 @@ def perturbation(text: str) -> "sp.Expr":
         raise _refusal(text, text) from None
     if sum(1 for _ in ast.walk(tree)) > MOST_NODES:
         raise ParameterError(f"a perturbation must be short, {MOST_NODES} terms at most. Received more. Shorten it.")
-    found = _value(tree.body, text.strip())
-    if not _real(found):
+    expression = _value(tree.body, text.strip())
+    if not _real(expression):
         raise _refusal(text, text)
-    return found
+    return expression
 
 
 def _real(expression: Any) -> bool:

@@ -99,11 +99,11 @@ class Resolution:
 
     def crossings(self, points: "Sequence[Point]", watched: int, level: float) -> list[float]:
         """Times [s] at which one variable rises through a level, by bisection and secants on the solver itself."""
-        found = []
+        times = []
         for (time, y), (later, after) in pairwise(points):
             if y[watched] < level <= after[watched]:
-                found.append(self._crossing((time, y), later, watched, level))
-        return found
+                times.append(self._crossing((time, y), later, watched, level))
+        return times
 
     def _crossing(self, start: "Point", later: float, watched: int, level: float) -> float:
         from scipy.optimize import brentq

@@ -65,10 +65,10 @@ def loop_class(plant: str) -> type[ClosedLoop]:
     ParameterError
         When there is none of that name.
     """
-    found = {kind.plant_name: kind for kind in (ClosedLoop, CoulombLoop)}
-    if plant not in found:
-        raise ParameterError(f"plant must be one of {', '.join(found)}. Received {plant!r}.")
-    return found[plant]
+    classes = {kind.plant_name: kind for kind in (ClosedLoop, CoulombLoop)}
+    if plant not in classes:
+        raise ParameterError(f"plant must be one of {', '.join(classes)}. Received {plant!r}.")
+    return classes[plant]
 
 
 def run(

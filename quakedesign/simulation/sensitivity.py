@@ -262,13 +262,13 @@ def _study(
 def _errors(run: "Trajectory", matched: bool) -> dict[str, float]:
     """Largest errors of a run; that of e3 from the instants that it keeps."""
     metrics, infinite = run.metrics, math.inf
-    found = {"slip_error": metrics.max_slip_error, "slip_rate_error": metrics.max_slip_rate_error}
+    errors = {"slip_error": metrics.max_slip_error, "slip_rate_error": metrics.max_slip_rate_error}
     if "diverged" in run.events:
-        return dict.fromkeys([*found, "matched_error"] if matched else found, infinite)
-    if None in found.values():
+        return dict.fromkeys([*errors, "matched_error"] if matched else errors, infinite)
+    if None in errors.values():
         raise SimulationError("a study needs runs that are longer than the time from which errors count.")
     if matched:
         settled = run.time > metrics.settled_from
         assert run.matched_perturbation is not None
-        found["matched_error"] = float(np.max(np.abs(run.integrals[0] + run.matched_perturbation)[settled]))
-    return {name: float(value) for name, value in found.items() if value is not None}
+        errors["matched_error"] = float(np.max(np.abs(run.integrals[0] + run.matched_perturbation)[settled]))
+    return {name: float(value) for name, value in errors.items() if value is not None}

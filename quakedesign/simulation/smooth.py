@@ -88,9 +88,9 @@ class Problem:
         _check(method, rtol)
         began, clock = float(times[0]), replace(load, start=load.start - float(times[0]))
         solve = self._resolved if method in adaptive_integrators() else self._stepped
-        found = solve(start, clock, times - began, every_step=every_step, method=method, rtol=rtol)
-        time = np.append(began + found.time[:-1], times[-1]) if every_step else times
-        return replace(found, time=time, crossings=began + found.crossings)
+        solution = solve(start, clock, times - began, every_step=every_step, method=method, rtol=rtol)
+        time = np.append(began + solution.time[:-1], times[-1]) if every_step else times
+        return replace(solution, time=time, crossings=began + solution.crossings)
 
     def _stepped(
         self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
@@ -98,7 +98,7 @@ class Problem:
         field, jacobian = self._bound(load)
         crossing = self._crossing()
         spans = [times] if every_step or method == "dop853" else [times[i : i + 2] for i in range(len(times) - 1)]
-        found: list[tuple[np.ndarray, np.ndarray]] = []
+        pieces: list[tuple[np.ndarray, np.ndarray]] = []
         crossed: list[np.ndarray] = []
         evaluations, y = 0, start
         for span in spans:
@@ -113,12 +113,12 @@ class Problem:
                 atol=rtol * self.scales,
                 **({"jac": jacobian} if method == "radau" else {}),
             )
-            found.append((part.t, part.y) if not found else (part.t[1:], part.y[:, 1:]))
+            pieces.append((part.t, part.y) if not pieces else (part.t[1:], part.y[:, 1:]))
             crossed.append(part.t_events[0])
             evaluations += part.nfev
             y = part.y[:, -1]
-        values = np.concatenate([v for _, v in found], axis=1)
-        return Solution(np.concatenate([t for t, _ in found]), values, np.concatenate(crossed), evaluations)
+        values = np.concatenate([v for _, v in pieces], axis=1)
+        return Solution(np.concatenate([t for t, _ in pieces]), values, np.concatenate(crossed), evaluations)
 
     def _resolved(
         self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float

@@ -230,8 +230,8 @@ def _reach_lines(reach: Reach) -> list[str]:
         return [said, "which is within 1e-4 of what no Lyapunov function can exceed"]
     if reach.beyond is None:
         return [said, "the search stopped there, as there seems to be no end"]
-    found = f"at {UpperBound(reach.beyond)} the search finds none of degree {degrees}"
-    return [said, found if reach.sharp else f"{found}; in between it is not known"]
+    beyond = f"at {UpperBound(reach.beyond)} the search finds none of degree {degrees}"
+    return [said, beyond if reach.sharp else f"{beyond}; in between it is not known"]
 
 
 def _limit_line(limit: Fraction | None) -> str:

@@ -73,23 +73,23 @@ class Entry:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None for what a report adds."""
-        found = self.design
+        design = self.design
         return {
             "guarantee": self.guarantee.sentence() if self.guarantee else None,
             "guaranteed": self.answer.to_dict() | {"certificate": None} if self.answer else None,
             "outcome": self.run.outcome.to_dict() if self.run else None,
-            "gains": {name: str(v) for name, v in found.gains.items()},
-            "verdict": str(found.verdict),
+            "gains": {name: str(v) for name, v in design.gains.items()},
+            "verdict": str(design.verdict),
             "certificate": None,
-            "premises": [p.to_dict() for p in found.premises],
-            "domain": found.domain.to_dict() if found.domain else None,
+            "premises": [p.to_dict() for p in design.premises],
+            "domain": design.domain.to_dict() if design.domain else None,
             "feedforward": {v.feedforward.name: v.to_dict() for v in self.variants},
             "headline": None,
             "largest_sampling_time": self.largest_step,
             "growth_per_step": self.growth_per_step,
             "held": self.held.to_dict() if self.held else None,
-            "peaks": {name: found.to_dict() for name, found in self.peaks.items()} or None,
-            "details": dict(found.details),
+            "peaks": {name: design.to_dict() for name, design in self.peaks.items()} or None,
+            "details": dict(design.details),
             "metrics": self.run.metrics.to_dict() if self.run else None,
             "events": dict(self.run.events) if self.run else None,
             "run": dict(self.run.provenance) if self.run else None,
@@ -130,10 +130,10 @@ def compared(
     for controller in published(fault.name).values() if with_published else ():
         tell(f"{controller.title} (published): verdict", 0.0)
         entries.append(_entry("published", assess(fault, controller), schemes, tell))
-    for found in designs:
-        entry = _entry("designed", found, schemes, tell)
+    for designed in designs:
+        entry = _entry("designed", designed, schemes, tell)
         tell(f"{entry.label}: worst cases", 0.0)
-        answer = replace(attacked(fault, found.guarantee), compensation=found.compensation)
+        answer = replace(attacked(fault, designed.guarantee), compensation=designed.compensation)
         entries.append(replace(entry, answer=answer))
     return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
 

@@ -91,14 +91,14 @@ def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, 
     differentiator = seen.differentiator
     noise = max((DEVIATIONS * s.deviation for s in seen.stages if isinstance(s, Transducer)), default=0.0)
     reached, diverged = largest_acceleration(fault, law, scheme=scheme, step=differentiator.step)
-    found = joint_condition(fault, law, differentiator, acceleration=reached, noise=noise)
+    condition = joint_condition(fault, law, differentiator, acceleration=reached, noise=noise)
     premise = Premise(
         name="differentiator",
-        required=found.required,
-        certified=found.certified,
+        required=condition.required,
+        certified=condition.certified,
         unit=f"m/s^{differentiator.order + 1}",
         measured=True,
-        note=_note(differentiator.order, reached, found),
+        note=_note(differentiator.order, reached, condition),
     )
     if diverged is None:
         return premise
@@ -108,12 +108,12 @@ def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, 
     return replace(premise, certified=0.0, proved=False, note=said)
 
 
-def _note(order: int, reached: float, found: JointCondition) -> str:
+def _note(order: int, reached: float, condition: JointCondition) -> str:
     if order > 1:
         return f"no λ_d bounds derivative {order + 1} of the slip: its derivative 2 jumps wherever a held pressure does"
     return (
         f"λ_d against |x1''| <= {reached:.3g} m/s² with exact states and what the errors of the estimates, "
-        f"{found.slip_error:.2g} m and {found.rate_error:.2g} m/s, add to it through the law"
+        f"{condition.slip_error:.2g} m and {condition.rate_error:.2g} m/s, add to it through the law"
     )
 
 

@@ -58,9 +58,9 @@ def export_answer(
     period = fault.sampling_time if step is None else step
     seen = sensor(period, EXACT, differentiator_bound, filter_order, order=differentiator_order, averaging=averaging)
     chosen = sampled_scheme(way, measurement=seen, **own)
-    found = export_controller(fault, law, folder, step=step, scheme=chosen, fmu=fmu, force=force)
+    exported = export_controller(fault, law, folder, step=step, scheme=chosen, fmu=fmu, force=force)
     premises = []
     if isinstance(seen, OutputFeedback):
         premises.append(differentiator_premise(fault, law, seen, scheme=chosen.name))
     files = [str(folder / name) for name in (FILES if fmu else FILES[:2])]
-    return found.to_dict() | {"files": files, "premises": [p.to_dict() for p in premises]}
+    return exported.to_dict() | {"files": files, "premises": [p.to_dict() for p in premises]}

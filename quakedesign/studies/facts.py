@@ -72,16 +72,16 @@ def beyond_rest(fault: Fault) -> str:
     return f", {fault.reference.target_slip / fault.rest_slip:.3g} times the rest slip: pressure has to hold it there"
 
 
-def sampling_sentence(found: SamplingAdequacy) -> str:
+def sampling_sentence(adequacy: SamplingAdequacy) -> str:
     """Whether T_s is short enough for the instability, and which one would be."""
-    if found.adequate_step is None:
-        return f"T_s = {found.step:.4g} s: nothing grows between two samples"
-    where = "over the uncertainty box" if found.over_box else "of the nominal fault"
-    longest = LowerBound(Fraction(found.adequate_step)).quantity("s")
-    judged = "is adequate" if found.adequate else "is TOO LONG for the instability"
+    if adequacy.adequate_step is None:
+        return f"T_s = {adequacy.step:.4g} s: nothing grows between two samples"
+    where = "over the uncertainty box" if adequacy.over_box else "of the nominal fault"
+    longest = LowerBound(Fraction(adequacy.adequate_step)).quantity("s")
+    judged = "is adequate" if adequacy.adequate else "is TOO LONG for the instability"
     return (
-        f"T_s = {found.step:.4g} s {judged}: times the unstable pole, {found.pole:.4g} 1/s {where}, it is "
-        f"{found.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
+        f"T_s = {adequacy.step:.4g} s {judged}: times the unstable pole, {adequacy.pole:.4g} 1/s {where}, it is "
+        f"{adequacy.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
     )
 
 

@@ -129,8 +129,8 @@ class Limits:
         last = float(self.largest_step.impossible_beyond or 10_000 * first)
         ratio = max(last / float(first), 100.0) ** (1 / _POINTS)
         steps = [Fraction(f"{float(first) * ratio**i:.4g}") for i in range(_POINTS + 1)]
-        found = [(step, smallest_peak(task, step)) for step in steps]
-        return [(step, peak.slip_rate_error) for step, peak in found if peak is not None]
+        peaks = [(step, smallest_peak(task, step)) for step in steps]
+        return [(step, peak.slip_rate_error) for step, peak in peaks if peak is not None]
 
 
 def limits(fault: Fault, *, pressure: float | None = None, diffusivity: float = 1.0, prove: bool = True) -> Limits:
@@ -205,5 +205,5 @@ def _proved_steps(task: Task, step: Fraction) -> tuple[Guarantee, ...]:
 
 
 def _proved_delay(task: Task, step: Fraction) -> LowerBound | None:
-    found = longest_delay(task, step)
-    return LowerBound(found.held.delay) if found else None
+    longest = longest_delay(task, step)
+    return LowerBound(longest.held.delay) if longest else None

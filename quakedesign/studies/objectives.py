@@ -42,8 +42,8 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
         T_s [s].
     """
     task = task_of(fault)
-    found = {"peak": design_held(task, step, objective="peak")}
-    found |= {f"tracking, {room:g} times the peak": design_held(task, step, room=room) for room in ROOMS}
+    designs = {"peak": design_held(task, step, objective="peak")}
+    designs |= {f"tracking, {room:g} times the peak": design_held(task, step, room=room) for room in ROOMS}
     length = min(_PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
     return tuple(
         FrontPoint(
@@ -51,6 +51,6 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
             guarantee=claim,
             run=simulate(fault, claim.held.controller, duration=max(length, float(step)), settled_from=length / 2),
         )
-        for name, claim in found.items()
+        for name, claim in designs.items()
         if isinstance(claim, Guarantee)
     )

@@ -33,8 +33,8 @@ def trajectory_premise(law: Controller, lipschitz: float | None, run: Trajectory
     if law.lipschitz_limit is None:
         return None
     limit = float(law.lipschitz_limit)
-    found = on_trajectory(limit if lipschitz is None else lipschitz, run)
-    if found is None or lipschitz is not None:
-        return found
-    said = f"{found.note}; no certificate is at hand, and none of these gains exceeds {limit:.4g} {found.unit}"
-    return replace(found, certified=0.0, proved=False, note=said)
+    premise = on_trajectory(limit if lipschitz is None else lipschitz, run)
+    if premise is None or lipschitz is not None:
+        return premise
+    said = f"{premise.note}; no certificate is at hand, and none of these gains exceeds {limit:.4g} {premise.unit}"
+    return replace(premise, certified=0.0, proved=False, note=said)

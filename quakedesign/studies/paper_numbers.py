@@ -33,11 +33,11 @@ def baseline(comparison: Compared) -> Entry | None:
 
 def relative(run: Trajectory | None, basis: Trajectory | None) -> dict[str, float | None]:
     """Metrics of the bars over those of another run [-]; None where one of the two has none or the other is zero."""
-    found: dict[str, float | None] = {}
+    ratios: dict[str, float | None] = {}
     for name in BARS:
         own, other = (getattr(r.metrics, name) if r else None for r in (run, basis))
-        found[name] = own / other if own is not None and other else None
-    return found
+        ratios[name] = own / other if own is not None and other else None
+    return ratios
 
 
 def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> list[dict[str, Any]]:
@@ -63,8 +63,8 @@ def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> li
 
 
 def _outcome(run: Trajectory) -> dict[str, Any]:
-    found = run.outcome
-    return {"outcome": found.kind, "share_of_natural": found.share_of_natural}
+    outcome = run.outcome
+    return {"outcome": outcome.kind, "share_of_natural": outcome.share_of_natural}
 
 
 def printed(comparison: Compared) -> list[dict[str, Any]]:
@@ -75,7 +75,7 @@ def printed(comparison: Compared) -> list[dict[str, Any]]:
     rows = []
     for said in data.get(comparison.fault.name, []):
         run = runs.get(said["run"])
-        found = getattr(run.metrics, said["metric"]) if run else None
-        ratio = found / said["printed"] if found is not None else None
-        rows.append({**said, "unit": run.metrics.unit(said["metric"]) if run else None, "found": found, "ratio": ratio})
+        value = getattr(run.metrics, said["metric"]) if run else None
+        ratio = value / said["printed"] if value is not None else None
+        rows.append({**said, "unit": run.metrics.unit(said["metric"]) if run else None, "found": value, "ratio": ratio})
     return rows

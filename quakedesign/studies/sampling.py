@@ -142,12 +142,12 @@ def sampling_report(
         ("designed" if design else "given", variant, tuple(schemes)) for variant in _variants(controller, scales)
     ]
     entries += [("published", known, PUBLISHED_SCHEMES) for known in published(fault.name).values()]
-    found = [
+    rows = [
         _row(fault, origin, variant, scheme, bound if origin != "published" else None, duration, tell)
         for origin, variant, chosen in entries
         for scheme in chosen
     ]
-    return SamplingReport(fault=fault, rows=tuple(found), studies=_studies(fault, controller, schemes, duration, tell))
+    return SamplingReport(fault=fault, rows=tuple(rows), studies=_studies(fault, controller, schemes, duration, tell))
 
 
 def _variants(controller: Controller, scales: Sequence[str]) -> list[Controller]:
@@ -177,18 +177,18 @@ def _studies(
 ) -> dict[str, Study]:
     task = fault.reference.operation_time
     window = (task if duration is None else duration) * SHARE
-    found = {}
+    studies = {}
     if law.scale is not None and not any(law.feedforward.coefficients.values()):
         tell("orders of accuracy", 0.0)
-        found["orders"] = orders(fault, law, schemes)
+        studies["orders"] = orders(fault, law, schemes)
     for i, of in enumerate(("slip_noise", "rate_noise")):
         tell(f"sensitivity to {of.replace('_', ' ')}", i / 3)
-        found[of] = noise_sensitivity(
+        studies[of] = noise_sensitivity(
             fault, law, levels=noise_levels(fault, of), of=of, schemes=schemes, duration=window
         )
     tell("sensitivity to the input gain", 2 / 3)
     box = fault if fault.box.authority else fault.with_box(UNCERTAIN)
-    return found | {"input_gain": gain_sensitivity(box, law, points=3, schemes=schemes, duration=duration)}
+    return studies | {"input_gain": gain_sensitivity(box, law, points=3, schemes=schemes, duration=duration)}
 
 
 def orders(fault: Fault, law: Controller, schemes: Sequence[str] = SCHEMES) -> Study:

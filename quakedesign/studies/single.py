@@ -115,10 +115,10 @@ def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> tuple[Contro
             )
         return known[name], None
     if gains in (DESIGNED, CONTINUOUS):
-        found = design(fault, name, continuous=gains == CONTINUOUS)
-        if found.controller is None:
+        designed = design(fault, name, continuous=gains == CONTINUOUS)
+        if designed.controller is None:
             raise ParameterError(f"no gains with a proof were found for {name} on {fault.name}. Give --gains.")
-        return found.controller, certified_bound(found)
+        return designed.controller, certified_bound(designed)
     return law.for_authority(gains, least_authority(fault)), None
 
 
@@ -186,10 +186,10 @@ def run_single(
 def _premises(fault: Fault, known: Choice, run: Trajectory, seen: Sensor, scheme: str) -> list[Premise]:
     """Premises that a run decides, or a differentiator needs."""
     law, bound = known.controller, known.lipschitz
-    found = [trajectory_premise(law, None if bound is None else float(bound), run)]
+    premises = [trajectory_premise(law, None if bound is None else float(bound), run)]
     if isinstance(seen, OutputFeedback):
-        found.append(differentiator_premise(fault, law, seen, scheme=scheme))
-    return [premise for premise in found if premise is not None]
+        premises.append(differentiator_premise(fault, law, seen, scheme=scheme))
+    return [premise for premise in premises if premise is not None]
 
 
 def _natural(fault: Fault, settings: dict[str, Any], around: dict[str, Any]) -> Trajectory:

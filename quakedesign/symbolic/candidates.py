@@ -22,15 +22,15 @@ def signed_monomials(weights: Mapping[str, int], degree: int, domain: str) -> tu
     tuple of Term
         With coefficient 1.
     """
-    found = []
+    terms = []
     for degrees in product(range(degree + 1), repeat=len(weights)):
         if sum(degrees) != degree:
             continue
         powers = [(s, Fraction(n, weights[s])) for s, n in zip(weights, degrees, strict=True) if n]
         for factors in _kinds(powers, domain):
             if sum(kind == "s" for _, _, kind in factors) % 2 == 0:
-                found.append(Term(Fraction(1), (), factors))
-    return tuple(found)
+                terms.append(Term(Fraction(1), (), factors))
+    return tuple(terms)
 
 
 def _kinds(powers: list[tuple[str, Fraction]], domain: str) -> Iterator[tuple[Factor, ...]]:

@@ -163,7 +163,7 @@ def as_data(
     """
     named = {str(s): sp.Rational(v.numerator, v.denominator) for s, v in parameters.items()}
     values = {s: named[s.name] for s in polynomial.free_symbols if s.name in named}
-    found: Polynomial = {}
+    data: Polynomial = {}
     for exponents, c in sp.Poly(sp.expand(polynomial.subs(values)), *variables).terms():
         if not c.is_Rational:
             raise CertificateError(
@@ -171,8 +171,8 @@ def as_data(
                 "where a root of k occurs."
             )
         if c:
-            found[tuple(int(n) for n in exponents)] = fraction_of(c)
-    return found
+            data[tuple(int(n) for n in exponents)] = fraction_of(c)
+    return data
 
 
 def _one_sign(polynomial: sp.Expr, variables: tuple[sp.Symbol, ...]) -> int:

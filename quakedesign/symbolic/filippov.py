@@ -48,11 +48,11 @@ class FilippovField:
         tagged = sp.Tuple(*(normal_form(rate) for rate in self.rates.values()))
         values = [substituted(SetValued(expression=r, intervals=self.intervals), dict(point)) for r in tagged]
         chosen = {s: ends for value in values for s, ends in value.intervals.items() if s in value.selections}
-        found = []
+        limits = []
         for ends in product(*chosen.values()):
             choice = dict(zip(chosen, ends, strict=True))
-            found.append(tuple(normal_form(value.expression.subs(choice)) for value in values))
-        return tuple(dict(zip(self.states, vertex, strict=True)) for vertex in dict.fromkeys(found))
+            limits.append(tuple(normal_form(value.expression.subs(choice)) for value in values))
+        return tuple(dict(zip(self.states, vertex, strict=True)) for vertex in dict.fromkeys(limits))
 
     def transformed(self, coordinates: Mapping[sp.Symbol, sp.Expr]) -> "FilippovField":
         """Return the field in new coordinates, each given by the states; the map is inverted by back-substitution.

@@ -72,7 +72,7 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
     exact = law.exact()
     courses = list(_courses(law, exact))
     low, high = exact.bounds
-    found = FrictionBounds(
+    bounds = FrictionBounds(
         least=-_confirmed(law, courses, "the lower of its bounds", -_declared(low), lambda c: [-c.friction]),
         most=_confirmed(law, courses, "the upper of its bounds", _declared(high), lambda c: [c.friction]),
         slip_slope=_confirmed(
@@ -83,12 +83,12 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
         ),
         weakens=all(upper_limit(c.slip_slope, c.box, _NOTHING, _NOTHING) == 0 for c in courses),
     )
-    if found.least <= 0:
+    if bounds.least <= 0:
         raise ParameterError(
-            f"friction of {law.name} must stay positive. Its lower bound is {float(found.least):.4g}. "
+            f"friction of {law.name} must stay positive. Its lower bound is {float(bounds.least):.4g}. "
             "Raise the residual friction; without friction a pressure has no effect."
         )
-    return found
+    return bounds
 
 
 def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_Course]:
@@ -115,11 +115,11 @@ def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_Course]:
 
 def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
     """Friction, if it has no jumps, which no slope would tell of."""
-    found = sp.sympify(friction)
-    signs = [power for power in found.atoms(SignedPower) if power.args[1] == 0]
-    if signs or found.has(sp.sign, sp.Heaviside, sp.DiracDelta):
+    continued = sp.sympify(friction)
+    signs = [power for power in continued.atoms(SignedPower) if power.args[1] == 0]
+    if signs or continued.has(sp.sign, sp.Heaviside, sp.DiracDelta):
         raise UnsupportedError(f"nothing can be proved with {law.name}, whose friction may jump. Write a steep ramp.")
-    return found
+    return continued
 
 
 def _confirmed(
@@ -130,7 +130,7 @@ def _confirmed(
     parts: Callable[[_Course], list[sp.Expr]],
 ) -> Fraction:
     """A bound that a law declares, if none of the parts exceeds it."""
-    found = declared
+    bound = declared
     for course in courses:
         for part in parts(course):
             try:
@@ -141,8 +141,8 @@ def _confirmed(
                 raise ParameterError(_disagreement(law, what, declared, answer))
             if isinstance(answer, Undecided):
                 raise UnsupportedError(_undecided(law, what, declared, answer))
-            found = max(found, answer)
-    return found
+            bound = max(bound, answer)
+    return bound
 
 
 def _disagreement(law: FrictionLaw, what: str, declared: Fraction, answer: Excess) -> str:

@@ -198,23 +198,23 @@ def _decided(components: Mapping[Any, Any], weights: Mapping[Any, Any], degree: 
 
 def _degrees(dilated: sp.Expr) -> set[sp.Rational] | None:
     """Exponents of ε in the terms of a sum; None where ε is not a factor."""
-    found = set()
+    degrees = set()
     for term in sp.Add.make_args(dilated) if dilated != 0 else ():
         power = term.as_independent(epsilon, as_Add=False)[1]
         base, exponent = power.as_base_exp()
         if power != 1 and (base != epsilon or not exponent.is_Rational):
             return None
-        found.add(sp.Integer(0) if power == 1 else exponent)
-    return found
+        degrees.add(sp.Integer(0) if power == 1 else exponent)
+    return degrees
 
 
 def _switching(components: Mapping[Any, Any], weights: Mapping[Any, Any]) -> tuple[tuple[sp.Expr, sp.Rational], ...]:
-    found = dict[sp.Expr, sp.Rational]()
+    switches = dict[sp.Expr, sp.Rational]()
     for e in components.values():
         for argument in FilippovField(rates={epsilon: e}).switching:
             degrees = _degrees(dilate(argument, weights)) or {sp.Integer(0)}
-            found[argument] = max(degrees)
-    return tuple(found.items())
+            switches[argument] = max(degrees)
+    return tuple(switches.items())
 
 
 def _claims(
@@ -242,16 +242,16 @@ def _search(identity: Identity, meaning: str, weights: Mapping[Any, Any]) -> Cou
     values = [sp.Integer(n) for n in (1, -1, 2, 0, -3)]
     for chosen in islice(product(values, repeat=len(states)), _TRIES):
         point = dict(zip(states, chosen, strict=True)) | primes
-        found = Counterexample(identity=identity, meaning=meaning, point=point, epsilon=sp.Integer(2))
-        if not _on_a_switch(found) and found.holds:
-            return found
+        counterexample = Counterexample(identity=identity, meaning=meaning, point=point, epsilon=sp.Integer(2))
+        if not _on_a_switch(counterexample) and counterexample.holds:
+            return counterexample
     return None
 
 
-def _on_a_switch(found: Counterexample) -> bool:
+def _on_a_switch(counterexample: Counterexample) -> bool:
     """Whether a sign has no single value there; the values then say nothing about the sets."""
-    at = {**found.point, epsilon: found.epsilon}
-    both = sp.Tuple(found.identity.left, found.identity.right)
+    at = {**counterexample.point, epsilon: counterexample.epsilon}
+    both = sp.Tuple(counterexample.identity.left, counterexample.identity.right)
     return not all(_differ(argument.subs(at, simultaneous=True), sp.Integer(0)) for argument in signs(both))
 
 

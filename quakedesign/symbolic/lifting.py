@@ -77,11 +77,11 @@ def is_zero_on_cells(expression: sp.Expr, states: tuple[sp.Symbol, ...]) -> bool
 
 def _exponents(source: sp.Expr, states: tuple[sp.Symbol, ...]) -> dict[sp.Expr, set[sp.Rational]]:
     """Exponents with which every sum P occurs inside a power."""
-    found = dict[sp.Expr, set[sp.Rational]]()
+    exponents = dict[sp.Expr, set[sp.Rational]]()
     for power in sp.preorder_traversal(source):
         if (_is_power(power) or _is_root(power)) and power.has(*states) and power.args[0] not in states:
-            found.setdefault(power.args[0], set()).add(power.args[1])
-    return found
+            exponents.setdefault(power.args[0], set()).add(power.args[1])
+    return exponents
 
 
 class _Lifting:

@@ -60,7 +60,7 @@ def slope_symbols(names: tuple[str, ...] = ()) -> dict[sp.Expr, sp.Symbol]:
     """Real symbol of every slope of friction and of the state rates, by its derivative."""
     states = state_symbols(names)
     tags = ["x_1", "v", *names]
-    found = dict(
+    slopes = dict(
         zip(
             (_friction(names).diff(x) for x in (plant.x1, rate, *states)),
             (plant.slip_slope, plant.rate_slope, *sp.symbols([rf"\mu_{{{n}}}" for n in names], real=True)),
@@ -69,8 +69,8 @@ def slope_symbols(names: tuple[str, ...] = ()) -> dict[sp.Expr, sp.Symbol]:
     )
     for name, g in zip(names, _state_rates(names), strict=True):
         for tag, x in zip(tags, (plant.x1, rate, *states), strict=True):
-            found[g.diff(x)] = sp.Symbol(rf"g_{{{name}\,{tag}}}", real=True)
-    return found
+            slopes[g.diff(x)] = sp.Symbol(rf"g_{{{name}\,{tag}}}", real=True)
+    return slopes
 
 
 @kept
@@ -130,8 +130,8 @@ def stability_conditions(names: tuple[str, ...] = (), *, inertia: bool = True) -
     n = len(a) - 1
     hurwitz = sp.Matrix(n, n, lambda i, j: a[2 * j - i + 1] if 0 <= 2 * j - i + 1 <= n else 0)
     minors = [sp.expand(hurwitz[:i, :i].det(method="berkowitz")) for i in range(1, n)]
-    found = [*([] if inertia else [a[0]]), *minors, a[-1]]
-    return tuple(f for i, f in enumerate(found) if f not in found[:i])
+    conditions = [*([] if inertia else [a[0]]), *minors, a[-1]]
+    return tuple(f for i, f in enumerate(conditions) if f not in conditions[:i])
 
 
 def _absent(law: FrictionLaw) -> dict[sp.Symbol, sp.Expr]:
@@ -180,12 +180,12 @@ def instability(law: FrictionLaw, *, inertia: bool = True) -> sp.Basic:
 
     Conditions that hold for all positive parameters and σ' > p are left out.
     """
-    found = []
+    parts = []
     for condition in stability_conditions(law.state_names, inertia=inertia):
         expression = condition.subs(_absent(law))
         if not _positive(_inserted(expression, law)):
-            found.append(_solved(expression, law))
-    return sp.Or(*found)
+            parts.append(_solved(expression, law))
+    return sp.Or(*parts)
 
 
 def _solved(expression: sp.Expr, law: FrictionLaw) -> sp.Basic:

@@ -48,11 +48,11 @@ def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ..
 def collected(terms: Iterable[Term], states: Sequence[str]) -> tuple[Term, ...]:
     """Sum with equal products collected, in a fixed order: parameters by name, factors in the order of their states."""
     order = {state: i for i, state in enumerate(states)}
-    found: dict[tuple[tuple[str, ...], tuple[Factor, ...]], Fraction] = {}
+    coefficients: dict[tuple[tuple[str, ...], tuple[Factor, ...]], Fraction] = {}
     for term in terms:
         key = (tuple(sorted(term.parameters)), tuple(sorted(term.factors, key=lambda factor: order[factor[0]])))
-        found[key] = found[key] + term.coefficient if key in found else term.coefficient
-    return tuple(sorted(Term(c, *key) for key, c in found.items() if c))
+        coefficients[key] = coefficients[key] + term.coefficient if key in coefficients else term.coefficient
+    return tuple(sorted(Term(c, *key) for key, c in coefficients.items() if c))
 
 
 def without_nesting(
@@ -88,8 +88,8 @@ def without_nesting(
             return e.func(lifts[argument], e.args[1])
         return e.func(*(walk(a) for a in e.args))
 
-    found = [walk(sp.sympify(e)) for e in expressions]
-    return {symbol: argument for argument, symbol in lifts.items()}, found
+    plain = [walk(sp.sympify(e)) for e in expressions]
+    return {symbol: argument for argument, symbol in lifts.items()}, plain
 
 
 def _split(part: sp.Expr, states: Container[sp.Symbol]) -> Term:
@@ -122,11 +122,11 @@ def _power(base: sp.Expr, power: sp.Expr, states: Container[sp.Symbol]) -> Facto
 
 def multiplied(factors: Iterable[Factor]) -> tuple[Factor, ...]:
     """Product of signed powers with every state once; ⌈x⌋⁰ is its sign, |x|⁰ is left out."""
-    found: dict[str, tuple[Fraction, bool]] = {}
+    powers: dict[str, tuple[Fraction, bool]] = {}
     for state, exponent, kind in factors:
-        power, odd = found.get(state, (Fraction(0), False))
-        found[state] = power + exponent, odd != (kind == "s")
-    return tuple((state, a, "s" if odd else "a") for state, (a, odd) in found.items() if a or odd)
+        power, odd = powers.get(state, (Fraction(0), False))
+        powers[state] = power + exponent, odd != (kind == "s")
+    return tuple((state, a, "s" if odd else "a") for state, (a, odd) in powers.items() if a or odd)
 
 
 def from_terms(terms: Iterable[Term], symbols: Mapping[str, sp.Symbol]) -> sp.Expr:

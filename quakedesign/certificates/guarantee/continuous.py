@@ -46,8 +46,8 @@ class ContinuousPeaks:
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
-        found = self.bounds()
-        proved = isinstance(found, Bounds) and self.claims.covers(Claims.of(self.task, found))
+        bounds = self.bounds()
+        proved = isinstance(bounds, Bounds) and self.claims.covers(Claims.of(self.task, bounds))
         return Verdict.PROVED if proved else Verdict.UNDECIDED
 
     def to_dict(self) -> dict[str, Any]:
@@ -68,10 +68,10 @@ def continuous_peaks(task: Task, law: ContinuousLaw) -> ContinuousPeaks | NoGuar
     ParameterError
         For a law that leaves an error under a constant pressure at rest.
     """
-    found = _bounds(task, law)
-    if isinstance(found, NoGuarantee):
-        return found
-    return ContinuousPeaks(task=task, law=law, claims=Claims.of(task, found).rounded())
+    bounds = _bounds(task, law)
+    if isinstance(bounds, NoGuarantee):
+        return bounds
+    return ContinuousPeaks(task=task, law=law, claims=Claims.of(task, bounds).rounded())
 
 
 def _loop(task: Task, law: ContinuousLaw) -> PeriodicLoop:

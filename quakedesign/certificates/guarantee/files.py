@@ -151,9 +151,9 @@ def _task(raw: dict[str, Any]) -> Task:
 def _slow_gain(raw: Any, task: Task) -> SlowGain:
     with_keys(raw, {"parts", "growth"})
     need(type(raw["parts"]) is int, "parts must be an integer")
-    found = SlowGain(parts=raw["parts"], growth=read_rational(raw["growth"]))
-    found.models(task)
-    return found
+    slow_gain = SlowGain(parts=raw["parts"], growth=read_rational(raw["growth"]))
+    slow_gain.models(task)
+    return slow_gain
 
 
 def _held(raw: Any) -> Held:

@@ -65,14 +65,14 @@ def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     with ctx.workprec(_BITS):
         flow = matrix(loop.flow)
         rows = matrix(tuple(loop.outputs.values()))
-        found: dict[tuple[str, str], tuple[Fraction, ...]] = {}
+        bounds: dict[tuple[str, str], tuple[Fraction, ...]] = {}
         flows, earlier = ([Flow.of(flow, part, past=past) for part in loop.segments] for past in (False, True))
         for name in (*loop.inputs, *loop.sampled, *loop.fading):
             gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name)), rows)
-            found |= {
+            bounds |= {
                 (output, name): tuple(map(upper, worst)) for output, worst in zip(loop.outputs, gains, strict=True)
             }
-        return found
+        return bounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +123,7 @@ class _Past:
 def _gains(parts: list[Response], past: _Past, outputs: Any) -> list[list[Any]]:
     """Bounds for every output, on every piece of every segment."""
     size, count = outputs.ncols(), outputs.nrows()
-    found: list[list[Any]] = [[] for _ in range(count)]
+    gains: list[list[Any]] = [[] for _ in range(count)]
     for number, part in enumerate(parts):
         flow = part.of
         phases = list(accumulate(flow.steps, mul, initial=outputs))
@@ -135,8 +135,8 @@ def _gains(parts: list[Response], past: _Past, outputs: Any) -> list[list[Any]]:
             for i, (start, end, more) in enumerate(part.since_jump(row)):
                 bent = (absolute(phases[i] * flow.square) * flow.within[i] * units)[k, 0]
                 larger = (before[i * count + k] + start).max(before[(i + 1) * count + k] + end)
-                found[k].append(larger + more + bent * flow.chord(i))
-    return found
+                gains[k].append(larger + more + bent * flow.chord(i))
+    return gains
 
 
 def _as_column(values: list[Any]) -> Any:

@@ -46,8 +46,8 @@ def worst_errors(differentiator: Differentiator, noise: float = 0.0) -> tuple[fl
 @lru_cache(maxsize=64)
 def constants(unit: Differentiator, noisy: bool) -> tuple[float, ...]:
     """c_0 … c_nd of a differentiator with λ_d = T = 1, without and, if noisy, also with dominating noise."""
-    found = [_errors(unit, scale) / _orders(unit, scale) for scale in ((1.0, STRETCH) if noisy else (1.0,))]
-    return tuple(float(max(column)) for column in zip(*found, strict=True))
+    ratios = [_errors(unit, scale) / _orders(unit, scale) for scale in ((1.0, STRETCH) if noisy else (1.0,))]
+    return tuple(float(max(column)) for column in zip(*ratios, strict=True))
 
 
 def _orders(unit: Differentiator, scale: float) -> "np.ndarray":

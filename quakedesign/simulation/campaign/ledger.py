@@ -46,8 +46,8 @@ def differences(one: Any, other: Any, name: str = "") -> list[str]:
     """Names of the entries in which two plain values differ, nested ones with dots."""
     if isinstance(one, dict) and isinstance(other, dict):
         keys = [*one, *(key for key in other if key not in one)]
-        found = (differences(one.get(key), other.get(key), f"{name}.{key}".strip(".")) for key in keys)
-        return [entry for part in found for entry in part]
+        every = (differences(one.get(key), other.get(key), f"{name}.{key}".strip(".")) for key in keys)
+        return [entry for part in every for entry in part]
     return [] if one == other else [name]
 
 
@@ -148,11 +148,11 @@ class Ledger:
         SimulationError
             When there is a file of another campaign.
         """
-        found: dict[bytes, np.ndarray] = {}
+        records: dict[bytes, np.ndarray] = {}
         for path in sorted((self.folder / BATCHES).glob("[!.]*.npz")):
             for start, end in self._pairs(path):
-                found[start.tobytes()] = end
-        return found
+                records[start.tobytes()] = end
+        return records
 
     def _pairs(self, path: Path) -> "list[tuple[np.ndarray, np.ndarray]]":
         try:

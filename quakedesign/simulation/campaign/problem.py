@@ -197,7 +197,7 @@ class Problem:
 
     def _result(self, end: Any) -> SampleResult:
         watched = self._watched.watched(end)
-        found = metrics(
+        measured = metrics(
             watched,
             controlled=self.controller is not None,
             step=self.setting.step,
@@ -207,7 +207,7 @@ class Problem:
             sticks=self._watched.loop.sticks,
             further=self._watched.scheme.described,
         ).to_dict()
-        figures = {name: value for name, value in found.items() if value is not None and name not in _NOT_COMPARED}
+        figures = {name: value for name, value in measured.items() if value is not None and name not in _NOT_COMPARED}
         return SampleResult(figures=figures, events=events(watched))
 
     def trajectory(self, sample: Sample, samples: int) -> Trajectory:

@@ -102,9 +102,9 @@ class Campaign:
 
     def _quantiles(self, metric: str, levels: Sequence[float]) -> dict[str, float | None]:
         way = -1 if metric in _LESS_IS_WORSE else 1
-        found = sorted(way * value for value in self.values(metric).tolist() if not math.isnan(value))
-        places = {level: min(len(found) - 1, max(0, math.ceil(level * len(found)) - 1)) for level in levels}
-        return {f"{level:g}": _finite(way * found[place]) for level, place in places.items()}
+        ordered = sorted(way * value for value in self.values(metric).tolist() if not math.isnan(value))
+        places = {level: min(len(ordered) - 1, max(0, math.ceil(level * len(ordered)) - 1)) for level in levels}
+        return {f"{level:g}": _finite(way * ordered[place]) for level, place in places.items()}
 
     def worst(self, metric: str, count: int = SHOWN) -> list[int]:
         """Indices of the worst samples by one metric, the worst first, diverged ones before all others."""

@@ -45,13 +45,13 @@ def corners(space: Space) -> list[Point]:
 
 def neighbours(space: Space, centre: Point, span: float) -> list[Point]:
     """Points beside a centre, one coordinate changed by a span, inside the box."""
-    found = []
+    points = []
     for i in space.active:
         for moved in (centre[i] - span, centre[i] + span):
             value = moved % 1.0 if i in space.periodic else min(1.0, max(0.0, moved))
             if value != centre[i]:
-                found.append((*centre[:i], value, *centre[i + 1 :]))
-    return found
+                points.append((*centre[:i], value, *centre[i + 1 :]))
+    return points
 
 
 def search(

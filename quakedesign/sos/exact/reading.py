@@ -54,17 +54,17 @@ def _whole(exponent: Any) -> Any:
 
 
 def _names(inputs: Sequence[Any]) -> tuple[str, ...]:
-    found: dict[str, None] = {}
+    names: dict[str, None] = {}
     for one in inputs:
         if isinstance(one, str):
-            found |= dict.fromkeys(text.names(one))
+            names |= dict.fromkeys(text.names(one))
         elif hasattr(one, "free_symbols"):
-            found |= dict.fromkeys(sorted(s.name for s in one.free_symbols))
+            names |= dict.fromkeys(sorted(s.name for s in one.free_symbols))
         elif isinstance(one, Mapping):
             raise PolynomialError(
                 "a polynomial given by its exponents needs its variables. Received none. Give variables=('x', 'y')."
             )
-    return tuple(found) or ("x",)
+    return tuple(names) or ("x",)
 
 
 def _polynomial(given: Any, names: tuple[str, ...]) -> dict[Exponents, Fraction]:

@@ -97,12 +97,12 @@ def _forget(weight: Polynomial, k: int, gone: Exponents, basis: Any, others: Any
 def reach(statement: Statement) -> set[Exponents]:
     """Monomials to which a multiple of an equality may contribute."""
     size = len(statement.variables)
-    found = set[Exponents]()
+    reachable = set[Exponents]()
     for h in statement.equalities:
         spend(comb(size + max(statement.degree - degree(h), 0), size) * len(h))
         for m in monomials(size, statement.degree - degree(h)):
-            found.update(times(m, e) for e in h)
-    return found
+            reachable.update(times(m, e) for e in h)
+    return reachable
 
 
 def parity_classes(statement: Statement, basis: tuple[Exponents, ...]) -> list[tuple[int, ...]]:

@@ -131,12 +131,12 @@ def _tokens(text: str) -> list[Token]:
 def _scan(text: str) -> Iterator[Token]:
     place = _blank(text, 0)
     while place < len(text):
-        found = _TOKEN.match(text, place)
-        if found is None:
+        match = _TOKEN.match(text, place)
+        if match is None:
             remedy = "Use numbers, names, + - * / ^ ** and parentheses."
             refuse(text, Token("other", text[place], place), "a number, a name or an operator", remedy)
-        yield Token(str(found.lastgroup), _SAME.get(found[0], found[0]), place)
-        place = _blank(text, found.end())
+        yield Token(str(match.lastgroup), _SAME.get(match[0], match[0]), place)
+        place = _blank(text, match.end())
 
 
 def _blank(text: str, place: int) -> int:

@@ -45,9 +45,9 @@ def handing_back() -> bool:
 
 def hand_back(problem: Any) -> None:
     """Note a problem that is about to be solved."""
-    found = _handed.get()
-    if found is not None:
-        found.setdefault(id(problem), problem)
+    handed = _handed.get()
+    if handed is not None:
+        handed.setdefault(id(problem), problem)
 
 
 def solve(problem: Any, **chosen: Any) -> bool:
@@ -103,8 +103,8 @@ class Compiled:
         self.solver_seconds = answer.solve_time
         if not useful(answer):
             return False
-        found = {name: getattr(answer, name) for name in ("x", "z", "obj_val", "solve_time", "iterations")}
-        self.problem.unpack_results(SimpleNamespace(status="Solved", **found), chain, inverse)
+        fields = {name: getattr(answer, name) for name in ("x", "z", "obj_val", "solve_time", "iterations")}
+        self.problem.unpack_results(SimpleNamespace(status="Solved", **fields), chain, inverse)
         return True
 
 

@@ -51,24 +51,24 @@ class Search:
         """Checked proof, or None."""
         solution, program = self._solve(self.blocks)
         if solution is not None and (solution.margin > 0 or self._determined()):
-            found = self._finish(rounded(self.statement, self.blocks, solution))
-            if found is not None:
-                return found
+            proof = self._finish(rounded(self.statement, self.blocks, solution))
+            if proof is not None:
+                return proof
         candidates = list(local_minima(self.statement, self._hints(solution)))
         point = negative_point(self.statement, candidates, self.units)
         if point is not None:
             return self._finish(point)
-        found = self._outside(program)
-        if found is not None:
-            return found
+        proof = self._outside(program)
+        if proof is not None:
+            return proof
         if solution is not None and solution.margin < -_STRICT and program is not None:
-            found = self._refute(program, solution)
-            if found is not None:
-                return found
-        found = self._on_faces(candidates, solution)
-        if found is None and solution is not None and solution.margin < 0 and program is not None:
-            found = self._refute(program, solution)
-        return found
+            proof = self._refute(program, solution)
+            if proof is not None:
+                return proof
+        proof = self._on_faces(candidates, solution)
+        if proof is None and solution is not None and solution.margin < 0 and program is not None:
+            proof = self._refute(program, solution)
+        return proof
 
     def _determined(self) -> bool:
         """Whether the target fixes the Gram matrices, so that exact arithmetic alone decides."""
@@ -124,8 +124,8 @@ class Search:
 
     def _refute(self, program: MomentProgram, solution: Solution) -> Proof | None:
         target = {e: float(c) for e, c in self.statement.target.items()}
-        found = program.interior(target, solution.margin / 2)
-        for values in (found, solution.functional) if found is not None else (solution.functional,):
+        interior = program.interior(target, solution.margin / 2)
+        for values in (interior, solution.functional) if interior is not None else (solution.functional,):
             for bits in (6, 10, 14, 18, 22, 26, 32, 40):
                 proof = Functional(values=self._consistent(values, bits))
                 if holds(self.statement, proof):
@@ -145,9 +145,9 @@ class Search:
         blocks = at_zeros(self.blocks, zeros) if zeros else self.blocks
         for accuracy in _ACCURACIES:
             for threshold, tolerance in KERNELS:
-                found = self._descend(blocks, threshold, tolerance, accuracy)
-                if found is not None:
-                    return found
+                proof = self._descend(blocks, threshold, tolerance, accuracy)
+                if proof is not None:
+                    return proof
         smaller = at_real_zeros(blocks, polished_zeros(self.statement, candidates), self.units)
         return self._descend(smaller, *KERNELS[0], _ACCURACIES[0]) if smaller != blocks else None
 
@@ -157,9 +157,9 @@ class Search:
             if solution is None:
                 return None
             if solution.margin > 1e-9:
-                found = self._finish(rounded(self.statement, blocks, solution))
-                if found is not None:
-                    return found
+                proof = self._finish(rounded(self.statement, blocks, solution))
+                if proof is not None:
+                    return proof
             smaller = at_kernels(blocks, solution.grams, threshold, tolerance, self.units)
             if smaller is None:
                 return None
@@ -190,14 +190,14 @@ def strict_proof(asked: Statement) -> SumOfSquares | None:
 
 def initial_blocks(statement: Statement) -> list[Block]:
     """Blocks after the exact reduction, split by sign symmetry; among forms only squares of the target's degree."""
-    found = []
+    blocks = []
     graded = statement.graded
     for chosen, weight, basis in zip(statement.products, statement.weights, reduced_bases(statement), strict=True):
         if graded:
             basis = tuple(b for b in basis if 2 * sum(b) + degree(weight) == statement.degree)
         for part in parity_classes(statement, basis):
-            found.append(Block(product=chosen, weight=weight, monomials=tuple(basis[i] for i in part)))
-    return found
+            blocks.append(Block(product=chosen, weight=weight, monomials=tuple(basis[i] for i in part)))
+    return blocks
 
 
 def block_sizes(statement: Statement) -> dict[str, list[int]]:

@@ -87,10 +87,10 @@ class Proposal:
 def joint_program(demands: Sequence[Demand]) -> "JointProgram":
     """The programme of the structure that demands have, kept from the last time that it was asked for."""
     key = len(demands[0].parts), *(_structure(d.template) for d in demands)
-    found = _known.pop(key, None) or JointProgram(demands)
+    program = _known.pop(key, None) or JointProgram(demands)
     if len(_known) >= _KEPT:
         _known.pop(next(iter(_known)), None)
-    return _known.setdefault(key, found)
+    return _known.setdefault(key, program)
 
 
 def _structure(template: Statement) -> tuple[Any, ...]:

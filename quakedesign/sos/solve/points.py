@@ -23,16 +23,16 @@ _SIMPLE = (Fraction(0), Fraction(1), Fraction(-1), Fraction(1, 2), Fraction(2))
 def polished_zeros(statement: Statement, candidates: Sequence[Sequence[float]]) -> list[list[float]]:
     """Candidates where the polynomial nearly vanishes, after Newton steps on its gradient; different ones only."""
     p = Arrays(statement.polynomial, len(statement.variables))
-    found: list[list[float]] = []
+    zeros: list[list[float]] = []
     for x in candidates:
         near = np.asarray(x, dtype=float)
         if abs(p(near)) > 1e-9 * (1 + np.abs(near).max()) ** degree(statement.polynomial):
             continue
         for _ in range(6):
             near = near - np.linalg.lstsq(p.hessian(near), p.gradient(near), rcond=1e-7)[0]
-        if np.all(np.isfinite(near)) and all(np.abs(near - z).max() > 1e-6 for z in found):
-            found.append(near.tolist())
-    return found
+        if np.all(np.isfinite(near)) and all(np.abs(near - z).max() > 1e-6 for z in zeros):
+            zeros.append(near.tolist())
+    return zeros
 
 
 def local_minima(
@@ -191,18 +191,18 @@ def rational_zeros(
     statement: Statement, candidates: Sequence[Sequence[float]], scale: Sequence[Fraction]
 ) -> list[tuple[Fraction, ...]]:
     """Different rational points of the set among the candidates where the polynomial vanishes exactly."""
-    found = dict[tuple[Fraction, ...], None]()
+    points = dict[tuple[Fraction, ...], None]()
     for x in candidates:
         for lead in _leads(statement, x):
             for tolerance in (1e-3, 1e-5, 1e-7):
                 point = rationalised([v / lead for v in x] if lead else list(x), scale, tolerance)
                 if any(point) and _vanishes(statement, point):
-                    found[point] = None
+                    points[point] = None
                     break
             else:
                 continue
             break
-    return list(found)
+    return list(points)
 
 
 def _vanishes(statement: Statement, point: tuple[Fraction, ...]) -> bool:

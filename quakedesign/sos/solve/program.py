@@ -156,9 +156,9 @@ class Program:
         within = Compiled(cp.Problem(cp.Maximize(margin), [*self._constraints(margin), margin <= 1, *wanted]))
         for room in (share * max(1.0, abs(best)) for share in _ROOM):
             least.value = best - room
-            found = self._rounded(best, room) if within.solve() and within.problem.value >= 1e-11 else None
-            if found is not None:
-                return found
+            solution = self._rounded(best, room) if within.solve() and within.problem.value >= 1e-11 else None
+            if solution is not None:
+                return solution
         return None
 
     def _rounded(self, best: float, room: float) -> Solution | None:
@@ -184,10 +184,10 @@ class Program:
         answers = []
         for parts, template in self._required:
             polynomial = combination(zip((Fraction(1), *values), parts, strict=True))
-            found = decide(_with_polynomial(template, polynomial))
-            if found.verdict is not Positivity.SOS:
+            answer = decide(_with_polynomial(template, polynomial))
+            if answer.verdict is not Positivity.SOS:
                 return None
-            answers.append(found)
+            answers.append(answer)
         return tuple(answers)
 
     def _constraints(self, margin: Any) -> list[Any]:
@@ -303,12 +303,12 @@ def _membership(vector: Any, parts: Sequence[Mapping[Any, Any]], template: State
 
 
 def _map(block: Block) -> list[tuple[Exponents, int, int, float]]:
-    found = []
+    entries = []
     for i, left in enumerate(block.monomials):
         for j, right in enumerate(block.monomials):
             for e, c in block.weight.items():
-                found.append((times(times(left, right), e), i, j, float(c)))
-    return found
+                entries.append((times(times(left, right), e), i, j, float(c)))
+    return entries
 
 
 def _sparse(entries: Any, index: Mapping[Exponents, int], size: int) -> Any:

@@ -197,10 +197,10 @@ def axis(low: Number, high: Number, points: int, what: str = "range") -> tuple[F
 
 def _levels(subject: Subject, loop: Loop, levels: Sequence[Number] | None) -> tuple[Fraction, ...]:
     if levels is not None:
-        found = tuple(sorted({rational(v, "lipschitz") for v in levels}))
-        if not found or found[0] < 0:
+        ordered = tuple(sorted({rational(v, "lipschitz") for v in levels}))
+        if not ordered or ordered[0] < 0:
             raise ParameterError(f"lipschitz must not be negative. Received {', '.join(map(str, levels)) or 'none'}.")
-        return found
+        return ordered
     limit = necessary_limit(loop, subject)
     if not limit:
         raise ParameterError("levels of L̄ are needed, since the base gains give no limit. Give --lipschitz.")

@@ -194,12 +194,12 @@ def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
     """Bound on |d| from which on nothing can be proved of these gains, known from the law or a refuting equilibrium."""
     chosen = None if isinstance(subject, LoopField) else law(subject) if isinstance(subject, str) else subject
     limit = chosen(gains=dict(loop.gains)).lipschitz_limit if chosen is not None else None
-    found = [] if limit is None else [max(Fraction(0), limit)]
+    limits = [] if limit is None else [max(Fraction(0), limit)]
     for bound in (Fraction(0), max(_FAR, 4 * _reachable(loop))):
         held = refute(replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), subject)
         if held is not None and held.refutation is not None:
-            found.append(abs(held.refutation.parameters["d"]))
-    return min(found, default=None)
+            limits.append(abs(held.refutation.parameters["d"]))
+    return min(limits, default=None)
 
 
 def against(loop: Loop, subject: Subject) -> tuple[str, Certificate | None]:
@@ -227,10 +227,10 @@ def _reach(line: _Line, subject: Subject, degrees: tuple[int, ...], began: float
     for tried in degrees if line.limit != 0 else ():
         search = _Search(line, subject, tried)
         bracket = search.above(value)
-        found = search.proved(bracket) if bracket.low is not None else None
+        proof = search.proved(bracket) if bracket.low is not None else None
         solves += search.sweep.solves
-        if found is not None:
-            (value, certificate), degree = found, tried
+        if proof is not None:
+            (value, certificate), degree = proof, tried
         beyond = max((end for end in (beyond, bracket.high) if end is not None), default=None)
         if value is not None and line.limit is not None and line.limit <= value * (1 + TOLERANCE):
             beyond = None

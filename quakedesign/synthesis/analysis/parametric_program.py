@@ -134,11 +134,11 @@ class Sweep:
         if not self.covers(loop):
             raise ValueError("the point has another structure. Compile a sweep for it.")
         values, units = values_of(loop), frame or self.frame(loop)
-        found = self._in_units(units.scale).solve(self._features(values), units.pace, accuracy)
+        solution = self._in_units(units.scale).solve(self._features(values), units.pace, accuracy)
         self.solves += 1
-        if found is None:
+        if solution is None:
             return None
-        margin, decision, per_product, seconds = found
+        margin, decision, per_product, seconds = solution
         self.solver_seconds += seconds
         slopes = self._slopes(values, per_product)
         return Screened(margin=margin, decision=decision, frame=units, slopes=slopes)
@@ -171,11 +171,11 @@ class Sweep:
 
     def _slopes(self, values: Mapping[str, float], per_product: Any) -> dict[str, float]:
         """Derivative of the margin in every name, from that in every product."""
-        found = {name: 0.0 for names in self.products for name in names}
+        slopes = {name: 0.0 for names in self.products for name in names}
         for names, slope in zip(self.products, per_product.tolist(), strict=True):
             for i, name in enumerate(names):
-                found[name] += slope * _product(values, (*names[:i], *names[i + 1 :]))
-        return found
+                slopes[name] += slope * _product(values, (*names[:i], *names[i + 1 :]))
+        return slopes
 
 
 class _Numbers:
@@ -204,20 +204,20 @@ class _Numbers:
     def solve(self, features: Any, pace: float, accuracy: float) -> tuple[float, list[float], Any, float] | None:
         """Margin, decision, derivative of the margin in every product, and seconds; None if the solver fails."""
         weights = np.where(self.rate, self.coefficients / pace, self.coefficients)
-        found = self.cones.solve(weights * features[self.products], accuracy)
-        if found is None:
+        solution = self.cones.solve(weights * features[self.products], accuracy)
+        if solution is None:
             return None
-        margin, decision, moments = found
+        margin, decision, moments = solution
         shares = weights * decision[self.cones.parts] * moments[self.cones.columns]
         per_product = np.bincount(self.products, shares, minlength=len(features))
         return margin, decision.tolist(), per_product, self.cones.compiled.solver_seconds
 
 
 def _product(values: Mapping[str, float], names: tuple[str, ...]) -> float:
-    found = 1.0
+    product = 1.0
     for name in names:
-        found *= values[name]
-    return found
+        product *= values[name]
+    return product
 
 
 def _nested(loop: Loop) -> list[tuple[Fraction, ...]]:

@@ -103,13 +103,13 @@ def fastest_settling(
     """
     loop = closed_loop(subject, gains, lipschitz=lipschitz, gain_range=gain_range)
     tried = candidate_degrees(loop) if degrees is None else (degrees,) if isinstance(degrees, int) else tuple(degrees)
-    found: list[tuple[Certificate, Settling]] = []
+    settled: list[tuple[Certificate, Settling]] = []
     for m in tried:
         plain = find_certificate(loop, m, subject=subject)
         faster = with_largest_decay(plain, balance(loop), subject) if plain else None
         told = settling(faster, start, model_of(subject)[1]) if faster else None
         if faster and told:
-            found.append((faster, told))
-        if degrees is None and len(found) == 2:
+            settled.append((faster, told))
+        if degrees is None and len(settled) == 2:
             break
-    return min(found, key=lambda one: one[1].seconds, default=None)
+    return min(settled, key=lambda one: one[1].seconds, default=None)

@@ -51,8 +51,8 @@ def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fractio
             f"the terms of {loop.law} must determine how its gains scale. Received {solution or 'a contradiction'}. "
             "Leave out gains without effect."
         )
-    found = {name: fraction_of(v) for name, v in zip(unknown, solution, strict=True)}
-    return {name: found[name] for name in (*loop.gains, *loop.states)}
+    exponents = {name: fraction_of(v) for name, v in zip(unknown, solution, strict=True)}
+    return {name: exponents[name] for name in (*loop.gains, *loop.states)}
 
 
 def scaled_norm(loop: Loop, exponents: Mapping[str, Fraction]) -> float:

@@ -52,11 +52,11 @@ def improvements(
     rows = []
     for name in objectives:
         asked = question(subject, name, **options)
-        found = None if asked.setting.objective.bounded else synthesise(subject, name, **options, **more)
+        synthesis = None if asked.setting.objective.bounded else synthesise(subject, name, **options, **more)
         for loop in asked.known if against is None else [asked.known[i] for i in against]:
             bound = scaled_norm(loop, asked.setting.exponents) * _SAME
             equal = question(subject, name, **options, bound=bound)
-            mine = found or synthesise(subject, name, **options, **more, bound=bound)
+            mine = synthesis or synthesise(subject, name, **options, **more, bound=bound)
             rows.append(_row(name, loop, beside(equal, mine, (loop,))))
     return rows
 

@@ -135,13 +135,13 @@ def _power(base: Sequence[Any], exponents: Sequence[int]) -> Any:
 
 def _columns(row: Row, j: int | None, values: Mapping[str, float], weights: Sequence[float] = ()) -> tuple[Form, Form]:
     """V and −V̇ of one monomial, or of all with weights."""
-    found: tuple[Form, Form] = ({}, {})
-    for total, parts in zip(found, (row.function, row.fall), strict=True):
+    columns: tuple[Form, Form] = ({}, {})
+    for total, parts in zip(columns, (row.function, row.fall), strict=True):
         for k, e, names, c in parts:
             if j is None or k == j:
                 value = c * (weights[k] if j is None else 1.0) * math.prod(values[n] for n in names)
                 total[e] = total.get(e, 0.0) + value
-    return found
+    return columns
 
 
 def _faster(
@@ -150,18 +150,18 @@ def _faster(
     """Part of a row that V decides: V, −V̇, or −w^{m−n}V̇ − κ(n/m)V."""
     function, fall = _columns(row, j, values, weights)
     if not row.fall:
-        found = function
+        form = function
     elif pace is None:
-        found = fall
+        form = fall
     else:
         m, n = pace.degrees
         size = len(row.fall[0][1])
-        found = fall
+        form = fall
         for _ in range(m - n):
-            found = _times(found, _wide(pace.forms[row.cell], size))
+            form = _times(form, _wide(pace.forms[row.cell], size))
         for e, c in _wide(function, size).items():
-            found[e] = found.get(e, 0.0) - pace.rate * n / m * c
-    return {e: c * factor for e, c in found.items()}
+            form[e] = form.get(e, 0.0) - pace.rate * n / m * c
+    return {e: c * factor for e, c in form.items()}
 
 
 def _moved(row: Row, present: Sequence[float], values: Any, other: Any, pace: Pace | None) -> Form:
@@ -188,18 +188,18 @@ def _wide(form: Form, size: int) -> Form:
 
 
 def _times(left: Form, right: Form) -> Form:
-    found: Form = {}
+    product: Form = {}
     for e, c in left.items():
         for f, d in right.items():
             key = tuple(map(sum, zip(e, f, strict=True)))
-            found[key] = found.get(key, 0.0) + c * d
-    return found
+            product[key] = product.get(key, 0.0) + c * d
+    return product
 
 
 @lru_cache(maxsize=32)
 def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> Any:
     """Every row with its set and monomials in scaled variables, and the scale of all of these."""
-    found = []
+    templates = []
     loop = kin.loop
     for row in rows_of(kin):
         whole = lifted_scale(row.equalities, scale)
@@ -219,8 +219,8 @@ def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> Any:
         margin = power_sum(len(loop.states), degree, len(whole))
         conditions = (tuple(_normal(scaled(p, whole)) for p in group) for group in (row.equalities, row.inequalities))
         one = Obligation("", dict.fromkeys((*support, *margin), Fraction(1)), *conditions)
-        found.append((row, statement_of(one, loop.domain), whole))
-    return tuple(found)
+        templates.append((row, statement_of(one, loop.domain), whole))
+    return tuple(templates)
 
 
 def _raised(support: Any, unit: Form, times: int) -> Any:

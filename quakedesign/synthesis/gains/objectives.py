@@ -78,9 +78,9 @@ class LargestDecay(Objective):
         speed = fastest(loop, function) * (m - n) / m
         for _ in range(_HALVINGS):
             speed /= 2
-            found = look(setting, loop, speed, function)
-            if found is not None:
-                return found
+            state = look(setting, loop, speed, function)
+            if state is not None:
+                return state
         return None
 
     def proved(self, setting: Setting, state: State, subject: Subject) -> Certificate | None:
@@ -93,17 +93,17 @@ class LargestDecay(Objective):
                 continue
             claims = {"positive": positive, "decrease": decrease, **bounds_of(state.loop, function, scale)}
             plain = finish(state.loop, function, claims, subject)
-            found = plain and with_largest_decay(plain, scale, subject)
-            if found:
-                return found
+            certificate = plain and with_largest_decay(plain, scale, subject)
+            if certificate:
+                return certificate
         return None
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
         """Certificate with the V of the largest margins, which is the better one where the forms w fit badly."""
         bound, beta = loop.uncertain["d"][1], loop.uncertain.get("beta", (Fraction(1), Fraction(1)))
         gains = tuple(loop.gains.values())
-        found = fastest_settling(subject, gains, lipschitz=bound, gain_range=beta, start=bound, degrees=degrees)
-        return found[0] if found else None
+        settling = fastest_settling(subject, gains, lipschitz=bound, gain_range=beta, start=bound, degrees=degrees)
+        return settling[0] if settling else None
 
     def figure(self, certificate: Certificate, setting: Setting) -> float:
         """1/T = κ·(m−n)/m·C^{−(m−n)/m} with V ≤ C where |e_i| ≤ L̄, rounded down."""

@@ -147,12 +147,12 @@ def _step(setting: Setting, state: State, share: float) -> State | None:
     if around is None:
         return None
     limits = _limits(setting, loop, level, around, dict(zip(changes, sizes, strict=True)))
-    found = around.program.solve(around.demands, around.fixed, limits)
-    if found is None:
+    proposal = around.program.solve(around.demands, around.fixed, limits)
+    if proposal is None:
         return None
     chosen = dict(zip(loop.gains, base, strict=True))
     first = len(around.monomials)
-    for name, size, x in zip(changes, sizes, found.decision[first : first + len(sizes)], strict=True):
+    for name, size, x in zip(changes, sizes, proposal.decision[first : first + len(sizes)], strict=True):
         chosen[name] += size * x
     moved = with_gains(loop, short(loop, objective.kept(chosen, loop, setting.exponents)))
     beyond = state.level if share else None
@@ -164,15 +164,15 @@ def _changes(setting: Setting, loop: Loop, trust: float) -> dict[str, dict[str, 
     norm = scaled_norm(loop, setting.exponents)
     bound = float(loop.uncertain["d"][1])
     rooted = {of for of, _ in loop.roots.values()}
-    found = {}
+    changes = {}
     for name, k in loop.gains.items():
         unit = bound ** float(setting.exponents[name])
         step = trust * math.sqrt(abs(float(k)) * norm * unit)
         step = min(step, TRUST.under_root * float(k)) if name in rooted else step
         larger = short(loop, {name: float(k) + step})
         if k and larger[name] != k:
-            found[name] = {**loop.gains, **larger}
-    return found
+            changes[name] = {**loop.gains, **larger}
+    return changes
 
 
 def _around(
@@ -242,8 +242,8 @@ def look(
     if around is None:
         return None
     limits = _limits(setting, loop, level, around, {})
-    found = around.program.solve(around.demands, around.fixed, limits)
-    if found is None or not found.margin > (setting.least if least is None else least):
+    proposal = around.program.solve(around.demands, around.fixed, limits)
+    if proposal is None or not proposal.margin > (setting.least if least is None else least):
         return None
-    function = around.function(found.decision)
-    return State(loop=loop, level=level, lyapunov=function, margin=found.margin)
+    function = around.function(proposal.decision)
+    return State(loop=loop, level=level, lyapunov=function, margin=proposal.margin)

@@ -209,11 +209,11 @@ def _tried(
         loop = with_gains(asked.loop, short(asked.loop, grown))
         if look(setting, loop, scaled_norm(loop, setting.exponents)) is None:
             return _WORST
-        found = trial.error(tuple(loop.gains.values()))
-        if not found:
+        value = trial.error(tuple(loop.gains.values()))
+        if not value:
             return _WORST
-        tried.setdefault(found, tuple(loop.gains.values()))
-        return math.log(found)
+        tried.setdefault(value, tuple(loop.gains.values()))
+        return math.log(value)
 
     simplex = np.vstack([np.zeros(len(free)), _SIMPLEX * np.eye(len(free))])
     minimize(error, simplex[0], method="Nelder-Mead", options={"maxfev": rounds, "initial_simplex": simplex})

@@ -137,8 +137,8 @@ def synthesise(
     require_count(_MOST_STARTS, starts=starts)
     require_count(MOST_WORKERS, workers=workers)
     first = list(islice(begin_with(asked, seed), starts * _DRAWS))
-    found = _best(asked, _climbed(asked.setting, first, starts, workers))
-    mine = _synthesis(asked, *found) if found else None
+    best = _best(asked, _climbed(asked.setting, first, starts, workers))
+    mine = _synthesis(asked, *best) if best else None
     return beside(asked, mine, asked.known) if compare else mine
 
 
@@ -196,8 +196,8 @@ def _climbed(setting: Setting, first: Sequence[Loop], wanted: int, workers: int)
         return list(islice((states for states in map(job, first) if states), wanted))
     with Processes(workers) as crew:
         for at in range(0, len(first), workers):
-            found = dict(crew.answers(job, [(loop,) for loop in first[at : at + workers]]))
-            done += [found[place] for place in sorted(found) if found[place]]
+            climbs = dict(crew.answers(job, [(loop,) for loop in first[at : at + workers]]))
+            done += [climbs[place] for place in sorted(climbs) if climbs[place]]
             if len(done) >= wanted:
                 break
     return done[:wanted]
@@ -246,17 +246,17 @@ def _best(asked: Question, climbs: Sequence[Sequence[State]]) -> tuple[Certifica
         if begin is not None:
             best = _in_order(higher, [climb(higher, begin)])
             stages.append((higher, best))
-    found = list(filter(None, (_proved(at, states, asked.subject) for at, states in stages)))
+    proofs = list(filter(None, (_proved(at, states, asked.subject) for at, states in stages)))
     pick = max if asked.setting.objective.larger else min
-    return pick(found, key=lambda item: item[1], default=None)
+    return pick(proofs, key=lambda item: item[1], default=None)
 
 
 def _carried(higher: Setting, state: State) -> State | None:
     """State of a lower degree looked at with a higher one, at its level or a lower one."""
     objective = higher.objective
     levels = [objective.reached(state.level * share, state.loop, higher.exponents) for share in _SHARES]
-    found = (look(higher, state.loop, level, state.lyapunov, least=FAINT) for level in dict.fromkeys(levels))
-    return next(filter(None, found), None)
+    states = (look(higher, state.loop, level, state.lyapunov, least=FAINT) for level in dict.fromkeys(levels))
+    return next(filter(None, states), None)
 
 
 def _in_order(setting: Setting, climbs: Sequence[Sequence[State]]) -> list[State]:

@@ -210,9 +210,9 @@ def _held(root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fract
     return Held(law=compensated_law(root, weight, step * authority), step=step, **around)
 
 
-def _bounds(found: Estimate) -> Bounds:
-    assert isinstance(found.bounds, Bounds)
-    return found.bounds
+def _bounds(estimate: Estimate) -> Bounds:
+    assert isinstance(estimate.bounds, Bounds)
+    return estimate.bounds
 
 
 def _short(value: Fraction) -> Fraction:

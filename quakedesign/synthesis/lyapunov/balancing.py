@@ -67,15 +67,15 @@ def _size(term: Term, loop: Loop) -> Fraction:
 
 def lifted_scale(equalities: Sequence[Polynomial], scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
     """Scale of all variables, given that of the first ones: each equality t·w^n = P fixes that of its w in turn."""
-    found = list(scale)
+    scales = list(scale)
     for equality in equalities:
-        position = len(found)
+        position = len(scales)
         power = max(e[position] for e in equality)
-        sizes = [abs(c) * monomial(found, e[:position]) for e, c in equality.items() if not any(e[position:])]
+        sizes = [abs(c) * monomial(scales, e[:position]) for e, c in equality.items() if not any(e[position:])]
         largest = max(sizes, default=Fraction(1))
         exponent = (math.log2(largest.numerator) - math.log2(largest.denominator)) / power
-        found.append(Fraction(2) ** round(exponent))
-    return tuple(found)
+        scales.append(Fraction(2) ** round(exponent))
+    return tuple(scales)
 
 
 def below(number: float) -> Fraction:

@@ -138,5 +138,5 @@ def _largest(
     kind = Obligation(one.name, support, moved.equalities, moved.inequalities)
     template = statement_of(kind, domain, power_of_sum(len(whole), level))
     demand = Demand(template=template, parts=(moved.polynomial,), margin=direction)
-    found = joint_program([demand]).solve([demand])
-    return 0.0 if found is None else max(0.0, found.margin) / float(unit)
+    proposal = joint_program([demand]).solve([demand])
+    return 0.0 if proposal is None else max(0.0, proposal.margin) / float(unit)

@@ -49,12 +49,12 @@ def _at(exponents: Sequence[int], sizes: Sequence[float]) -> float:
 
 def rounded(lyapunov: Sequence[Term], bits: int, divisor: float = 1.0) -> tuple[Term, ...]:
     """V divided by a number, every coefficient with so many binary digits."""
-    found = []
+    terms = []
     for term in lyapunov:
         value = float(term.coefficient) / divisor
         grid = Fraction(2) ** (bits - math.floor(math.log2(abs(value))))
-        found.append(Term(round(Fraction(value) * grid) / grid, term.parameters, term.factors))
-    return tuple(found)
+        terms.append(Term(round(Fraction(value) * grid) / grid, term.parameters, term.factors))
+    return tuple(terms)
 
 
 def degrees_of(obligations: Obligations) -> tuple[int, int]:
@@ -96,8 +96,8 @@ def _margin(one: Obligation, loop: Loop, scale: Sequence[Fraction]) -> float:
     support = Obligation("", dict.fromkeys((*moved, *margin), Fraction(1)), *conditions)
     parts = [{e: c / size for e, c in moved.items()}]
     demand = Demand(template=statement_of(support, loop.domain), parts=parts, margin=margin)
-    found = joint_program([demand]).solve([demand])
-    return 0.0 if found is None else max(0.0, found.margin) * float(size * min(1 / r**power for r in scale))
+    proposal = joint_program([demand]).solve([demand])
+    return 0.0 if proposal is None else max(0.0, proposal.margin) * float(size * min(1 / r**power for r in scale))
 
 
 def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:

@@ -76,11 +76,11 @@ def rows_of(kin: Kin) -> tuple[Row, ...]:
     """Every different row of the monomials of V."""
     loop, degree = kin.loop, kin.structure.degree
     columns = [Obligations(loop, (term,)) for term in signed_monomials(loop.states, degree, loop.domain)]
-    found: dict[tuple[Any, ...], Row] = {}
+    rows: dict[tuple[Any, ...], Row] = {}
     for row in (*_functions(columns), *_falls(loop, columns)):
         conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
-        found.setdefault((row.function, row.fall, conditions), row)
-    return tuple(found.values())
+        rows.setdefault((row.function, row.fall, conditions), row)
+    return tuple(rows.values())
 
 
 def _functions(columns: Sequence[Obligations]) -> Iterator[Row]:

@@ -196,8 +196,8 @@ class _Search:
         A = np.hstack([-np.array(self.lines), np.ones((len(self.lines), 1))])
         count = A.shape[1] - 1
         cost = [*[0.0] * count, -1.0]
-        found = linprog(cost, A_ub=A, b_ub=np.zeros(len(A)), bounds=[(-1, 1)] * count + [(0, 1)], method="highs")
-        return (float(found.x[-1]), found.x[:-1]) if found.status == 0 else (1.0, np.zeros(count))
+        solution = linprog(cost, A_ub=A, b_ub=np.zeros(len(A)), bounds=[(-1, 1)] * count + [(0, 1)], method="highs")
+        return (float(solution.x[-1]), solution.x[:-1]) if solution.status == 0 else (1.0, np.zeros(count))
 
     def refine(self, decision: Any) -> bool:
         """Add the worst of many new points; False where none is worse than those at hand."""
@@ -219,10 +219,10 @@ class _Search:
         """Weights of a basic solution, solved for exactly."""
         A = np.vstack([np.array(self.lines).T, np.ones(len(self.lines))])
         b = np.array([*[0.0] * (len(A) - 1), 1.0])
-        found = linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=b, bounds=(0, None), method="highs-ds")
-        if found.status != 0:
+        solution = linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=b, bounds=(0, None), method="highs-ds")
+        if solution.status != 0:
             return None
-        chosen = [self.places[i] for i in np.flatnonzero(found.x > _SURE)]
+        chosen = [self.places[i] for i in np.flatnonzero(solution.x > _SURE)]
         weights = _null_vector([_values(self.rows[row], point) for row, point in chosen])
         if weights is None:
             return None
@@ -241,6 +241,6 @@ def _null_vector(rows: Sequence[Sequence[Fraction]]) -> list[Fraction] | None:
     if rank != len(rows) - 1:
         return None
     free = next(j for j in range(len(rows)) if j >= rank or reduced[j, j] != 1)
-    found = [-fraction_of(reduced[i, free]) for i in range(rank)]
-    found.insert(free, Fraction(1))
-    return found if min(found) > 0 else None
+    vector = [-fraction_of(reduced[i, free]) for i in range(rank)]
+    vector.insert(free, Fraction(1))
+    return vector if min(vector) > 0 else None

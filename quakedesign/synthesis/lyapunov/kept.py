@@ -32,9 +32,9 @@ def kept(search: Search) -> Search:
         if path.read_text(encoding="utf-8") == _NOTHING:
             return None
         try:
-            found = load_certificate(path)
-            if found.loop == loop and found.check(subject) is Verdict.PROVED:
-                return found
+            certificate = load_certificate(path)
+            if certificate.loop == loop and certificate.check(subject) is Verdict.PROVED:
+                return certificate
         except (CertificateError, WorkError):
             pass
         return search(loop, degree, subject)
@@ -48,6 +48,6 @@ def place(loop: Loop, degree: int) -> Path:
     return FOLDER / f"{loop.law}_{sha256(asked.encode()).hexdigest()[:16]}.json"
 
 
-def keep(loop: Loop, degree: int, found: Certificate | None) -> None:
+def keep(loop: Loop, degree: int, certificate: Certificate | None) -> None:
     """Write what a search has found."""
-    write_whole(place(loop, degree), _NOTHING if found is None else certificate_text(found))
+    write_whole(place(loop, degree), _NOTHING if certificate is None else certificate_text(certificate))

@@ -42,23 +42,23 @@ class Row:
 
 def ends_of(loop: Loop) -> dict[str, tuple[tuple[str, int], ...]]:
     """Ends of every range: ±name where it is [−x, x], name where it is a point, else name- and name+."""
-    found: dict[str, tuple[tuple[str, int], ...]] = {}
+    ends: dict[str, tuple[tuple[str, int], ...]] = {}
     for name, (low, high) in loop.uncertain.items():
         if low == -high:
-            found[name] = ((name, -1), (name, 1))
+            ends[name] = ((name, -1), (name, 1))
         else:
-            found[name] = ((name, 1),) if low == high else ((f"{name}-", 1), (f"{name}+", 1))
-    return found
+            ends[name] = ((name, 1),) if low == high else ((f"{name}-", 1), (f"{name}+", 1))
+    return ends
 
 
 def values_of(loop: Loop) -> dict[str, float]:
     """Numbers that the names stand for, roots included (their enclosures are narrow)."""
-    found = {name: float(v) for name, v in loop.parameters.items()}
+    values = {name: float(v) for name, v in loop.parameters.items()}
     for name, (of, _) in loop.roots.items():
-        found[name] = found[of] ** 0.5
+        values[name] = values[of] ** 0.5
     for name, (low, high) in loop.uncertain.items():
-        found |= {name: float(high), f"{name}-": float(low), f"{name}+": float(high)}
-    return found
+        values |= {name: float(high), f"{name}-": float(low), f"{name}+": float(high)}
+    return values
 
 
 def rows_of(loop: Loop, monomials: Sequence[Term]) -> tuple[Row, ...]:
@@ -70,11 +70,11 @@ def rows_of(loop: Loop, monomials: Sequence[Term]) -> tuple[Row, ...]:
         When the law has nested powers that certificates do not know.
     """
     columns = [Obligations(loop, (term,)) for term in monomials]
-    found: dict[tuple[Any, ...], Row] = {}
+    rows: dict[tuple[Any, ...], Row] = {}
     for row in (*_functions(columns), *_rates(loop, columns)):
         conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
-        found.setdefault((row.rate, row.parts, conditions), row)
-    return tuple(found.values())
+        rows.setdefault((row.rate, row.parts, conditions), row)
+    return tuple(rows.values())
 
 
 def _functions(columns: Sequence[Obligations]) -> Iterator[Row]:

@@ -88,11 +88,11 @@ class CommonQuadratic:
         low, high = max(best.rate, 0.0), -self.polytope.slowest()
         while high - low > tolerance * high:
             middle = (low + high) / 2
-            found = self(middle)
-            if found is None:
+            proposal = self(middle)
+            if proposal is None:
                 high = middle
             else:
-                best, low = found, max(middle, min(found.rate, high))
+                best, low = proposal, max(middle, min(proposal.rate, high))
         return best
 
 
@@ -113,12 +113,12 @@ def robust_stability(loop: Loop, *, fastest: bool = False) -> Certificate | None
     proposal = search.fastest() if fastest else search()
     if proposal is None:
         return None
-    found = finished(loop, proposal)
-    if fastest and (found is None or float(found.claims["rate"]) < -_GOOD * polytope.slowest()):
+    certificate = finished(loop, proposal)
+    if fastest and (certificate is None or float(certificate.claims["rate"]) < -_GOOD * polytope.slowest()):
         other = search()  # where the fastest V is hard to find or to round, the roundest may do better
         rounder = finished(loop, other) if other is not None else None
-        found = max(filter(None, (found, rounder)), key=lambda c: c.claims["rate"], default=None)
-    return found
+        certificate = max(filter(None, (certificate, rounder)), key=lambda c: c.claims["rate"], default=None)
+    return certificate
 
 
 def finished(loop: Loop, proposal: Proposal) -> Certificate | None:
@@ -151,9 +151,12 @@ def finished_exactly(loop: Loop, theta: Sequence[Sequence[Fraction]]) -> Certifi
         claims = {"positive": positive, "rate": below(slowest / 10**n)}
         witnesses = {one.name: quadratic_witness(one) for one in different(claimed(loop, lyapunov, claims))}
         try:
-            found = Certificate(loop=loop, lyapunov=lyapunov, claims=claims, witnesses=witnesses)
-            if found.check() is Verdict.PROVED and parse_certificate(certificate_text(found)) == found:
-                return found
+            certificate = Certificate(loop=loop, lyapunov=lyapunov, claims=claims, witnesses=witnesses)
+            if (
+                certificate.check() is Verdict.PROVED
+                and parse_certificate(certificate_text(certificate)) == certificate
+            ):
+                return certificate
         except (CertificateError, WorkError):
             continue
     return None

@@ -15,16 +15,16 @@ from quakedesign.synthesis.linear.sampled.varying_parameters import VaryingVerdi
 _LARGEST = 16
 
 
-def inverse_optimality_files(found: InverseOptimality) -> list[Answer]:
+def inverse_optimality_files(optimality: InverseOptimality) -> list[Answer]:
     """P and Q0 of a K that is optimal for a Q ≥ Q0 + R·D; nothing for another verdict."""
-    if found.P is None or found.Q0 is None:
+    if optimality.P is None or optimality.Q0 is None:
         return []
-    return definite_files({"P": found.P, "Q": found.Q0})
+    return definite_files({"P": optimality.P, "Q": optimality.Q0})
 
 
-def held_files(problem: LinearProblem, gains: Sequence[Fraction], found: VaryingVerdict) -> list[Answer]:
+def held_files(problem: LinearProblem, gains: Sequence[Fraction], verdict: VaryingVerdict) -> list[Answer]:
     """Every form, in SI, whose definiteness proves a held loop; nothing for another verdict."""
-    return definite_files(found.proof.forms(problem, gains)) if found.proof is not None else []
+    return definite_files(verdict.proof.forms(problem, gains)) if verdict.proof is not None else []
 
 
 def definite_files(forms: Mapping[str, Matrix]) -> list[Answer]:

@@ -171,7 +171,7 @@ def gain_range(fault: Fault, controller: Controller) -> GainRange | None:
     if inside is None:
         return None
     limit = _least_stable(error_loop(tuple(controller.gains.values()), needed))
-    found = {"low": (least, inside), "high": (most, inside)}
+    ends = {"low": (least, inside), "high": (most, inside)}
     low, certified = limit, least
     for _ in range(_BETA_STEPS):
         middle = nearest(float((low + certified) / 2), 1 << 24)
@@ -179,19 +179,19 @@ def gain_range(fault: Fault, controller: Controller) -> GainRange | None:
         if proof is None:
             low = middle
         else:
-            certified, found["low"] = middle, (middle, proof)
+            certified, ends["low"] = middle, (middle, proof)
     factor, failed = Fraction(4), False
     while factor <= _LARGEST_BETA and not failed:
         proof = prove(least, most * factor)
         failed = proof is None
         if proof is not None:
-            found["high"] = (most * factor, proof)
+            ends["high"] = (most * factor, proof)
         factor *= 4
     return GainRange(
-        low=UpperBound(found["low"][0]),
-        high=LowerBound(found["high"][0]),
+        low=UpperBound(ends["low"][0]),
+        high=LowerBound(ends["high"][0]),
         low_limit=LowerBound(limit),
-        certificates=(found["low"][1], found["high"][1]),
+        certificates=(ends["low"][1], ends["high"][1]),
     )
 
 

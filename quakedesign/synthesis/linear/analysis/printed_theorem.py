@@ -213,8 +213,8 @@ def corrected_design(example: Example) -> ExactDesign:
 def _designed(example: Example, bound: Matrix) -> ExactDesign:
     problem, Q = example.problem, total(example.Q0, bound)
     unit = (Fraction(0), problem.sectors.authority, Fraction(0), Fraction(0))
-    found = solve_care(problem.nominal(), times(1 / example.R, outer(unit, unit)), Q)
-    theta = rounded(found.X, 60)
+    solution = solve_care(problem.nominal(), times(1 / example.R, outer(unit, unit)), Q)
+    theta = rounded(solution.X, 60)
     gains = tuple(problem.sectors.authority * row[1] / example.R for row in theta)
     return ExactDesign(gains=gains, theta=theta, proved=decreases(problem, gains, theta))
 

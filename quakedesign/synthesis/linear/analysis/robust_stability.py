@@ -60,11 +60,11 @@ class Analysis:
     @property
     def certificates(self) -> dict[str, Certificate]:
         """What was proved, by name: ``stability``, ``friction-slope``, ``low-beta`` and ``high-beta``."""
-        found: dict[str, Certificate | None] = {"stability": self.decay.certificate if self.decay else None}
-        found["friction-slope"] = self.slope.certificate if self.slope else None
+        by_name: dict[str, Certificate | None] = {"stability": self.decay.certificate if self.decay else None}
+        by_name["friction-slope"] = self.slope.certificate if self.slope else None
         if self.span is not None:
-            found["low-beta"], found["high-beta"] = self.span.certificates
-        return {name: certificate for name, certificate in found.items() if certificate is not None}
+            by_name["low-beta"], by_name["high-beta"] = self.span.certificates
+        return {name: certificate for name, certificate in by_name.items() if certificate is not None}
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts, measured ones as numbers, SI."""
@@ -101,11 +101,11 @@ def analysis(fault: Fault, controller: Controller) -> Analysis:
 
 def _decay_of_optimal_gains(fault: Fault, controller: Controller) -> DecayRate | None:
     """What the Riccati equation that K solves proves, where it covers the uncertainty; None where it does not."""
-    found = inverse_optimality(LinearProblem.of(fault), tuple(controller.gains.values()))
-    if found.P is None:
+    optimality = inverse_optimality(LinearProblem.of(fault), tuple(controller.gains.values()))
+    if optimality.P is None:
         return None
     loop = sector_loop(controller, sectors(fault))
-    certificate = finished_exactly(loop, found.scales.form_outside(found.P))
+    certificate = finished_exactly(loop, optimality.scales.form_outside(optimality.P))
     if certificate is None:
         return None
     return DecayRate(

@@ -59,15 +59,15 @@ class LinearVerdict:
 
     def proofs(self) -> dict[str, Certificate | Answer | ContinuousPeaks]:
         """Every proof that has a file format, by name."""
-        found: dict[str, Certificate | Answer | ContinuousPeaks] = dict(self.analysis.certificates)
+        by_name: dict[str, Certificate | Answer | ContinuousPeaks] = dict(self.analysis.certificates)
         if isinstance(self.peaks, ContinuousPeaks):
-            found["peaks"] = self.peaks
+            by_name["peaks"] = self.peaks
         problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
         several = {"inverse-optimal": inverse_optimality_files(inverse_optimality(problem, gains))}
         several["held"] = held_files(problem, gains, self.held.runs)
         for name, answers in several.items():
-            found |= {f"{name}{f'-{n}' if n else ''}": answer for n, answer in enumerate(answers)}
-        return found
+            by_name |= {f"{name}{f'-{n}' if n else ''}": answer for n, answer in enumerate(answers)}
+        return by_name
 
     def save(self, out: Path, *, force: bool = False) -> dict[str, str]:
         """Write every proof: the one of stability to `out`, the others beside it with their names added.

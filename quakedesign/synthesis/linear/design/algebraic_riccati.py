@@ -96,13 +96,13 @@ def _propose(a: Matrix, g: Matrix, q: Matrix) -> Any:
     values, vectors = np.linalg.eigh(G)
     kept = np.abs(values) > 1e-15 * np.abs(values).max()
     try:
-        found = control.care(A, vectors[:, kept], Q, np.diag(1 / values[kept]), method=METHOD)[0]
+        solution = control.care(A, vectors[:, kept], Q, np.diag(1 / values[kept]), method=METHOD)[0]
     except (np.linalg.LinAlgError, ValueError, control.ControlArgument) as error:
         raise ParameterError(
             f"the Riccati equation has no stabilising solution that can be found ({error}). A stabilisable pair and a "
             "Q that sees every mode on the imaginary axis are expected. Change Q0."
         ) from None
-    return np.asarray(found)
+    return np.asarray(solution)
 
 
 def _refined(a: Matrix, g: Matrix, q: Matrix, proposal: Any) -> tuple[Matrix, Fraction]:

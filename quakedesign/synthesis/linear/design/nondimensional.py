@@ -65,7 +65,7 @@ class ScaledDesign:
 
         used = self.best_split(R) if split is None else split
         try:
-            found = control.lqr(self.A, self.B, self.Q0 + R * self.bound(used), [[R]], method=METHOD)
+            solution = control.lqr(self.A, self.B, self.Q0 + R * self.bound(used), [[R]], method=METHOD)
         except (np.linalg.LinAlgError, ValueError, control.ControlArgument) as error:
             ranges = self.inside.sectors
             raise ParameterError(
@@ -74,7 +74,7 @@ class ScaledDesign:
                 f"{float(max(map(abs, ranges.slip))):.2g} in units of the natural frequency. Check the units of the "
                 "damping, the shear modulus and the lengths."
             ) from None
-        return (*found, used)
+        return (*solution, used)
 
     def best_split(self, R: float) -> float:
         """Split of W with the smallest trace of S, to six digits; 1/2 where one of the bounds is 0."""

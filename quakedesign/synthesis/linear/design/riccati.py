@@ -129,10 +129,10 @@ def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesig
     weight = Fraction(R)
     Q = total(task.exact_Q0, times(weight, sound_bound(task.inside.bounds, Fraction(split))))
     unit = (Fraction(0), Fraction(1), Fraction(0), Fraction(0))
-    found = solve_care(task.shifted(), times(1 / weight, outer(unit, unit)), Q)
-    inner = [row[1] / weight for row in found.X]
+    solution = solve_care(task.shifted(), times(1 / weight, outer(unit, unit)), Q)
+    inner = [row[1] / weight for row in solution.X]
     gains = task.scales.gains_outside(inner)
-    lyapunov = _quadratic(task.scales.form_outside(found.X))
+    lyapunov = _quadratic(task.scales.form_outside(solution.X))
     exact = _rounded_gains(task.outside, gains, _matrix(lyapunov))
     loop = task.inside.loop((Fraction(1), -task.inside.stiffness, task.inside.damping), inner)
     return RiccatiDesign(
@@ -141,11 +141,11 @@ def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesig
         K=floats([gains])[0],
         Q=floats(Q),
         R=R,
-        S=floats(found.X),
+        S=floats(solution.X),
         E=_eigenvalues(loop) / float(task.scales.time),
         split=split,
         rate=float(task.rate / task.scales.time),
-        residual=float(found.residual),
+        residual=float(solution.residual),
         fastest_pole=task.fastest_pole([inner]),
     )
 
@@ -157,9 +157,9 @@ def _eigenvalues(matrix: Any) -> Any:
 def _rounded_gains(problem: LinearProblem, gains: Sequence[Fraction], theta: Matrix) -> tuple[Fraction, ...]:
     """Gains to ten significant digits, or to as many more as V needs to decrease over the whole box."""
     for digits in (10, 17):
-        found = tuple(_decimal(g, digits) for g in gains)
-        if decreases(problem, found, theta):
-            return found
+        decimals = tuple(_decimal(g, digits) for g in gains)
+        if decreases(problem, decimals, theta):
+            return decimals
     return tuple(_decimal(g, 10) for g in gains)
 
 

@@ -65,11 +65,11 @@ def compare_feedback(fault: Fault, gains: Sequence[Fraction]) -> tuple[FeedbackC
     k1, _, _, k4 = (float(k) for k in gains)
     rest = max(abs(float(p)) for p in rest_pressure(fault, (Fraction(0), target), nominal=True, pieces=200))
     bend = largest_reference_acceleration(fault)
-    found = []
+    comparisons = []
     for feedback in FEEDBACKS:
         offset = k1 * float(target) if feedback == "state" else 0.0
         lag = max(abs(lag_coefficient(problem, gains, vertex, feedback)) for vertex in problem.vertices()) * bend
-        found.append(
+        comparisons.append(
             FeedbackComparison(
                 feedback=feedback,
                 lag=lag,
@@ -78,7 +78,7 @@ def compare_feedback(fault: Fault, gains: Sequence[Fraction]) -> tuple[FeedbackC
                 integral=(rest + abs(offset)) / abs(k4),
             )
         )
-    return tuple(found)
+    return tuple(comparisons)
 
 
 def lag_coefficient(problem: LinearProblem, gains: Sequence[Fraction], vertex: Vertex, feedback: str) -> float:

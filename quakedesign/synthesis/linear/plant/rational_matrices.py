@@ -79,8 +79,8 @@ def diagonal(values: Sequence[Fraction]) -> Matrix:
 
 def inverse(a: Rows) -> Matrix:
     """A⁻¹; ZeroDivisionError for a singular matrix."""
-    found = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in a]).inv()
-    return tuple(tuple(fraction_of(v) for v in row) for row in found.tolist())
+    inverted = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in a]).inv()
+    return tuple(tuple(fraction_of(v) for v in row) for row in inverted.tolist())
 
 
 def trace_of_product(a: Rows, b: Rows) -> Fraction:

@@ -131,13 +131,13 @@ def uncertainty_bounds(fault: Fault, *, loading_rate: float | str = 0) -> Uncert
     )
 
 
-def _terms(fault: Fault, found: Sectors, ranges: Any, values: Any, drift: Fraction) -> list[tuple[str, str, Range]]:
+def _terms(fault: Fault, sectors: Sectors, ranges: Any, values: Any, drift: Fraction) -> list[tuple[str, str, Range]]:
     """Name, what it acts on, and range in x2' of every term of b·h."""
     friction, disturbance = friction_bounds(fault.friction), fault.disturbance
-    load = ranges[plant.N_hat][1] * found.largest_effective_stress
+    load = ranges[plant.N_hat][1] * sectors.largest_effective_stress
     slip_chord, rate_chord = (load * slope for slope in (friction.slip_slope, friction.rate_slope))
     k, eta = ranges[plant.k_hat], ranges[plant.eta_hat]
-    lowest = found.slip[0] + k[1] - rational(disturbance.slip_growth)  # 0 where σ' − p* stays positive
+    lowest = sectors.slip[0] + k[1] - rational(disturbance.slip_growth)  # 0 where σ' − p* stays positive
     growth = [rational(v) for v in (disturbance.slip_growth, disturbance.rate_growth)]
     shaking, _ = disturbance.exact_bounds
     return [

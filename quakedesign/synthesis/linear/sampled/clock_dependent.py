@@ -60,15 +60,15 @@ class ClockProof:
 
     def forms(self, problem: LinearProblem, gains: Sequence[Fraction]) -> dict[str, Matrix]:
         """Matrices that all have to be positive definite, by name."""
-        found = {"P": self.P[0]}
+        matrices = {"P": self.P[0]}
         for m, step in enumerate(dict.fromkeys((self.shortest, self.longest))):
-            found[f"j{m}_"] = total(self.P[-1], times(-1, _after(_jump(gains, step), self.P[0])))
+            matrices[f"j{m}_"] = total(self.P[-1], times(-1, _after(_jump(gains, step), self.P[0])))
             for n, vertex in enumerate(problem.vertices()):
                 flow = _flow(problem, vertex)
                 for i, fall in enumerate(_changes(self.P)):
                     moved = times(step, lyapunov(flow, self.P[i]))
-                    found[f"v{m}_{n}_{i}_"] = times(-1, total(fall, moved))
-        return found
+                    matrices[f"v{m}_{n}_{i}_"] = times(-1, total(fall, moved))
+        return matrices
 
     def holds(self, problem: LinearProblem, gains: Sequence[Fraction]) -> bool:
         """Whether it proves the loop, exactly."""
@@ -138,9 +138,9 @@ def clock_proof(
     outside = [1 / u for u in (*scales.states, scales.pressure)]
     for bits in BITS if proposal else ():
         P = tuple(congruent(rounded(matrix, bits), outside) for matrix in proposal)
-        found = ClockProof(shortest=steps[0], longest=steps[1], P=P)
-        if found.holds(problem, gains):
-            return found
+        proof = ClockProof(shortest=steps[0], longest=steps[1], P=P)
+        if proof.holds(problem, gains):
+            return proof
     return None
 
 

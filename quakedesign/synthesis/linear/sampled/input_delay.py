@@ -69,10 +69,10 @@ class DelayProof:
 
     def forms(self, problem: LinearProblem, gains: Sequence[Fraction]) -> dict[str, Matrix]:
         """Matrices that all have to be positive definite, by name."""
-        found = {"P": self.P, "W": self.W}
+        matrices = {"P": self.P, "W": self.W}
         for n, vertex in enumerate(problem.vertices()):
-            found[f"v{n}_"] = decrease_form(problem, gains, self.longest, vertex, self.P, self.W)
-        return found
+            matrices[f"v{n}_"] = decrease_form(problem, gains, self.longest, vertex, self.P, self.W)
+        return matrices
 
     def holds(self, problem: LinearProblem, gains: Sequence[Fraction]) -> bool:
         """Whether it proves the loop, exactly."""
@@ -119,9 +119,9 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
     proposal = _propose(inside, K, period / scales.time) if any(K) else []
     for bits in BITS if proposal else ():
         P, W = (rounded(matrix, bits) for matrix in proposal)
-        found = DelayProof(longest=period, P=scales.form_outside(P), W=_weight_outside(W, scales))
-        if found.holds(problem, gains):
-            return found
+        proof = DelayProof(longest=period, P=scales.form_outside(P), W=_weight_outside(W, scales))
+        if proof.holds(problem, gains):
+            return proof
     return None
 
 

@@ -158,11 +158,11 @@ class _Task:
         """Whether a condition is surely violated at a point, with more digits where the plant grows far in a period."""
         for bits in _BITS:
             with ctx.workprec(bits):
-                found = self.conditions(tuple((v, v) for v in point))
-                if any(v < 0 for v in found[:5]):
+                conditions = self.conditions(tuple((v, v) for v in point))
+                if any(v < 0 for v in conditions[:5]):
                     return True
-                if all(v > 0 for v in found[:5]) and not found[5].contains(0):
-                    return bool(found[5] < 0)
+                if all(v > 0 for v in conditions[:5]) and not conditions[5].contains(0):
+                    return bool(conditions[5] < 0)
         return False
 
     def _halves(self, cell: Cell) -> list[Cell]:
@@ -256,9 +256,9 @@ def _all_shorter(
     """One proof for all periods up to the longest one, or up to a share of it where that takes too many cells."""
     for share in _SHARES:
         step = longest * share
-        found = hold_verdict(problem, gains, (Fraction(0), step), integration=integration, cells=_CELLS)
-        if found.verdict is Verdict.PROVED:
-            return LargestStep(proved=LowerBound(step), refuted=refuted, cells=found.cells)
+        verdict = hold_verdict(problem, gains, (Fraction(0), step), integration=integration, cells=_CELLS)
+        if verdict.verdict is Verdict.PROVED:
+            return LargestStep(proved=LowerBound(step), refuted=refuted, cells=verdict.cells)
     return None
 
 

@@ -140,8 +140,8 @@ def _longest_delay(problem: LinearProblem, gains: Sequence[Fraction], most: Frac
     low, high, best = Fraction(0), most, None
     while high - low > _TOLERANCE * high and high > most / 1000:
         middle = _short((low + high) / 2)
-        found = delay_proof(problem, gains, middle)
-        low, high, best = (middle, high, found) if found else (low, middle, best)
+        proof = delay_proof(problem, gains, middle)
+        low, high, best = (middle, high, proof) if proof else (low, middle, best)
     return best
 
 
@@ -149,9 +149,9 @@ def _further(problem: LinearProblem, gains: Sequence[Fraction], low: Fraction, l
     """Proof from a period on, as far towards the limit for constant parameters as one is found."""
     for share in _SHARES:
         high = _short(share * limit)
-        found = clock_proof(problem, gains, (low, high)) if high > low else None
-        if found is not None:
-            return found
+        proof = clock_proof(problem, gains, (low, high)) if high > low else None
+        if proof is not None:
+            return proof
     return None
 
 
