@@ -11,6 +11,7 @@ from cyclopts import CycloptsError
 from quakedesign.cli import (
     attraction,
     campaign,
+    completion,
     design,
     figures,
     gain_map,
@@ -33,6 +34,7 @@ __all__ = [
     "app",
     "attraction",
     "campaign",
+    "completion",
     "design",
     "figures",
     "gain_map",

@@ -22,7 +22,7 @@ def gain_map(
     range: Numbers | None = None,
     lipschitz: Numbers | None = None,
     gain_range: tuple[str, str] = ("1", "1"),
-    points: Whole = 100,
+    points: Whole = 40,
     degree: Whole | None = None,
     interior: Whole = 200,
     seed: Whole = 0,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Gains, MetresPerSecond, Push, Seconds, Whole, print_json, print_lines
+from quakedesign.cli.shared import Gains, MetresPerSecond, Push, Seconds, Whole, hush, print_json, print_lines
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
@@ -45,9 +45,19 @@ class Output:
     ----------
     json
         Print JSON, in SI units; results.json where that is written.
+    quiet
+        Print nothing for people, not even progress: the exit code is the answer.
+    log_level
+        What to say on stderr while it works: info for every step, debug for all progress.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
+    quiet: Annotated[bool, Parameter(negative="")] = False
+    log_level: Literal["warning", "info", "debug"] = "warning"
+
+    def __post_init__(self) -> None:
+        if (self.quiet, self.log_level) != (False, "warning"):
+            hush(quiet=self.quiet, level=self.log_level)
 
     def show(self, facts: dict[str, Any], said: Iterable[str] | Callable[[], object]) -> None:
         """Print facts as JSON, or else what is said for people: lines, or a call that prints them."""

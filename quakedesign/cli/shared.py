@@ -1,8 +1,10 @@
 """What all commands share: the application, options, output and progress."""
 
 import json
+import logging
 import os
 import shlex
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -95,12 +97,27 @@ ExactMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m/s"))]
 Whole = Annotated[int, Parameter(converter=_whole)]
 Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
+_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+_log = logging.getLogger("quakedesign")
 _typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
 
 
 def typed(arguments: Sequence[str]) -> None:
-    """Keep what was typed, for `command_line`."""
+    """Keep what was typed, for `command_line`, and speak until `hush` is called."""
     _typed.set(tuple(arguments))
+    hush(quiet=False, level="warning")
+
+
+def hush(*, quiet: bool, level: str) -> None:
+    """Say nothing for people from here on, or say what is being done on stderr, from a level of logging on."""
+    _quiet.set(quiet)
+    for handler in _log.handlers[:]:
+        _log.removeHandler(handler)
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    _log.addHandler(handler)
+    _log.propagate = False
+    _log.setLevel(level.upper())
 
 
 def command_line() -> str:
@@ -146,7 +163,7 @@ class _Screen(Console):
 
 def console(**options: Any) -> Console:
     """Console for people, on stdout unless told; every string is one line of text."""
-    return _Screen(markup=False, emoji=False, highlight=False, soft_wrap=True, **options)
+    return _Screen(quiet=_quiet.get(), markup=False, emoji=False, highlight=False, soft_wrap=True, **options)
 
 
 def new_file(path: Path | None, what: str, *, force: bool) -> None:
@@ -173,10 +190,14 @@ def progress() -> Iterator[Callable[[str, float], None]]:
 
     columns = TextColumn("{task.description:44}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
     console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("starting", total=1.0)
+    shown = console.is_terminal and not _quiet.get()
+    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
+        task, last = bar.add_task("starting", total=1.0), ""
 
         def tell(what: str, done: float) -> None:
+            nonlocal last
             bar.update(task, description=what, completed=done)
+            _log.log(logging.DEBUG if what == last else logging.INFO, "%s (%.0f %%)", visible(what), 100 * done)
+            last = what
 
         yield tell
