@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -54,6 +54,33 @@ class Loop:
     fade: Fade | None = None
 
 
+@dataclass
+class Held:
+    """A law of samples as a file states it, and the places of the pressure's states in its loop."""
+
+    step: Fraction
+    delay: Fraction
+    lag: Fraction
+    diffusion: Fraction  # 0 without a layer
+    update: list[Row]
+    measured: list[Row]
+    output: Row
+    feedback: Row
+    root: Root | None
+    noise: tuple[Fraction, Fraction]
+
+    def __post_init__(self) -> None:
+        whole, self.part = self.delay // self.step, self.delay % self.step  # arrival after a sample
+        self.own = len(self.update)
+        self.waiting = int(whole) + (self.part > 0)
+        self.valve = 2 + self.own + self.waiting
+        layered = self.diffusion > 0
+        self.well, self.stepped = self.valve + 1, layered and self.lag == 0
+        self.path = range(self.well, self.well + (self.lag > 0) + MODES * layered)
+        self.modes = self.path[self.lag > 0 :]
+        self.size = self.well + len(self.path) + self.stepped
+
+
 def read_loop(value: Any, task: Task) -> Loop:
     """Build the error loop: e1, e2, the law's states, pressures on their way, valve, and what lies behind it.
 
@@ -62,10 +89,27 @@ def read_loop(value: Any, task: Task) -> Loop:
     """
     if type(value) is dict and "rates" in value:
         return read_continuous(value, task)
+    law = read_held(value)
+    flow, push = flow_of(law, task)
+    sample, arrival = maps_of(law, task.b)
+    size, root, step = law.size, law.root, law.step
+    slope = sum(root.slopes) / (2 * step) if root else Fraction(0)
+    events = [([[line[0] - slope * line[size], *line[1:size]] for line in sample], law.part or step)]
+    events += [(arrival, step - law.part)] if law.part else []
+    inputs = [unit(size)[1], drift_of(law, task.b), *([[line[size] for line in sample]] if root else [])]
+    told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
+    inputs += [entry for entry, off in zip(told, law.noise, strict=True) if off]
+    outputs = [unit(size)[0], unit(size)[1], push]
+    loop = Loop(flow, events, outputs, inputs, root, step, law.noise)
+    return with_left_out(loop, law) if law.diffusion else loop
+
+
+def read_held(value: Any) -> Held:
+    """Read step, delay, lag and diffusion, the law's matrices, the implicit step and the noise."""
     more = [k for k in ("root", "noise", "diffusion") if type(value) is dict and k in value]
     parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
     given = keys(value, "loop", *parts, *more)
-    implicit, layered = "root" in more, "diffusion" in more
+    implicit = "root" in more
     root = read_root(given["root"]) if implicit else None
     step, delay, lag = (number(given[k], k) for k in ("step", "delay", "lag"))
     need(step > 0 and 0 <= delay <= MAX_PERIODS * step and lag >= 0, "step > 0, delay of 0 to 8 steps, lag >= 0")
@@ -75,71 +119,71 @@ def read_loop(value: Any, task: Task) -> Loop:
     noise = read_noise(given["noise"]) if "noise" in more else (Fraction(0), Fraction(0))
     need(implicit or not noise[1] or uses_rate(seen, feedback), "noise of the slip rate needs a law that measures it")
     time = number(given.get("diffusion", "0"), "diffusion")
-    need(not layered or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
-    whole, part = delay // step, delay % step
-    waiting = int(whole) + (part > 0)
-    behind, stepped = (lag > 0) + MODES * layered, layered and lag == 0
-    size = 2 + n + waiting + 1 + behind + stepped
-    need(size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
-    valve = 2 + n + waiting
-    path = range(valve + 1, valve + 1 + behind)
-    modes = path[lag > 0 :]
+    need("diffusion" not in more or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
+    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise)
+    need(law.size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
+    return law
 
-    push = [Fraction(i in (valve, valve + 1)) for i in range(size)]  # modes follow
-    flow = zeros(size)
+
+def flow_of(law: Held, task: Task) -> tuple[list[Row], Row]:
+    """The flow between events, and what the states say of the fault's pressure."""
+    push = [Fraction(i in (law.valve, law.well)) for i in range(law.size)]  # modes follow
+    flow = zeros(law.size)
     flow[0][1] = Fraction(1)
-    if lag > 0:
-        flow[valve + 1][valve + 1] = -1 / lag
-    for k, mode in enumerate(modes):
-        push[mode], flow[mode][mode] = mode_share(k), -mode_rate(k, time)
-        if lag > 0:
-            flow[mode][valve + 1] = 1 / lag
+    if law.lag > 0:
+        flow[law.well][law.well] = -1 / law.lag
+    for k, mode in enumerate(law.modes):
+        push[mode], flow[mode][mode] = mode_share(k), -mode_rate(k, law.diffusion)
+        if law.lag > 0:
+            flow[mode][law.well] = 1 / law.lag
     flow[1] = [sum(task.beta) / 2 * v for v in push]
     flow[1][0], flow[1][1] = sum(task.s) / 2, -sum(task.w) / 2
+    return flow, push
 
+
+def maps_of(law: Held, b: Fraction) -> tuple[list[Row], list[Row]]:
+    """The sample, with one more column for w, and the arrival of a pressure, which counts if it is between samples."""
+    n, size, valve = law.own, law.size, law.valve
     rest = [Fraction(0)] * (size - 2 - n)  # behind it the column of w
-    asked = [*(task.b * v for v in (*feedback[:2], *output)), *rest, task.b * sum(feedback[2:])]
+    asked = [*(b * v for v in (*law.feedback[:2], *law.output)), *rest, b * sum(law.feedback[2:])]
     sample = [[*line, Fraction(0)] for line in unit(size)]
-    for i in range(n):
-        sample[2 + i] = [*seen[i][:2], *update[i], *rest, Fraction(sum(seen[i][2:]))]
-    queue = [*range(2 + n, 2 + n + waiting), *([] if part else [valve])]
+    for i, (seen, kept) in enumerate(zip(law.measured, law.update, strict=True)):
+        sample[2 + i] = [*seen[:2], *kept, *rest, Fraction(sum(seen[2:]))]
+    queue = [*range(2 + n, valve), *([] if law.part else [valve])]
     for i, place in enumerate(queue):
         sample[place] = [*unit(size)[queue[i - 1]], Fraction(0)] if i else asked
     arrival = unit(size)
     arrival[valve] = unit(size)[valve - 1]
-    pressures = [Fraction(0)] * (2 + n) + [Fraction(-1)] * (waiting + 1) + [Fraction(0)] * (behind + stepped)
-    still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(update)]
-    drift = [
-        *pressures[:2],
-        *(-v / task.b for v in steady_states(still, output, [Fraction(0)] * n, Fraction(1))),
-        *pressures[2 + n :],
-    ]
-    last = arrival if part else sample
+    last = arrival if law.part else sample
     change = [v - (i == valve) for i, v in enumerate(last[valve])]
-    for i in path[:1] if lag > 0 else path:  # it stays while the valve's pressure jumps
+    for i in law.path[:1] if law.lag > 0 else law.path:  # it stays while the valve's pressure jumps
         last[i] = [v - c for v, c in zip(last[i], change, strict=True)]
-    if stepped:
+    if law.stepped:
         last[-1] = change
-    slope = sum(root.slopes) / (2 * step) if root else Fraction(0)
-    events = [([[line[0] - slope * line[size], *line[1:size]] for line in sample], part or step)]
-    events += [(arrival, step - part)] if part else []
-    inputs = [unit(size)[1], drift, *([[line[size] for line in sample]] if root else [])]
-    told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
-    inputs += [entry for entry, off in zip(told, noise, strict=True) if off]
-    outputs = [unit(size)[0], unit(size)[1], push]
-    if not layered:
-        return Loop(flow, events, outputs, inputs, root, step, noise)
-    high, rate, floor = abs(mode_share(MODES)), mode_rate(MODES, time), 6 * MODES * SHORT
-    if lag > 0:
-        left = (high / rate + floor * time) / lag
-        return Loop(
-            flow, events, [*outputs, [left * v for v in unit(size)[valve + 1]]], inputs, root, step, noise, BENT, HALVES
-        )
-    height, floor = high * (1 + 1 / (rate * step)), floor * (1 + time / step)
+    return sample, arrival
+
+
+def drift_of(law: Held, b: Fraction) -> Row:
+    """What a change of the steady pressure does to the states, which are counted from those that ask for it."""
+    still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(law.update)]
+    steady = steady_states(still, law.output, [Fraction(0)] * law.own, Fraction(1))
+    behind = [Fraction(0)] * (law.size - law.well)
+    return [Fraction(0), Fraction(0), *(-v / b for v in steady), *[Fraction(-1)] * (law.waiting + 1), *behind]
+
+
+def with_left_out(loop: Loop, law: Held) -> Loop:
+    """The loop with a bound of what the modes of a layer leave out: of the well's flow, or fading after its steps."""
+    size, time, high = law.size, law.diffusion, abs(mode_share(MODES))
+    rate, floor = mode_rate(MODES, time), 6 * MODES * SHORT
+    cut = replace(loop, cuts=BENT, past_cuts=HALVES)
+    if law.lag > 0:
+        left = (high / rate + floor * time) / law.lag
+        return replace(cut, outputs=[*loop.outputs, [left * v for v in unit(size)[law.well]]])
+    height, floor = high * (1 + 1 / (rate * law.step)), floor * (1 + time / law.step)
     most = height + floor
-    fade = Fade(int(part > 0), height / most, rate, floor / most)
-    outputs, inputs = [*outputs, [most * v for v in unit(size)[-1]]], [*inputs, unit(size)[1]]
-    return Loop(flow, events, outputs, inputs, root, step, noise, BENT, HALVES, fade)
+    fade = Fade(int(law.part > 0), height / most, rate, floor / most)
+    outputs, inputs = [*loop.outputs, [most * v for v in unit(size)[-1]]], [*loop.inputs, unit(size)[1]]
+    return replace(cut, outputs=outputs, inputs=inputs, fade=fade)
 
 
 def read_noise(value: Any) -> tuple[Fraction, Fraction]:
