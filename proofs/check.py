@@ -39,6 +39,10 @@ IMPORTS = {
         *("guarantee_reading", "guarantee_task", "guarantee_root"),
         *("guarantee_loop", "guarantee_slow", "guarantee_bounds"),
     ),
+    "slow_sliding": (
+        *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
+        *("guarantee_loop", "guarantee_gains", "guarantee_bounds"),
+    ),
 }
 LOADED: dict[str, ModuleType] = {}
 
@@ -122,9 +126,10 @@ def check_polynomial(document: dict[str, Any]) -> Result:
 
 
 def check_guarantee(document: dict[str, Any]) -> Result:
-    """Verify a file of the kind ``guarantee``."""
-    need(document["kind"] == "guarantee", "kind", "guarantee", document["kind"])
-    return Result("proved", tuple(beside("guarantee").verify(document)))
+    """Verify a file of the kind ``guarantee`` or ``slow_sliding``."""
+    kind = document["kind"]
+    need(kind in ("guarantee", "slow_sliding"), "kind", "guarantee or slow_sliding", kind)
+    return Result("proved", tuple(beside(kind).verify(document)))
 
 
 # ---------------------------------------------------------------- the command

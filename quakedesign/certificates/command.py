@@ -20,6 +20,7 @@ from quakedesign.certificates.premises import (
     largest_matched_rate,
     least_authority,
 )
+from quakedesign.certificates.slow_sliding import is_sliding, read_sliding, sliding_task
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.fault import Fault, load_fault
 from quakedesign.sos import Answer, Positivity
@@ -60,6 +61,8 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
         if is_about_attraction(raw):
             verdict_of, said = _attraction(raw)
             return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
+        if is_sliding(raw):
+            return _sliding(raw, fault)
         if is_about_polynomial(raw):
             verdict_of, said = _polynomial(raw)
             return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
@@ -83,6 +86,20 @@ def _guarantee(raw: Any, fault: Fault | None) -> tuple[str, list[str]]:
         if claim.task != task_of(fault, rate_limited=claim.task.change is not None):
             raise CertificateError(f"the data are not those of {fault.name}")
         lines.append(f"the data are those of {fault.name}, box {fault.box.name}")
+    return str(Verdict.PROVED), lines
+
+
+def _sliding(raw: Any, fault: Fault | None) -> tuple[str, list[str]]:
+    """Verdict on a file about slow sliding, and whether its data are those of a fault."""
+    claim = read_sliding(raw)
+    if claim.check() is not Verdict.PROVED:
+        raise CertificateError("the claims do not follow from the loop and the fault's data")
+    lines = [f"fault {claim.task.name}, by the data in the file", claim.sentence()]
+    if fault is not None:
+        low, high = claim.task.ranges["direct_effect"]
+        if claim.task != sliding_task(fault, claim.task.stress, (high - low) / (high + low)):
+            raise CertificateError(f"the data are not those of {fault.name}")
+        lines.append(f"the data are those of {fault.name}")
     return str(Verdict.PROVED), lines
 
 

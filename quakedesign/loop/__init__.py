@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.observer import ErrorPrediction, slip_observer
     from quakedesign.loop.periodic import Fading, PeriodicLoop, Segment
     from quakedesign.loop.running import SampledController
-from quakedesign.loop.sliding import SlidingModel, sliding_loop
+    from quakedesign.loop.sliding import SlidingModel, at_once, sliding_loop
 
 __all__ = [
     "NOISES",
@@ -41,6 +41,7 @@ __all__ = [
     "SampledController",
     "Segment",
     "SlidingModel",
+    "at_once",
     "compensated",
     "continuous_loop",
     "disturbance_estimate",

@@ -15,7 +15,7 @@ _ONE = Fraction(1)
 class SlidingModel:
     """Middle of what may be about sliding at V, with v = Ve^y, θ = (D/V)e^z, slip error x, pressure error q = p − p*.
 
-    strength·y + weakening·z = −stiffness·x + coefficient·q + e, x′ = V·c·y, z′ = −ρc(y + z), ρ = V/D.
+    strength·y + weakening·z = −stiffness·x + coefficient·q + e, x′ = V·c·y, z′ = −ρ(c·y + c_z·z), ρ = V/D.
 
     Attributes
     ----------
@@ -25,6 +25,8 @@ class SlidingModel:
         ρ [1/s].
     slope : Fraction
         c [-], in place of e^y − 1 over y.
+    state_slope : Fraction
+        c_z [-], in place of 1 − e^{−z} over z.
     strength : Fraction
         What a change of y takes, N·a and damping [Pa].
     weakening : Fraction
@@ -40,6 +42,7 @@ class SlidingModel:
     rate: Fraction
     state_rate: Fraction
     slope: Fraction
+    state_slope: Fraction
     strength: Fraction
     weakening: Fraction
     direct: Fraction
@@ -61,9 +64,10 @@ def sliding_loop(
     """The error loop about sliding at V, with the order of events and the path of the pressure of `held_loop`.
 
     States: the slip error x [m] and z [-] in place of e1 and e2; pressures in Pa. Inputs: ``stress`` e [Pa], ``rate`` f
-    [-] in x′ = V(cy + f) and z′ = −ρ(c(y + z) + f), ``state`` h [1/s] in z′, and the ``drift`` dp*/dt [Pa/s]. Outputs:
-    ``slip_error`` x [m], ``log_rate`` y, ``log_state`` z, ``both`` y + z, ``strength`` a·y + b·z, ``push`` q [Pa], and
-    with a layer ``left_out`` [Pa]; those of y and q without what e and what the layer leaves out add to them at once.
+    [-] in x′ = V(cy + f) and z′ = −ρ(cy + c_z·z + f), ``state`` h [-] in z′ = … − ρh, and the ``drift`` dp*/dt [Pa/s].
+    Outputs: ``slip_error`` x [m], ``log_rate`` y, ``log_state`` z, ``ageing`` cy + c_z·z, ``strength`` a·y + b·z,
+    ``push`` q [Pa], ``asked`` [Pa], what arrived at the valve less what p* needs, and with a layer ``left_out`` [Pa].
+    Those of y and q come without what e and what the layer leaves out add to them at once (`at_once`).
 
     Raises
     ------
@@ -78,10 +82,10 @@ def sliding_loop(
     y[0] -= model.stiffness / model.strength
     y[1] -= model.weakening / model.strength
     z = _row(size, {1: _ONE})
-    both = tuple(a + b for a, b in zip(y, z, strict=True))
-    moving, ageing = model.rate * model.slope, model.state_rate * model.slope
-    flow = (tuple(moving * v for v in y), tuple(-ageing * v for v in both), *loop.flow[2:])
-    by_stress = _row(size, {0: moving / model.strength, 1: -ageing / model.strength})
+    ageing = tuple(model.slope * a + model.state_slope * b for a, b in zip(y, z, strict=True))
+    moving = model.rate * model.slope
+    flow = (tuple(moving * v for v in y), tuple(-model.state_rate * v for v in ageing), *loop.flow[2:])
+    by_stress = _row(size, {0: moving / model.strength, 1: -model.state_rate * model.slope / model.strength})
     by_pressure = tuple(model.coefficient * v for v in by_stress)
     left_out = {"left_out": row} if (row := loop.outputs.get("left_out")) else {}
     return replace(
@@ -90,20 +94,28 @@ def sliding_loop(
         inputs={
             "stress": by_stress,
             "rate": _row(size, {0: model.rate, 1: -model.state_rate}),
-            "state": z,
+            "state": _row(size, {1: -model.state_rate}),
             "drift": loop.inputs["drift"],
         },
         outputs={
             "slip_error": _row(size, {0: _ONE}),
             "log_rate": tuple(y),
             "log_state": z,
-            "both": both,
+            "ageing": ageing,
             "strength": tuple(model.direct * a + model.evolution * b for a, b in zip(y, z, strict=True)),
             "push": push,
+            "asked": _row(size, {loop.states.index("valve"): _ONE}),
             **left_out,
         },
         fading={name: replace(fading, entry=by_pressure) for name, fading in loop.fading.items()},
     )
+
+
+def at_once(model: SlidingModel) -> dict[tuple[str, str], Fraction]:
+    """What an input of size 1 adds to an output at the same instant, by (output, input)."""
+    heard = {"log_rate": _ONE, "ageing": model.slope, "strength": model.direct}
+    sizes = {"stress": 1 / model.strength, "left_out": model.coefficient / model.strength}
+    return {(output, name): share * size for output, share in heard.items() for name, size in sizes.items()}
 
 
 def _row(size: int, entries: dict[int, Fraction]) -> Row:

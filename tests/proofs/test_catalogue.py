@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.certificates import certificate_text, load_certificate, loop_of
+from quakedesign.certificates import Verdict, certificate_text, load_certificate, loop_of
 from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.slow_sliding import parse_sliding, read_sliding, sliding_task, sliding_text
 from quakedesign.controllers import family, law
 from quakedesign.fault import load_fault
 from quakedesign.sos.exact import files as polynomial_files
@@ -22,7 +23,8 @@ ROOT = Path(__file__).parents[2] / "proofs"
 FILES = sorted((ROOT / "certificates").glob("*.json"))
 POLYNOMIALS = [p for p in FILES if p.stem.startswith("motzkin")]
 GUARANTEES = [p for p in FILES if p.stem.startswith("guarantee")]
-LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES)]
+SLIDING = [p for p in FILES if p.stem.startswith("sliding")]
+LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES, *SLIDING)]
 each = pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 each_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda p: p.stem)
 
@@ -52,6 +54,7 @@ def test_the_catalogue_is_complete():
     assert {p.stem for p in LOOPS} == {*STATEMENTS, "elqr_real-fault", "elqr_lab-fault"}
     loops = {"real-fault", "lab-fault", "cta_real-fault", "late_real-fault"}
     assert {p.stem for p in GUARANTEES} == {f"guarantee_{loop}" for loop in loops}
+    assert {p.stem for p in SLIDING} == {"sliding_crustal-patch"}
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
 
 
@@ -70,6 +73,8 @@ def test_the_library_writes_the_same_bytes(path):
         assert polynomial_files.text(*polynomial_files.load(text)) == text
     elif path in GUARANTEES:
         assert guarantee_text(parse_guarantee(text)) == text
+    elif path in SLIDING:
+        assert sliding_text(parse_sliding(text)) == text
     else:
         assert certificate_text(load_certificate(path)) == text
 
@@ -129,6 +134,30 @@ def test_a_smaller_claim_of_a_guarantee_is_refused_by_both(path, key, tmp_path):
     assert verdict != "proved"
     with pytest.raises(checker.Refused):
         checker.check(changed.read_text())
+
+
+def test_a_patch_of_the_crust_is_held_at_1_65_times_its_rate_under_25_kpa():
+    path = ROOT / "certificates" / "sliding_crustal-patch.json"
+    claim = parse_sliding(path.read_text())
+    assert claim.task == sliding_task(load_fault("crustal-patch"), F(25000))
+    assert claim.peak_slip_rate < F("1.65e-6")
+    raw = json.loads(path.read_text())
+    raw["stress"] = "80000"
+    assert read_sliding(raw).check() is Verdict.UNDECIDED
+
+
+@pytest.mark.slow
+def test_a_box_of_ten_percent_is_held_under_5e_4_of_the_normal_stress():
+    """Minutes for the standalone checker: 32 cells through rock."""
+    path = ROOT / "certificates" / "boxes" / "sliding_ten-percent.json"
+    claim, text = parse_sliding(path.read_text()), path.read_text()
+    assert sliding_text(claim) == text
+    assert claim.task.stress == F(5, 10**4) * claim.task.ranges["normal_stress"][0]
+    for name, value in (("direct_effect", "0.010"), ("evolution_effect", "0.015"), ("critical_slip", "0.001")):
+        assert claim.task.ranges[name] == (F(value) * F("0.9"), F(value) * F("1.1"))
+    assert claim.claims.log_rate == F(1, 2)
+    assert claim.check() is Verdict.PROVED
+    assert checker.check(text).verdict == "proved"
 
 
 def test_the_polynomial_is_that_of_motzkin():

@@ -199,6 +199,19 @@ def bounds_from(
     """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
     channels = (*channels_of(task, root, step, noise, spread), *_fed_forward(task, {name for _, name in gains}))
     channels = tuple(_through_layer(task, channels, gains))
+    small_gain, found = channel_bounds(channels, gains)
+    if found is None:
+        return _none(small_gain, channels, gains)
+    return Bounds(
+        slip_error=Fraction(found["slip_error"]),
+        slip_rate_error=Fraction(found["slip_rate_error"]),
+        push=Fraction(found["push"] + found.get("left_out", _ZERO) + _unshifted(task)),
+        small_gain=Fraction(small_gain),
+    )
+
+
+def channel_bounds(channels: Sequence[Channel], gains: Gains) -> tuple[Any, dict[str, Any] | None]:
+    """Spectral radius of M from above and, where it is below 1, the bound of every output."""
     loops = [
         [
             max(sum((c * gains[y, k.name][j] for y, c in i.shares.items()), _ZERO) for j in _parts(gains))
@@ -208,20 +221,14 @@ def bounds_from(
     ]
     small_gain = spectral_radius(loops)
     if small_gain >= 1:
-        return _none(small_gain, channels, gains)
+        return small_gain, None
     inputs = _solved(loops, [channel.own for channel in channels])
-    found = {
+    return small_gain, {
         y: max(
             sum((gains[y, k.name][j] * v for k, v in zip(channels, inputs, strict=True)), _ZERO) for j in _parts(gains)
         )
         for y in dict.fromkeys(y for y, _ in gains)
     }
-    return Bounds(
-        slip_error=Fraction(found["slip_error"]),
-        slip_rate_error=Fraction(found["slip_rate_error"]),
-        push=Fraction(found["push"] + found.get("left_out", _ZERO) + _unshifted(task)),
-        small_gain=Fraction(small_gain),
-    )
 
 
 def channels_of(
@@ -293,7 +300,7 @@ def _dominates(value: Any, matrix: Sequence[Sequence[Any]]) -> bool:
 
 
 def _parts(gains: Gains) -> range:
-    return range(len(gains["push", "drift"]))
+    return range(len(next(iter(gains.values()))))
 
 
 def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:

@@ -28,7 +28,7 @@ class Estimate:
 
 def estimated(task: Task, held: Held) -> Estimate | None:
     """Bounds of the theorem with sums in place of upper sums; None where the nominal loop is unstable or very slow."""
-    gains = _gains(held.loop(task))
+    gains = gains_of(held.loop(task))
     if gains is None:
         return None
     return Estimate(bounds_from(task, gains, held.law.root, held.step, held.noise), max(gains["slip_error", "drift"]))
@@ -39,7 +39,7 @@ def slowly_estimated(task: Task, held: Held) -> Estimate | None:
     low, high = task.beta
     found = []
     for share in _ENDS:
-        gains = _gains(held.loop(task, replace(task.model, gain=(low + share * (high - low)) * task.authority)))
+        gains = gains_of(held.loop(task, replace(task.model, gain=(low + share * (high - low)) * task.authority)))
         if gains is None:
             return None
         found.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
@@ -59,7 +59,7 @@ class _Flow:
     piece: float
 
 
-def _gains(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | None:
+def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | None:
     """Gains at every end of a piece."""
     flow = np.array(loop.flow, dtype=float)
     flows, period = [], np.eye(len(flow))

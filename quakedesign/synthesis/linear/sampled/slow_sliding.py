@@ -70,6 +70,7 @@ def sliding_model(fault: Fault) -> SlidingModel:
         rate=rate,
         state_rate=_number(errors.decays[1].subs(at)),
         slope=_ONE,
+        state_slope=_ONE,
         strength=normal * direct + rational(fault.damping) / rational(fault.length) ** 2 * rate,
         weakening=normal * evolution,
         direct=direct,

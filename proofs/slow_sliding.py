@@ -1,0 +1,376 @@
+"""Verify certificate files of the kind ``slow_sliding`` (FORMAT.md) with the Python standard library alone.
+
+From a fault with rate-and-state friction, ranges of its constants, and a controller's matrices to a bound of the slip
+rate. The loop's path of the pressure, its impulse responses and the small gain are those of the kind ``guarantee``.
+"""
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import accumulate
+from typing import Any
+
+from guarantee_bounds import radius, solve
+from guarantee_gains import gains
+from guarantee_loop import Fade, Loop, read_loop
+from guarantee_numbers import unit
+from guarantee_reading import Row, keys, lower, need, number, numbers, row, upper
+from guarantee_task import FAULT, Task
+
+MAX_CELLS = 64
+MAX_LOGARITHM = 3
+TERMS = 24
+FADED = Fraction(1, 16)
+ROCK = ("density", "shear_modulus", "length", "damping")
+CONSTANTS = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")
+PATH = ("step", "delay", "lag", "diffusion", "slip_noise")
+LAW = ("states", "update", "measured", "output", "feedback")
+CLAIMS = ("log_rate", "log_state", "slip_error", "push", "asked")
+
+Range = tuple[Fraction, Fraction]
+
+
+@dataclass
+class Fault:
+    """Rock, plan and disturbance in SI units; one box of constants at a time."""
+
+    name: str
+    inertia: Fraction
+    stiffness: Fraction
+    radiation: Fraction
+    rate: Fraction
+    distance: Fraction
+    ramp: Fraction
+    stress: Fraction
+    box: dict[str, Range]
+
+    def load(self) -> Fraction:
+        """Rate of the shear stress that the reference takes off."""
+        return self.stiffness * self.rate
+
+    def drift(self) -> Fraction:
+        """How fast the pressure that is needed may leave the plan."""
+        return max(abs(self.load() / mu - self.ramp) for mu in self.box["coefficient"])
+
+    def normal(self, push: Fraction) -> Range:
+        """Range of the effective normal stress, the pressure up to `push` off."""
+        low, high = self.box["normal_stress"]
+        return low - self.stiffness * self.distance / self.box["coefficient"][0] - push, high + push
+
+
+@dataclass
+class Path:
+    """How the pressure gets to the fault, and what is measured."""
+
+    lag: Fraction
+    diffusion: Fraction
+    noise: Fraction
+
+
+# ---------------------------------------------------------------- reading
+
+
+def read_fault(document: dict[str, Any]) -> Fault:
+    """Read fault, reference and stress."""
+    given = keys(document["fault"], "fault", "name", *ROCK, *CONSTANTS)
+    need(type(given["name"]) is str and FAULT.fullmatch(given["name"]) is not None, "fault.name must be a short text")
+    rho, modulus, size, eta = (number(given[name], name) for name in ROCK)
+    box = {}
+    for name in CONSTANTS:
+        low, high = row(given[name], name, 2)
+        need(0 < low <= high, f"{name} must have two ends that are ordered and above 0")
+        box[name] = low, high
+    rate, distance, ramp = numbers(document["reference"], "reference", "rate", "distance", "ramp").values()
+    stress = number(document["stress"], "stress")
+    need(min(rho, modulus, size, rate) > 0, "density, modulus, length and rate must be > 0")
+    need(min(eta, distance, ramp, stress) >= 0, "damping, distance, ramp and stress must be >= 0")
+    return Fault(given["name"], rho * size, modulus / size, eta / size**2, rate, distance, ramp, stress, box)
+
+
+def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
+    """Cut the box: a cut, then all of its lower part, then all of its upper part; an empty list for no cut."""
+    need(type(value) is list and 0 < len(value) < 2 * MAX_CELLS, f"there must be 1 to {MAX_CELLS} cells")
+    open_boxes, cells = [box], []
+    for entry in value:
+        need(bool(open_boxes), "cells must end where every part has been said")
+        part = open_boxes.pop()
+        if entry == [] and type(entry) is list:
+            cells.append(part)
+            continue
+        need(type(entry) is list and len(entry) == 2, "a cut must be a constant and a number")
+        name, at = entry[0], number(entry[1], "a cut")
+        need(type(name) is str and name in CONSTANTS, f"a cut must be across one of {', '.join(CONSTANTS)}")
+        low, high = part[name]
+        need(low < at < high, "a cut must lie inside its box")
+        open_boxes += [part | {name: (at, high)}, part | {name: (low, at)}]
+    need(not open_boxes, "cells must say every part")
+    return cells
+
+
+def read_path(value: Any) -> tuple[Loop, Path, int]:
+    """The loop of a guarantee with the pressure's path alone, and where the valve's pressure is among its states."""
+    given = keys(value, "loop", *PATH, *LAW)
+    path = Path(*(number(given[name], name) for name in ("lag", "diffusion", "slip_noise")))
+    need(path.noise >= 0, "slip_noise must be >= 0")
+    need(path.lag > 0 or path.diffusion > 0, "the pressure must reach the fault through a lag or rock")
+    measured = given["measured"]
+    need(type(measured) is list, "measured must be a list")
+    plain = {name: given[name] for name in ("step", "delay", "lag", "states", "update", "output")}
+    plain |= {"measured": [[v, "0"] for v in measured], "feedback": [given["feedback"], "0"]}
+    plain |= {"diffusion": given["diffusion"]} if path.diffusion else {}
+    plain |= {"noise": {"slip": given["slip_noise"], "rate": "0"}} if path.noise else {}
+    still, zero = (Fraction(0), Fraction(0)), Fraction(0)
+    one = Fraction(1)
+    nothing = Task("", one, still, still, (one, one), still, zero, zero, zero, True, zero, zero, zero, None, zero, True)
+    loop = read_loop(plain, nothing)
+    step, delay = number(given["step"], "step"), number(given["delay"], "delay")
+    return loop, path, 2 + len(given["states"]) + int(delay // step) + (delay % step > 0)
+
+
+# ---------------------------------------------------------------- exponentials and sectors
+
+
+def partial(size: Fraction) -> Fraction:
+    """e^x from below, x >= 0."""
+    total = term = Fraction(1)
+    for k in range(1, TERMS):
+        term = term * size / k
+        total += term
+    return total
+
+
+def power_of_e(size: Fraction) -> Fraction:
+    """e^x from above, 0 <= x <= 3: terms left out are below a geometric series."""
+    term = Fraction(1)
+    for k in range(1, TERMS + 1):
+        term = term * size / k
+    return partial(size) + term / (1 - size / (TERMS + 1))
+
+
+def sector(size: Fraction) -> Range:
+    """Slopes of e^y - 1, and of 1 - e^-y, for |y| <= size."""
+    return (1 - 1 / partial(size)) / size, (power_of_e(size) - 1) / size
+
+
+def middle(ends: Range) -> Fraction:
+    """Of a range."""
+    return (ends[0] + ends[1]) / 2
+
+
+def half(ends: Range) -> Fraction:
+    """Half the width of a range."""
+    return (ends[1] - ends[0]) / 2
+
+
+# ---------------------------------------------------------------- one cell
+
+
+@dataclass
+class Cell:
+    """A box of constants with what the claims make of it."""
+
+    fault: Fault
+    path: Path
+    claims: dict[str, Fraction]
+    normal: Range
+
+    def __post_init__(self) -> None:
+        self.a, self.b, slips, self.mu, _ = (self.fault.box[name] for name in CONSTANTS)
+        self.ageing = self.fault.rate / slips[1], self.fault.rate / slips[0]
+        self.rates, self.states = sector(self.claims["log_rate"]), sector(self.claims["log_state"])
+        self.grown, self.aged = power_of_e(self.claims["log_rate"]), power_of_e(self.claims["log_state"])
+        self.viscous = self.fault.radiation * self.fault.rate
+        self.strength = middle(self.normal) * middle(self.a) + self.viscous * middle(self.rates)
+        self.weakening = middle(self.normal) * middle(self.b)
+
+    def fastest_push(self) -> Fraction:
+        """Bound of |q'|."""
+        path, drift = self.path, self.fault.drift()
+        late = path.diffusion / 2 + path.lag
+        fast = Fraction(5, 2) / path.diffusion if path.diffusion > 0 else 1 / path.lag
+        return fast * (self.claims["asked"] + drift * late + self.claims["push"]) + drift
+
+    def fastest_state(self) -> Fraction:
+        """Bound of |z'|."""
+        return self.ageing[1] * max(self.grown - 1 / self.aged, self.aged - 1 / self.grown)
+
+    def stress(self) -> Fraction:
+        """Stress with all that the mass may add."""
+        fault, claims, push = self.fault, self.claims, self.fastest_push()
+        bent = self.a[1] * claims["log_rate"] + self.b[1] * claims["log_state"]
+        moved = (fault.load() / self.mu[0] + push) * bent + self.normal[1] * self.b[1] * self.fastest_state()
+        moved += fault.load() * (self.grown - 1) + self.mu[1] * push
+        return fault.stress + moved * fault.inertia * fault.rate * self.grown / (self.normal[0] * self.a[0])
+
+    def soon(self, time: Fraction) -> Row:
+        """How far y, cy + c_z z and ay + bz may move within this time, the stress aside."""
+        state = self.fastest_state()
+        change = self.fault.load() * (self.grown - 1) + self.weakening * state
+        change += middle(self.mu) * self.fastest_push()
+        y, z = change * time / self.strength, state * time
+        return [
+            y,
+            middle(self.rates) * y + middle(self.states) * z,
+            middle(self.a) * y + middle(self.b) * z,
+        ]
+
+
+def around(loop: Loop, cell: Cell, valve: int) -> Loop:
+    """The loop about slow sliding: y, cy + c_z z, ay + bz, z, x, q, the valve's pressure and what is left out."""
+    size, fault = len(loop.flow), cell.fault
+    unit_rows, push = unit(size), loop.outputs[2]
+    y = [middle(cell.mu) * v / cell.strength for v in push]
+    y[0] -= fault.stiffness / cell.strength
+    y[1] -= cell.weakening / cell.strength
+    c, cz, speed = middle(cell.rates), middle(cell.states), middle(cell.ageing)
+    z = unit_rows[1]
+    ageing = [c * a + cz * b for a, b in zip(y, z, strict=True)]
+    strong = [middle(cell.a) * a + middle(cell.b) * b for a, b in zip(y, z, strict=True)]
+    flow = [[fault.rate * c * v for v in y], [-speed * v for v in ageing], *loop.flow[2:]]
+
+    def entry(slip: Fraction, state: Fraction) -> Row:
+        return [slip, state, *[Fraction(0)] * (size - 2)]
+
+    stress = entry(fault.rate * c / cell.strength, -speed * c / cell.strength)
+    inputs = [stress, entry(fault.rate, -speed), entry(Fraction(0), -speed)]
+    inputs += [loop.inputs[1]] if fault.drift() else []
+    inputs += [loop.inputs[2]] if cell.path.noise else []
+    inputs += [[middle(cell.mu) * v for v in stress]] if loop.fade else []
+    outputs = [y, ageing, strong, z, unit_rows[0], push, unit_rows[valve], *loop.outputs[3:]]
+    return replace(loop, flow=flow, inputs=inputs, outputs=outputs)
+
+
+def since_step(loop: Loop) -> Row:
+    """Times since a step reached the well at the beginning of every piece; all 0 where none does."""
+    starts = list(accumulate((length for _, length in loop.events), initial=Fraction(0)))
+    if not loop.fade:
+        return [Fraction(0)] * (len(loop.events) * (len(loop.cuts) - 1))
+    origin = starts[loop.fade.event]
+    return [
+        (starts[i] + cut * length - origin) % starts[-1]
+        for i, (_, length) in enumerate(loop.events)
+        for cut in loop.cuts[:-1]
+    ]
+
+
+def weight(fade: Fade, time: Fraction) -> Fraction:
+    """What is left of a step after a time."""
+    x = fade.rate * time
+    return fade.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24) + fade.floor
+
+
+def found_gains(loop: Loop, cell: Cell, times: Row, late: Fraction) -> list[list[Row]]:
+    """Gains by input, output and piece, with what adds at once, and those before a step soon after it."""
+    noisy = len(loop.inputs) - 1 - bool(loop.fade) if cell.path.noise else None
+    fades = len(loop.inputs) - 1 if loop.fade else None
+    last = times.index(max(times))
+    once = [1 / cell.strength, middle(cell.rates) / cell.strength, middle(cell.a) / cell.strength]
+    found = []
+    for place, entry in enumerate(loop.inputs):
+        lines = gains(loop, entry, place == noisy, *[loop.fade] * (place == fades))
+        for k in range(3):
+            if place == 0:
+                lines[k] = [v + once[k] for v in lines[k]]
+            if place == fades and loop.fade:
+                size = middle(cell.mu) * once[k]
+                lines[k] = [v + size * weight(loop.fade, t) for v, t in zip(lines[k], times, strict=True)]
+            lines[k] = [lines[k][last] if t < late else v for v, t in zip(lines[k], times, strict=True)]
+        found.append(lines)
+    return found
+
+
+def shares_of(loop: Loop, cell: Cell) -> tuple[Row, list[Row]]:
+    """Own bound and shares of the outputs for every input."""
+    zero, high = Fraction(0), cell.normal[1]
+    many = len(loop.outputs)
+    off = (cell.ageing[1] - cell.ageing[0]) / (cell.ageing[1] + cell.ageing[0])
+    bent, layer = half(cell.rates), many - 7
+    stress = [high * half(cell.a) + cell.viscous * bent, zero, half(cell.normal), high * half(cell.b), zero]
+    stress += [half(cell.mu), zero, *[half(cell.mu) if loop.fade else cell.mu[1]] * layer]
+    state = [off * bent, off, zero, (1 + off) * half(cell.states), *[zero] * (many - 4)]
+    own, shares = [cell.stress(), zero, zero], [stress, [bent, *[zero] * (many - 1)], state]
+    drift, noise = cell.fault.drift(), cell.path.noise
+    for size in [v for v in (drift, noise) if v]:
+        own.append(size)
+        shares.append([zero] * many)
+    if loop.fade:
+        own.append(zero)
+        shares.append([*[zero] * (many - 1), Fraction(1)])
+    return own, shares
+
+
+def bounds(plain: Loop, cell: Cell, valve: int) -> tuple[dict[str, Fraction], Fraction]:
+    """What follows from the claims on one cell, and the small gain."""
+    loop = around(plain, cell, valve)
+    times = since_step(loop)
+    late = min((t for t in times if loop.fade and weight(loop.fade, t) <= FADED), default=Fraction(0))
+    found, more = found_gains(loop, cell, times, late), cell.soon(late)
+    own, shares = shares_of(loop, cell)
+    own = [v + sum(c * m for c, m in zip(share, more, strict=False)) for v, share in zip(own, shares, strict=True)]
+    table = [
+        [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
+        for share in shares
+    ]
+    small = radius(table)
+    need(small < 1, f"the small gain must be below 1 on every cell. It is {upper(small)}")
+    sizes = solve(table, own)
+    peaks = [
+        max(sum(g * v for g, v in zip(at, sizes, strict=True)) for at in zip(*of, strict=True))
+        for of in zip(*found, strict=True)
+    ]
+    y, _, _, z, slip, push, asked, *left = peaks
+    values = (y + more[0], z, slip, push + sum(left), asked)
+    return dict(zip(CLAIMS, values, strict=True)), small
+
+
+# ---------------------------------------------------------------- the theorem
+
+
+def verify(document: dict[str, Any]) -> list[str]:
+    """Verify the claims of a parsed file; the statement, line by line.
+
+    Raises
+    ------
+    Refused
+        When a rule is broken, or a claim does not follow.
+    """
+    keys(document, "the file", "format", "kind", "fault", "reference", "stress", "loop", "cells", "claims")
+    fault = read_fault(document)
+    claims = numbers(document["claims"], "claims", *CLAIMS)
+    need(min(claims.values()) > 0, "claims must be > 0")
+    need(max(claims["log_rate"], claims["log_state"]) <= MAX_LOGARITHM, "logarithms must be at most 3")
+    boxes = read_cells(document["cells"], fault.box)
+    loop, path, valve = read_path(document["loop"])
+    small = Fraction(0)
+    for box in boxes:
+        part = replace(fault, box=box)
+        normal = part.normal(claims["push"])
+        need(normal[0] > 0, "the pressure must not open the fault")
+        found, gain = bounds(loop, Cell(part, path, claims, normal), valve)
+        small = max(small, gain)
+        for name in CLAIMS:
+            need(found[name] < claims[name], f"the claim {name} must follow from all claims on every cell. It does not")
+    return statement(document, fault, claims, len(boxes), small)
+
+
+def statement(
+    document: dict[str, Any], fault: Fault, claims: dict[str, Fraction], cells: int, small: Fraction
+) -> list[str]:
+    """What was verified, in ASCII; bounds on their outer side, those of the disturbance on its inner one."""
+    loop, ranges = document["loop"], []
+    for name in CONSTANTS:
+        low, high = fault.box[name]
+        ranges.append(f"{name} in [{lower(high) if low == high else upper(low)}, {lower(high)}]")
+    when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s, rock of L^2/D = {loop['diffusion']} s"
+    off = f", measured slip within {loop['slip_noise']} m of the true one" if loop["slip_noise"] != "0" else ""
+    peak = fault.rate * power_of_e(claims["log_rate"])
+    highest = fault.stiffness * fault.distance / fault.box["coefficient"][0] + claims["push"]
+    return [
+        f"fault {ascii(fault.name)[1:-1]} (a name; the data in the file are what counts), rate-and-state friction with "
+        f"the ageing law, with inertia, every constant {', '.join(ranges)}; {cells} cells",
+        f"law with {len(loop['states'])} states of the slip alone, {when}{off}",
+        f"disturbance: any shear stress of at most {lower(fault.stress)} Pa; from steady sliding at "
+        f"{lower(fault.rate)} m/s over {lower(fault.distance)} m; small gain {upper(small)}",
+        f"the slip rate of this fault never exceeds {upper(peak)} m/s: |ln(v/V)| <= {upper(claims['log_rate'])}",
+        f"|slip - reference| <= {upper(claims['slip_error'])} m, |ln(theta V/D)| <= {upper(claims['log_state'])}",
+        f"pressure in the fault from {lower(-claims['push'])} Pa to {upper(highest)} Pa",
+    ]

@@ -1,0 +1,104 @@
+"""A guarantee of slow sliding: a fault, its box of constants in cells, the loop that runs, and its bounds."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee.statement import Held
+from quakedesign.certificates.guarantee.theorem import NoGuarantee
+from quakedesign.certificates.slow_sliding.cells import Cuts, cells
+from quakedesign.certificates.slow_sliding.task import SlidingTask
+from quakedesign.certificates.slow_sliding.theorem import SlidingClaims, cell_bounds, exponential, follows
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingGuarantee:
+    """Claims about one loop around slow sliding; `check` decides them.
+
+    Attributes
+    ----------
+    task : SlidingTask
+    held : Held
+    cuts : Cuts
+        How the box of constants falls into cells.
+    claims : SlidingClaims
+    """
+
+    task: SlidingTask
+    held: Held
+    cuts: Cuts
+    claims: SlidingClaims
+
+    def __repr__(self) -> str:
+        return f"SlidingGuarantee({self.task.name}: |ln(v/V)| <= {self.claims.log_rate:.4g})"
+
+    @cached_property
+    def cells(self) -> tuple[SlidingTask, ...]:
+        """The task on every cell."""
+        return cells(self.task, self.cuts)
+
+    def check(self) -> Verdict:
+        """PROVED if the claims follow from themselves on every cell, in ball arithmetic; else UNDECIDED."""
+        for cell in self.cells:
+            found = cell_bounds(cell, self.held, self.claims)
+            if isinstance(found, NoGuarantee) or not follows(found, self.claims):
+                return Verdict.UNDECIDED
+        return Verdict.PROVED
+
+    @property
+    def peak_slip_rate(self) -> UpperBound:
+        """Ve^Y [m/s] from above."""
+        return UpperBound(self.task.rate * exponential(self.claims.log_rate))
+
+    @property
+    def pressures(self) -> tuple[LowerBound, UpperBound]:
+        """Least and largest pressure in the fault [Pa]."""
+        task, push = self.task, self.claims.push
+        return LowerBound(-push), UpperBound(task.fastest_rise / task.rate * task.distance + push)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts, SI."""
+        claims, (low, high) = self.claims, self.pressures
+        return {
+            "peak_slip_rate": self.peak_slip_rate.exact,
+            "log_rate": claims.log_rate.exact,
+            "log_state": claims.log_state.exact,
+            "slip_error": claims.slip_error.exact,
+            "pressure": [low.exact, high.exact],
+            "stress": str(self.task.stress),
+            "cells": len(self.cells),
+        }
+
+    def sentence(self) -> str:
+        """What is guaranteed, for people; bounds rounded up, those of what it is guaranteed for down."""
+        task, held, claims = self.task, self.held, self.claims
+        ratio = UpperBound(exponential(claims.log_rate))
+        low, high = self.pressures
+        return (
+            f"from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, for every shear stress disturbance "
+            f"of at most {LowerBound(task.stress).quantity('Pa')}, {_box(task)}: the slip rate never exceeds "
+            f"{ratio:.4g} V = {self.peak_slip_rate:.3g} m/s while the reference goes {float(task.distance):.4g} m, the "
+            f"slip stays within {claims.slip_error:.3g} m of it, the pressure in the fault between "
+            f"{low.quantity('Pa')} and {high.quantity('Pa')} (with inertia)"
+        )
+
+
+def _path(held: Held) -> str:
+    said = f"held over {float(held.step):.6g} s"
+    said += f", {float(held.delay):.6g} s late" if held.delay else ""
+    said += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
+    said += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
+    noise = LowerBound(held.slip_noise)
+    return said + (f", with any noise of at most {noise:.6g} m in the measured slip" if held.slip_noise else "")
+
+
+def _box(task: SlidingTask) -> str:
+    said = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
+    wide = [
+        f"{short} from {float(task.ranges[axis][0]):.6g} to {float(task.ranges[axis][1]):.6g}"
+        for axis, short in said.items()
+        if task.ranges[axis][0] < task.ranges[axis][1]
+    ]
+    return f"for all constant {', '.join(wide)}" if wide else "for a, b and D_c as they are given"

@@ -1,0 +1,264 @@
+"""A law that holds slow sliding, chosen by what can be guaranteed of it, and cells that cover a box of constants."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from math import floor, log10
+from typing import Any, Unpack
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import minimize
+
+from quakedesign.bounds import UpperBound
+from quakedesign.certificates.guarantee import Held, NoGuarantee
+from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.slow_sliding import SlidingClaims, SlidingGuarantee, SlidingTask
+from quakedesign.certificates.slow_sliding.cells import MOST_CELLS, Cuts, parts
+from quakedesign.certificates.slow_sliding.theorem import (
+    after_a_step,
+    bounds_from,
+    cell_bounds,
+    follows,
+    loop_of,
+    model_of,
+)
+from quakedesign.errors import ParameterError
+from quakedesign.loop import LinearLaw, SlidingModel
+from quakedesign.synthesis.guaranteed.estimate import gains_of
+from quakedesign.synthesis.guaranteed.rounding import short
+from quakedesign.synthesis.linear.sampled.slow_sliding import Weights, sliding_law
+
+LOG_RATE = Fraction(1, 2)
+_STARTS = (
+    (-1.02, -1.74, 6.76, 0.97, -5.19, 3.11, -0.06, 0.39, -0.12),
+    (-6.0, -0.9, 4.6, 1.2, -5.9, 2.3, -0.17, 0.52, -0.05),
+)
+"""Logarithms of the weights and of what a, b and D of the law's model are over the fault's: ρL²/D = 1, ρT_s = 0.06."""
+_SIMPLEX = (0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.05, 0.05, 0.05)
+_EVALUATIONS = 120
+_FORGETTING = 0.972  # largest eigenvalue of a period, so that the proof need not sum many
+_GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}  # over Y, pressures in 2a of the normal stress
+_TURNS = 6
+_ROOM = 1.05  # of claims over what an estimate gives
+_NEAR = 0.89  # by which an estimate has to be better than its claims, as the proof's sums are larger
+_FAILED = 50.0
+_SMALL = Fraction(1, 10**4)  # of the normal stress
+_DIGITS, _SHORT = 6, 3
+_AXES = ("direct_effect", "evolution_effect", "critical_slip")
+
+
+def guaranteed_sliding(
+    task: SlidingTask, step: Fraction, *, log_rate: Fraction = LOG_RATE, **around: Unpack[Around]
+) -> SlidingGuarantee | NoGuarantee:
+    """A law that keeps |ln(v/V)| below a bound under the stress of a task, for all constants of its box.
+
+    Parameters
+    ----------
+    task : SlidingTask
+    step : Fraction
+        T_s [s].
+    log_rate : Fraction
+        Y [-].
+    **around : Fraction
+        As in `design_held`; a lag or a diffusion is needed.
+    """
+    held = designed_sliding(task, step, log_rate=log_rate, **around)
+    if isinstance(held, NoGuarantee):
+        return held
+    return proved_sliding(task, held, log_rate)
+
+
+def proved_sliding(task: SlidingTask, held: Held, log_rate: Fraction = LOG_RATE) -> SlidingGuarantee | NoGuarantee:
+    """Cells and claims for a law, or why there are none."""
+    claims = _claims(worst_corner(task), held, log_rate)
+    if claims is None:
+        return NoGuarantee(reason=_too_much(task, log_rate), small_gain=None)
+    try:
+        cuts = _cut(task, held, claims, [MOST_CELLS])
+    except ParameterError:
+        return NoGuarantee(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box", small_gain=None)
+    return SlidingGuarantee(task=task, held=held, cuts=cuts, claims=claims)
+
+
+def largest_stress(task: SlidingTask, held: Held, log_rate: Fraction = LOG_RATE) -> Fraction:
+    """About the largest stress [Pa] for which `proved_sliding` may succeed, with two digits; 0 for none."""
+    corner = worst_corner(task)
+    claims, some = _guess(corner, log_rate), _SMALL * corner.ranges["normal_stress"][0]
+    found = [_estimate(replace(corner, stress=stress), held, claims) for stress in (Fraction(0), some)]
+    rest, more = (0.0 if one is None else float(one["log_rate"]) for one in found)
+    room = (1 if corner == task else _NEAR) * _NEAR * float(log_rate) - rest
+    if None in found or room <= 0:
+        return Fraction(0)
+    most = float(some) * room / (more - rest)
+    scale = Fraction(10) ** (floor(log10(most)) - 1)
+    return floor(Fraction(most) / scale) * scale
+
+
+def designed_sliding(
+    task: SlidingTask, step: Fraction, *, log_rate: Fraction = LOG_RATE, **around: Unpack[Around]
+) -> Held | NoGuarantee:
+    """The law whose estimated bounds are smallest at the most unstable corner of the box."""
+    corner = worst_corner(task)
+    claims = _guess(corner, log_rate)
+
+    def held(x: np.ndarray) -> Held | None:
+        law = _law(corner, task, step, around, x)
+        return None if law is None else Held(law=law, step=step, **around)
+
+    def cost(x: np.ndarray) -> float:
+        tried = held(x)
+        if tried is None:
+            return _FAILED
+        model = model_of(corner, claims)
+        radius = _FAILED if model is None else _forgetting(tried, model, corner)
+        if radius > _FORGETTING:
+            return _FAILED + radius
+        found = _estimate(corner, tried, claims)
+        return _FAILED / 2 if found is None else float(found["log_rate"] / log_rate)
+
+    best = min((np.array(start) for start in _STARTS), key=cost)
+    simplex = np.vstack([best, best + np.diag(_SIMPLEX)])
+    reached = minimize(cost, best, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": _EVALUATIONS})
+    chosen = held(reached.x)
+    if chosen is None or reached.fun >= _FAILED / 2:
+        reason = "no law was found that holds slow sliding: shorten the step or the way through the rock"
+        return NoGuarantee(reason=reason, small_gain=None)
+    return chosen
+
+
+def worst_corner(task: SlidingTask) -> SlidingTask:
+    """Small a, large b, small D: where the fault is least stable."""
+    ends = {"direct_effect": 0, "evolution_effect": 1, "critical_slip": 0}
+    fixed = {axis: (task.ranges[axis][end],) * 2 for axis, end in ends.items()}
+    return replace(task, ranges={**task.ranges, **fixed})
+
+
+def _law(corner: SlidingTask, task: SlidingTask, step: Fraction, around: Around, x: np.ndarray) -> LinearLaw | None:
+    sizes = map(float, np.exp(np.clip(x[:6], -30, 30)))
+    weights = Weights(**dict(zip(Weights.__dataclass_fields__, sizes, strict=True)))
+    a, b, d = (_middle(task, axis) * short(float(np.exp(v)), _DIGITS) for axis, v in zip(_AXES, x[6:], strict=True))
+    normal = _middle(task, "normal_stress")
+    model = SlidingModel(
+        rate=task.rate,
+        state_rate=task.rate / d,
+        slope=Fraction(1),
+        state_slope=Fraction(1),
+        strength=normal * a + task.radiation * task.rate,
+        weakening=normal * b,
+        direct=a,
+        evolution=b,
+        stiffness=task.stiffness,
+        coefficient=_middle(task, "coefficient"),
+    )
+    try:
+        return sliding_law(model, step, diffusion=around.get("diffusion", Fraction(0)), weights=weights)
+    except ParameterError:
+        return None
+
+
+def _middle(task: SlidingTask, axis: str) -> Fraction:
+    low, high = task.ranges[axis]
+    return (low + high) / 2
+
+
+def _forgetting(held: Held, model: SlidingModel, task: SlidingTask) -> float:
+    """Largest eigenvalue of a period of the nominal loop."""
+    loop = loop_of(held, model, task)
+    flow, period = np.array(loop.flow, dtype=float), np.eye(len(loop.flow))
+    for part in loop.segments:
+        period = expm(flow * float(part.duration)) @ np.array(part.jump, dtype=float) @ period
+    return float(max(abs(np.linalg.eigvals(period))))
+
+
+def _guess(task: SlidingTask, log_rate: Fraction) -> SlidingClaims:
+    pressure = 2 * task.ranges["direct_effect"][1] * task.ranges["normal_stress"][0] * log_rate
+    return _as_claims(
+        {
+            "log_rate": log_rate,
+            "log_state": _GUESSES["log_state"] * float(log_rate),
+            "slip_error": task.ranges["critical_slip"][1] * log_rate,
+            "push": _GUESSES["push"] * float(pressure),
+            "asked": _GUESSES["asked"] * float(pressure),
+        }
+    )
+
+
+def _as_claims(values: Mapping[str, Any]) -> SlidingClaims:
+    return SlidingClaims(**{name: UpperBound(short(float(v), _SHORT)) for name, v in values.items()})
+
+
+def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims | None:
+    """Claims that follow from themselves, by the estimate, with the bound of y as told; None for none."""
+    claims = _guess(task, log_rate)
+    for _ in range(_TURNS):
+        found = _estimate(task, held, claims)
+        if found is None:
+            return None
+        wider = {k: float(found[k]) * _ROOM / _NEAR for k in SlidingClaims.__dataclass_fields__}
+        if min(float(getattr(claims, k)) / v for k, v in wider.items() if k != "log_rate") >= 1 / _ROOM:
+            break
+        claims = _as_claims({**wider, "log_rate": log_rate})
+    else:
+        return None
+    return claims if float(found["log_rate"]) < float(log_rate) else None
+
+
+def _estimate(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
+    model = model_of(task, claims)
+    if model is None:
+        return None
+    loop = loop_of(held, model, task)
+    gains = gains_of(loop)
+    if gains is None:
+        return None
+    count = len(next(iter(gains.values())))
+    ends = [held.step * Fraction(i, count - 1) for i in range(count)] if len(loop.segments) == 1 else None
+    phases = after_a_step(loop)
+    if len(phases) != count:
+        phases = tuple(ends) if ends and loop.fading else (max(phases),) * count
+    found = bounds_from(task, held, claims, loop, gains, phases)
+    return None if isinstance(found, NoGuarantee) else found
+
+
+def _cut(task: SlidingTask, held: Held, claims: SlidingClaims, left: list[int]) -> Cuts:
+    """Cuts of a box until the claims follow on every cell; `left` counts the cells that there may still be.
+
+    Raises
+    ------
+    ParameterError
+        When that takes too many.
+    """
+    if left[0] < 1:
+        raise ParameterError(f"a box must fall into at most {MOST_CELLS} cells. Received one that needs more.")
+    wide = any(task.ranges[axis][0] < task.ranges[axis][1] for axis in _AXES)
+    if _excess(task, held, claims) < (_NEAR if wide else 1):
+        found = cell_bounds(task, held, claims)
+        if not isinstance(found, NoGuarantee) and follows(found, claims):
+            left[0] -= 1
+            return (None,)
+    halves = [
+        (axis, (low + high) / 2, parts(task, axis, (low + high) / 2))
+        for axis, (low, high) in task.ranges.items()
+        if low < high and axis in _AXES
+    ]
+    if not halves:
+        raise ParameterError("a box must have cells on which its claims follow. Received a point without.")
+    axis, at, both = min(halves, key=lambda half: max(_excess(part, held, claims) for part in half[2]))
+    below = _cut(both[0], held, claims, left)
+    return ((axis, at), *below, *_cut(both[1], held, claims, left))
+
+
+def _excess(task: SlidingTask, held: Held, claims: SlidingClaims) -> float:
+    """How much larger than the claims the bounds may be, by the estimate."""
+    found = _estimate(task, held, claims)
+    if found is None:
+        return _FAILED
+    return max(float(found[k]) / float(getattr(claims, k)) for k in SlidingClaims.__dataclass_fields__)
+
+
+def _too_much(task: SlidingTask, log_rate: Fraction) -> str:
+    return (
+        f"a stress of {float(task.stress):.3g} Pa is not shown to leave |ln(v/V)| below {float(log_rate):.3g} with the "
+        "laws that were tried"
+    )

@@ -1,0 +1,313 @@
+"""Slow sliding, guaranteed: sectors, inertia, cells and files against closed forms and a second way to the bounds."""
+
+import copy
+import importlib.util
+import json
+import math
+from dataclasses import replace
+from fractions import Fraction as F
+from pathlib import Path
+
+import pytest
+
+from quakedesign.bounds import UpperBound
+from quakedesign.certificates import Verdict
+from quakedesign.certificates.command import check_files
+from quakedesign.certificates.guarantee import Held, NoGuarantee
+from quakedesign.certificates.slow_sliding import (
+    SlidingClaims,
+    SlidingGuarantee,
+    SlidingTask,
+    cell_bounds,
+    cells,
+    parse_sliding,
+    sliding_task,
+    sliding_text,
+    theorem,
+)
+from quakedesign.errors import CertificateError, ParameterError, UnsupportedError
+from quakedesign.fault import load_fault
+from quakedesign.loop import LinearLaw, SlidingModel
+from quakedesign.synthesis.linear.sampled.slow_sliding import Weights, sliding_law
+
+PROOFS = Path(__file__).parents[3] / "proofs"
+SPECIFICATION = importlib.util.spec_from_file_location("sliding_check", PROOFS / "check.py")
+checker = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(checker)
+standalone = checker.beside("slow_sliding")
+
+RATE = F("1.2e-6")
+
+
+def around(value, half):
+    return F(value) * (1 - F(half)), F(value) * (1 + F(half))
+
+
+def task(half="0.02", stress=25000, **changes):
+    ranges = {
+        "direct_effect": around("0.01", half),
+        "evolution_effect": around("0.015", half),
+        "critical_slip": around("0.001", half),
+        "coefficient": (F("0.6"), F("0.6")),
+        "normal_stress": (F(50 * 10**6), F(50 * 10**6)),
+    }
+    given = {
+        "name": "a patch", "density": F(2700), "shear_modulus": F(30 * 10**9), "length": F(5000),
+        "damping": F(5 * 10**14), "ranges": ranges, "rate": RATE, "distance": F("0.01"), "ramp": F(12),
+        "stress": F(stress),
+    }  # fmt: skip
+    return SlidingTask(**(given | changes))
+
+
+MODEL = SlidingModel(
+    rate=RATE, state_rate=F("1.2e-3"), slope=F(1), state_slope=F(1), strength=F(500024), weakening=F(750000),
+    direct=F("0.01"), evolution=F("0.015"), stiffness=F(6 * 10**6), coefficient=F("0.6"),
+)  # fmt: skip
+WEIGHTS = Weights(slip=3.0, state=0.18, pressure=9000.0, slip_noise=3.0, state_noise=0.006, level_noise=20.0)
+LAW = sliding_law(replace(MODEL, weakening=F(1100000), evolution=F("0.022")), F(50), weights=WEIGHTS)
+LAGGED = Held(law=LAW, step=F(50), lag=F(10))
+
+
+def claims(log_rate="1/2", log_state="1/18", slip_error="4e-5", push=380000, asked=380000):
+    given = {"log_rate": log_rate, "log_state": log_state, "slip_error": slip_error, "push": push, "asked": asked}
+    return SlidingClaims(**{name: UpperBound(F(value)) for name, value in given.items()})
+
+
+CLAIM = SlidingGuarantee(task=task(), held=LAGGED, cuts=(None,), claims=claims())
+
+
+@pytest.mark.parametrize("size", ["1/1000", "1/2", "1", "3"])
+def test_sectors_hold_the_exponentials_and_no_more(size):
+    low, high = theorem.chords(F(size))
+    x = float(F(size))
+    assert float(low) == pytest.approx((1 - math.exp(-x)) / x, rel=1e-12)
+    assert float(high) == pytest.approx(math.expm1(x) / x, rel=1e-12)
+    exact = sum((F(size) ** k / math.factorial(k) for k in range(60)), F(0))  # below e^x by less than 1e-50
+    assert low <= (1 - 1 / exact) / F(size) < (exact - 1) / F(size) <= high
+
+
+def test_the_guarantee_is_proved_by_both_checkers_and_survives_its_file(tmp_path):
+    text = sliding_text(CLAIM)
+    assert parse_sliding(text) == CLAIM
+    assert sliding_text(parse_sliding(text)) == text
+    path = tmp_path / "sliding.json"
+    path.write_text(text)
+    ((verdict, lines),) = check_files([path]).values()
+    assert verdict == "proved"
+    assert any("never exceeds 1.649 V = 1.98e-06 m/s" in line for line in lines)
+    result = checker.check(text)
+    assert result.verdict == "proved"
+    assert any("never exceeds 1.979e-06 m/s" in line for line in result.statement)
+
+
+def paired(one, held):
+    """Bounds of both checkers for one cell."""
+    document = json.loads(sliding_text(replace(CLAIM, task=one, held=held)))
+    fault, given = standalone.read_fault(document), {name: F(v) for name, v in document["claims"].items()}
+    loop, path, valve = standalone.read_path(document["loop"])
+    cell = standalone.Cell(fault, path, given, fault.normal(given["push"]))
+    return cell_bounds(one, held, claims()), standalone.bounds(loop, cell, valve)
+
+
+@pytest.mark.parametrize(
+    "held",
+    [
+        LAGGED,
+        pytest.param(Held(law=LAW, step=F(50), lag=F(10), delay=F(20), slip_noise=F(1, 10**7)), marks=pytest.mark.slow),
+        pytest.param(Held(law=LAW, step=F(50), diffusion=F(40)), marks=pytest.mark.slow),
+        pytest.param(Held(law=LAW, step=F(50), diffusion=F(40), delay=F(20)), marks=pytest.mark.slow),
+        pytest.param(Held(law=LAW, step=F(50), diffusion=F(40), lag=F(10)), marks=pytest.mark.slow),
+    ],
+    ids=["lag", "late and noisy", "rock", "rock and delay", "rock behind a lag"],
+)
+def test_both_checkers_find_the_same_bounds(held):
+    """With friction and a plan that are known to a hundredth only."""
+    one = task(ranges={**task().ranges, "coefficient": (F("0.597"), F("0.603"))}, ramp=F("11.9"))
+    ours, (theirs, small) = paired(one, held)
+    assert not isinstance(ours, NoGuarantee)
+    for name, value in theirs.items():
+        assert float(ours[name]) == pytest.approx(float(value), rel=2e-3), name
+    assert float(ours["small_gain"]) == pytest.approx(float(small), rel=2e-3)
+
+
+def test_the_bounds_are_a_fixed_point_of_their_sectors():
+    """Without ranges and at tiny claims only the linear loop is left: y of a stress at once, and a little more."""
+    small = claims("1/1000", "1/1000", "1e-6", 1000, 3000)
+    still = task("0", stress=1, distance=F(0), density=F(1, 10**6))
+    found = cell_bounds(still, LAGGED, small)
+    assert found["log_rate"] > F(1) / F(500024)
+    ten = cell_bounds(replace(still, stress=F(10)), LAGGED, small)
+    assert float(ten["log_rate"] / found["log_rate"]) == pytest.approx(10, rel=1e-3)
+
+
+def test_the_mass_adds_little_and_in_proportion():
+    one = theorem.inertia(task(), LAGGED, claims())
+    assert 0 < one < 10
+    assert theorem.inertia(replace(task(), density=F(5400)), LAGGED, claims()) == 2 * one
+    rough = 2700 * 5000 * 1.2e-6 * math.exp(0.5) / (49.3e6 * 0.0098)  # 1/λ₀
+    moved = 1 / 10 * (3.8e5 + 3.8e5)  # |q′| through a lag of 10 s
+    state = 1.2e-6 / 0.98e-3 * (math.exp(0.5) - math.exp(-1 / 18))
+    rest = (12 + moved) * (0.0102 * 0.5 + 0.0153 / 18) + 50.6e6 * 0.0153 * state
+    rest += 6e6 * 1.2e-6 * math.expm1(0.5) + 0.6 * moved
+    assert float(one) == pytest.approx(rest * rough, rel=1e-2)
+
+
+def test_cells_cover_the_box():
+    cuts = (("direct_effect", F("0.0099")), None, ("critical_slip", F("0.001")), None, None)
+    found = cells(task(), cuts)
+    below, *above = (cell.ranges for cell in found)
+    assert below["direct_effect"] == (F("0.0098"), F("0.0099"))
+    assert [cell["critical_slip"] for cell in above] == [(F("0.00098"), F("0.001")), (F("0.001"), F("0.00102"))]
+    assert {cell["direct_effect"] for cell in above} == {(F("0.0099"), F("0.0102"))}
+    volume = sum(math.prod(cell.ranges[a][1] - cell.ranges[a][0] for a in list(cell.ranges)[:3]) for cell in found)
+    assert volume == math.prod(high - low for low, high in list(task().ranges.values())[:3])
+
+
+@pytest.mark.parametrize(
+    "cuts",
+    [
+        (),
+        (None, None),
+        (("direct_effect", F("0.0099")), None),
+        (("direct_effect", F("0.0098")), None, None),
+        (("direct_effect", F("0.02")), None, None),
+        (("rate", F("0.0099")), None, None),
+        (("coefficient", F("0.6")), None, None),
+    ],
+)
+def test_cuts_that_do_not_cut_a_box_are_refused_by_both(cuts):
+    with pytest.raises(ParameterError):
+        cells(task(), cuts)
+    entries = [[] if cut is None else [cut[0], str(cut[1])] for cut in cuts]
+    with pytest.raises(checker.Refused):
+        standalone.read_cells(entries, dict(task().ranges))
+
+
+def test_no_more_than_64_cells_are_read():
+    many = task("0.02")
+    cuts, low = [], many.ranges["direct_effect"][0]
+    for k in range(64):
+        cuts += [("direct_effect", low + F(k + 1, 10**6)), None]
+    entries = [[] if cut is None else [cut[0], str(cut[1])] for cut in (*cuts, None)]
+    assert len(cells(many, (*cuts[:126], None))) == len(standalone.read_cells([*entries[:126], []], many.ranges)) == 64
+    with pytest.raises(ParameterError):
+        cells(many, (*cuts, None))
+    with pytest.raises(checker.Refused):
+        standalone.read_cells(entries, dict(many.ranges))
+
+
+CHANGES = {
+    "more stress": (("stress",), "60000"),
+    "weaker direct effect": (("fault", "direct_effect", 0), "1/125"),
+    "stronger evolution": (("fault", "evolution_effect", 1), "1/50"),
+    "shorter slips": (("fault", "critical_slip", 0), "1/2000"),
+    "unsure friction": (("fault", "coefficient", 1), "7/10"),
+    "less normal stress": (("fault", "normal_stress", 0), "40000000"),
+    "farther": (("reference", "distance"), "1"),
+    "faster": (("reference", "rate"), "3/1000000"),
+    "another plan": (("reference", "ramp"), "100"),
+    "heavier": (("fault", "density"), "2700000000"),
+    "viscous": (("fault", "damping"), "500000000000000000000000"),
+    "noise": (("loop", "slip_noise"), "1/1000"),
+    "slower well": (("loop", "lag"), "200"),
+    "late": (("loop", "delay"), "200"),
+    "longer step": (("loop", "step"), "200"),
+    "wrong gain": (("loop", "feedback"), "-1000000"),
+    "wrong output": (("loop", "output", 1), "50000000"),
+    "wrong update": (("loop", "update", 1, 1), "1/100"),
+    "wrong correction": (("loop", "measured", 2), "-1"),
+    "lower rate": (("claims", "log_rate"), "1/20"),
+    "lower state": (("claims", "log_state"), "1/100"),
+    "less slip": (("claims", "slip_error"), "1/1000000"),
+    "less pressure": (("claims", "push"), "10000"),
+    "less asked": (("claims", "asked"), "10000"),
+}
+
+
+def changed(path, new):
+    raw = copy.deepcopy(json.loads(sliding_text(CLAIM)))
+    holder = raw
+    for key in path[:-1]:
+        holder = holder[key]
+    assert holder[path[-1]] != new
+    holder[path[-1]] = new
+    return json.dumps(raw)
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_what_makes_the_statement_harder_is_not_proved(name):
+    text = changed(*CHANGES[name])
+    try:
+        verdict = parse_sliding(text).check()
+    except CertificateError:
+        verdict = Verdict.UNDECIDED
+    assert verdict is Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize("name", ["more stress", "another plan", "lower state", "less asked", "wrong correction"])
+def test_the_standalone_checker_refuses_it_as_well(name):
+    with pytest.raises(checker.Refused):
+        checker.check(changed(*CHANGES[name]))
+
+
+@pytest.mark.parametrize(
+    ("path", "new"),
+    [
+        (("format",), 2),
+        (("fault", "name"), ""),
+        (("fault", "density"), "0"),
+        (("fault", "damping"), "-1"),
+        (("fault", "direct_effect"), ["1/50", "1/100"]),
+        (("fault", "normal_stress", 0), "0"),
+        (("reference", "rate"), "0"),
+        (("reference", "distance"), "-1"),
+        (("stress",), "-1"),
+        (("stress",), "25000.0"),
+        (("loop", "lag"), "0"),
+        (("loop", "step"), "0"),
+        (("loop", "slip_noise"), "-1"),
+        (("loop", "measured"), ["1"]),
+        (("loop", "states"), ["slip", "slip", "level"]),
+        (("loop", "output"), "1"),
+        (("cells",), []),
+        (("cells",), [[], []]),
+        (("cells", 0), "none"),
+        (("cells", 0), ["rate", "1"]),
+        (("claims", "log_rate"), "31/10"),
+        (("claims", "log_rate"), "0"),
+        (("claims", "push"), "60000000"),
+    ],
+)  # fmt: skip
+def test_what_breaks_a_rule_is_refused_by_both(path, new):
+    text = changed(path, new)
+    with pytest.raises(checker.Refused):
+        checker.check(text)
+    if path == ("claims", "push"):  # no rule is broken: nothing follows
+        assert parse_sliding(text).check() is Verdict.UNDECIDED
+        return
+    with pytest.raises(CertificateError):
+        parse_sliding(text)
+
+
+def test_a_law_of_the_slip_rate_or_a_pressure_that_jumps_is_refused():
+    fed = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(F(-1), F(-1)))
+    for held in (Held(law=fed, step=F(50), lag=F(10)), Held(law=LAW, step=F(50))):
+        with pytest.raises(ParameterError):
+            cell_bounds(task(), held, claims())
+
+
+def test_the_task_is_that_of_the_fault():
+    """Crustal patch: K = 32.04 GPa/15 km, V = 1 m in 1e6 s, and μ* from a − b over three decades of rate."""
+    found = sliding_task(load_fault("crustal-patch"), F(25000), F("0.1"))
+    assert found.stiffness == F(32040, 15) * 1000
+    assert found.ranges["direct_effect"] == (F("0.009"), F("0.011"))
+    low, high = found.ranges["coefficient"]
+    decades = math.log(1e3)
+    assert float(low) == pytest.approx(0.63454 - (0.005 + 0.0025) * decades, rel=1e-9)
+    assert float(high) == pytest.approx(0.63454 - (0.005 - 0.0025) * decades, rel=1e-9)
+    middle = 0.63454 - 0.005 * decades
+    assert float(found.ramp) == pytest.approx(2.136e6 * 1e-6 / middle, rel=1e-9)
+    exact = sliding_task(load_fault("crustal-patch"), F(25000))
+    assert exact.drift < F(1, 10**8)
+    with pytest.raises(UnsupportedError):
+        sliding_task(load_fault("real-fault"), F(1))
