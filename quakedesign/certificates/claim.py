@@ -1,7 +1,7 @@
 """What a certificate is about, and what it consists of."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
@@ -169,6 +169,9 @@ def loop_of(
     lifts, rates = without_nesting([model.field[s] for s in states], states, names)
     powers = (*states, *lifts)
     values = {**gains, **(constants or {})}
+    speeds = {s.name: to_terms(rate, powers) for s, rate in zip(states, rates, strict=True)}
+    _require_bounded(speeds)
+    arguments = {lift.name: to_terms(argument, powers) for lift, argument in lifts.items()}
     return Loop(
         law=law,
         gains=dict(gains),
@@ -176,10 +179,31 @@ def loop_of(
         states={s.name: w for s, w in model.states.items()},
         domain=model.domain,
         uncertain=dict(uncertain),
-        field={s.name: to_terms(rate, powers) for s, rate in zip(states, rates, strict=True)},
+        field=speeds,
         roots={root.name: (of.name, root_enclosure(values[of.name])) for root, of in model.roots.items()},
-        lifts={lift.name: to_terms(argument, powers) for lift, argument in lifts.items()},
+        lifts=_occurring(arguments, speeds),
     )
+
+
+def _require_bounded(speeds: Mapping[str, Iterable[Term]]) -> None:
+    """Refuse a negative power that no other factor of its product makes up for."""
+    for state, terms in speeds.items():
+        for of, exponent, kind in (factor for term in terms for factor in term.factors if factor[1] < 0):
+            power = f"|{of}|^({exponent})" if kind == "a" else f"⌈{of}⌋^({exponent})"
+            raise CertificateError(
+                f"every rate must be bounded near the origin. Received one of {state} with {power}, which is unbounded "
+                f"where {of} = 0. Multiply it by a power of {of} that makes up for it."
+            )
+
+
+def _occurring(
+    lifts: Mapping[str, tuple[Term, ...]], speeds: Mapping[str, Iterable[Term]]
+) -> dict[str, tuple[Term, ...]]:
+    """Lifts that the field, or one of these, needs: a sign squared is 1, and leaves its argument unused."""
+    used = {name for terms in speeds.values() for term in terms for name, _, _ in term.factors}
+    for lift, terms in reversed(list(lifts.items())):
+        used |= {name for term in terms for name, _, _ in term.factors} if lift in used else set()
+    return {lift: terms for lift, terms in lifts.items() if lift in used}
 
 
 def root_enclosure(number: Fraction) -> Range:

@@ -9,6 +9,7 @@ import sympy as sp
 
 from quakedesign.errors import CertificateError
 from quakedesign.rationals import fraction_of
+from quakedesign.symbolic.normal_form import normal_form
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 Factor = tuple[str, Fraction, str]
@@ -60,6 +61,8 @@ def without_nesting(
 ) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr]]:
     """Nested signed powers named: the argument of every power of a sum becomes a symbol of its own.
 
+    Powers of a product of states need none: ⌈x²⌋⁰ = 1 and ⌈xy⌋⁰ = ⌈x⌋⁰⌈y⌋⁰ where neither vanishes.
+
     Parameters
     ----------
     expressions : sequence of Expr
@@ -83,6 +86,8 @@ def without_nesting(
             return e
         if isinstance(e, SignedPower | AbsolutePower) and e.args[0] not in states and e.args[0].has(*states):
             argument = sp.expand(walk(e.args[0]))
+            if not argument.is_Add and argument.free_symbols <= set(states):
+                return normal_form(e.func(argument, e.args[1]))
             if argument not in lifts:
                 lifts[argument] = sp.Symbol(next(free), real=True)
             return e.func(lifts[argument], e.args[1])
