@@ -160,7 +160,9 @@ def prove_squares(value: Any, statement: Statement) -> list[str]:
     for cofactor, equality in zip(cofactors, statement.equalities, strict=True):
         add_product(total, cofactor, equality)
     check_identity(statement.multiplier, statement.polynomial, total, "sos identity")
-    return ["conclusion: the polynomial is >= 0 on the set (the degree of the identity is not verified)"]
+    empty = all(not any(exponents) and number < 0 for exponents, number in statement.polynomial.items())
+    more = ["the polynomial is a negative number: the set is empty"] if statement.polynomial and empty else []
+    return ["conclusion: the polynomial is >= 0 on the set (the degree of the identity is not verified)", *more]
 
 
 # ---------------------------------------------------------------- a point

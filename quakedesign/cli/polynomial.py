@@ -75,6 +75,7 @@ def sos(
         "witness": plain_proof(answer.proof) if answer.proof is not None else None,
         "file": str(out) if out is not None and answer.proof is not None else None,
         "remark": answer.remark or None,
+        "empty_set": answer.set_is_empty,
         "seconds": answer.seconds,
         "versions": dict(answer.versions),
     }

@@ -57,6 +57,14 @@ class Answer:
         """``sos``, ``not-sos``, ``negative`` or ``undecided``."""
         return Positivity.UNDECIDED if self.proof is None else _KIND[type(self.proof)]
 
+    @property
+    def set_is_empty(self) -> bool:
+        """Whether a negative number is proved to be non-negative on the set, which then has no point."""
+        polynomial = self.statement.polynomial
+        return (
+            self.verdict is Positivity.SOS and not any(map(any, polynomial)) and any(c < 0 for c in polynomial.values())
+        )
+
     def check(self) -> bool:
         """Whether the proof decides the statement, in exact arithmetic and without a solver.
 

@@ -17,6 +17,7 @@ from quakedesign.sos.exact.polynomial import (
     degree,
     from_sympy,
     product,
+    square_factor,
 )
 from quakedesign.sos.exact.proofs import SumOfSquares, multiplier_is_positive
 from quakedesign.sos.exact.reading import read
@@ -48,7 +49,8 @@ def prove(
         Constraints of the set such as ``"x >= 0"``, ``"x^2 + y^2 <= 1"``, ``"x*y == 1"``; ℝⁿ unless given.
     multiplier : str, SymPy expression or mapping, optional
         multiplier · polynomial is decided instead; ``"auto"`` tries powers of 1 + Σx_i² (of Σx_i² for forms, of Σx_i
-        for forms on the orthant) up to the third.
+        for forms on the orthant) up to the third; on ℝⁿ for what is left of the polynomial beside squares, in its
+        variables.
     variables : sequence of str or Symbol, optional
         Their order; in order of appearance unless given.
     margin : rational, optional
@@ -86,7 +88,7 @@ def prove(
                 degree_bound=degree_bound,
                 more=more,
             )
-            if answer is not None and comb(asked.degree // 2 + len(names), len(names)) > _LARGEST_RETRY:
+            if answer is not None and _largest_basis(asked) > _LARGEST_RETRY:
                 continue
             found = decide(asked)
             if found.verdict in (Positivity.SOS, Positivity.NEGATIVE):
@@ -94,6 +96,15 @@ def prove(
             answer = found if answer is None or answer.verdict is Positivity.UNDECIDED else answer
     assert answer is not None
     return replace(answer, seconds=perf_counter() - start)
+
+
+def _largest_basis(asked: Statement) -> int:
+    """Monomials up to half the degree; on ℝⁿ only of what is left beside squares, in its variables."""
+    if asked.inequalities or asked.equalities or not asked.target:
+        return comb(asked.degree // 2 + len(asked.variables), len(asked.variables))
+    rest = square_factor(asked.target, len(asked.variables))[1]
+    used = sum(any(powers) for powers in zip(*rest, strict=True))
+    return comb(degree(rest) // 2 + used, used)
 
 
 def decide(asked: Statement) -> Answer:
@@ -149,12 +160,15 @@ def _multipliers(polynomial: Any, factor: Any, inequalities: Any, equalities: An
     """Multipliers to try: the given one, or one and growing powers."""
     if factor != "auto":
         return [factor]
+    if not inequalities and not equalities and polynomial:
+        polynomial = square_factor(polynomial, size)[1]
     top = degree(polynomial)
     form = all(sum(e) == top for e in polynomial)
+    used = [any(e[i] for e in polynomial) or bool(inequalities or equalities) for i in range(size)]
     orthant = inequalities and not equalities and all(Statement.is_variable(g) for g in inequalities)
     step = 1 if orthant and form else 2
-    base: dict[Any, Any] = {tuple(step * (i == j) for j in range(size)): Fraction(1) for i in range(size)}
-    if not form:
+    base: dict[Any, Any] = {tuple(step * (i == j) for j in range(size)): Fraction(1) for i in range(size) if used[i]}
+    if not form or not base:
         base[(0,) * size] = Fraction(1)
     return [product(size, [base] * k) for k in range(4)]
 

@@ -8,6 +8,7 @@ from own_parts import Monomials
 from quakedesign.sos import Positivity, prove
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.proofs import Square, SumOfSquares
+from quakedesign.sos.exact.words import sentences
 from quakedesign.sos.solve import engine
 from quakedesign.sos.solve.methods import methods
 from quakedesign.sos.solve.methods.base import Method
@@ -55,3 +56,29 @@ def test_one_that_claims_too_much_changes_no_verdict(monkeypatch):
     monkeypatch.setattr(engine, "methods", lambda: (Bold(), *methods()))
     assert {text: prove(text).verdict for text in honest} == honest
     assert honest["x^2 - 1"] is not Positivity.SOS
+
+
+ROBINSON = "x^6+y^6+z^6-x^4*y^2-x^2*y^4-x^4*z^2-x^2*z^4-y^4*z^2-y^2*z^4+3*x^2*y^2*z^2"
+
+
+@pytest.mark.parametrize("factor", ["x + w", "x*w - y^2 + 1"])
+def test_an_automatic_multiplier_is_one_of_what_is_left_beside_squares(factor):
+    answer = prove(f"({factor})^2*({ROBINSON})", multiplier="auto")
+    assert answer.verdict is Positivity.SOS
+    assert answer.check()
+    assert all(not e[answer.statement.variables.index("w")] for e in answer.statement.multiplier)
+
+
+@pytest.mark.parametrize("text", ["x^2", "x^2*y^2", "5", "0", "(x^2 + y)^2"])
+def test_where_only_squares_are_left_no_multiplier_is_needed(text):
+    answer = prove(text, multiplier="auto")
+    assert (answer.verdict, len(answer.statement.multiplier)) == (Positivity.SOS, 1)
+
+
+def test_an_empty_set_is_named():
+    empty = prove("-1", on=["x >= 1", "x <= 0"])
+    assert (empty.verdict, empty.set_is_empty) == (Positivity.SOS, True)
+    assert "the set is empty: a negative number is not negative on it" in sentences(empty)
+    for answer in (prove("1", on=["x >= 1"]), prove("x - 1", on=["x >= 1"]), prove("-1", on=["x >= 0"]), prove("0")):
+        assert not answer.set_is_empty
+        assert not any("empty" in line for line in sentences(answer))
