@@ -7,11 +7,12 @@ from itertools import pairwise
 from math import ceil
 
 from guarantee_loop import Fade, Loop
-from guarantee_numbers import Fixed, column, exponentials, fixed
+from guarantee_numbers import BITS, Fixed, column, exponentials, fixed
 from guarantee_reading import Refused, Row, need
 
 DOUBLINGS = 12  # at most 4096 periods are summed
-SHARE = 256  # what is left of the past after those is below a 256th
+SHARE = 1024  # what is left of the past after those is below a 1024th, but for what the slowest mode leaves
+TURNS, ROOM = 8, 1 << 40  # of sums that are solved for to bound themselves
 MAX_WORK = 3 * 10**7  # products of integers
 
 
@@ -129,23 +130,66 @@ class Past:
 
 
 def past(flows: list[Flow], rows: int) -> Past:
-    """Sum 2^j periods until what is left is below a 256th of every unit row's sum."""
+    """Sum 2^j periods until a 1024th of every sum is left, and what the slowest mode, seen alone, leaves."""
     *earlier, flow = flows
     period, columns = flow.whole, pieces(flow, None)
     for flow in reversed(earlier):
         columns, period = columns.beside(pieces(flow, period)), period * flow.whole
     size = len(period.rows)
-    sums = columns.sums()
+    place, seen, back = seen_alone(slowest(period), columns.sums())
+    sums = (seen * columns).sums()
     for _ in range(DOUBLINGS):
         width = len(columns.rows[0])
         need(2 * width * size * (size + rows) <= MAX_WORK, "the loop must forget its past sooner: it takes too long")
         following = period * columns
-        sums = [a + b for a, b in zip(sums, following.sums(), strict=True)]
+        sums = [a + b for a, b in zip(sums, (seen * following).sums(), strict=True)]
         columns, period = columns.beside(following), period * period
-        left = (period.size() * Fixed([[v] for v in sums])).size()
-        if all(v * SHARE <= total for (v,), total in zip(left.rows, sums, strict=True)):
-            return Past(columns, period, Fixed([[ceil(Fraction(v * SHARE, SHARE - 1))] for v in sums]))
+        far = period * back
+        left = (seen * far).size()
+        quick = Fixed([[v * (j != place)] for j, v in enumerate(sums)])
+        if all(v * SHARE <= total for (v,), total in zip((left * quick).rows, sums, strict=True)):
+            return Past(columns, far, whole_sums(left, sums, place))
     raise Refused(f"the nominal loop must be stable, and seen to be within {2**DOUBLINGS} periods")
+
+
+def slowest(period: Fixed) -> list[int]:
+    """What the slowest mode is seen along, if there is one: a row of what is left of all states after long, in size."""
+    rows = period.rows
+    for _ in range(DOUBLINGS):
+        rows = [[sum(map(int.__mul__, line, entries)) for entries in zip(*rows, strict=True)] for line in rows]
+        much = max(abs(v) for line in rows for v in line).bit_length() - BITS
+        rows = [[v >> much if much > 0 else v << -much for v in line] for line in rows]
+    return max(rows, key=lambda line: max(map(abs, line)))
+
+
+def seen_alone(row: list[int], sums: list[int]) -> tuple[int, Fixed, Fixed]:
+    """Unit rows W but for the given one, in place of that of the state that counts most, and its inverse."""
+    size = len(row)
+    place = max(range(size), key=lambda i: abs(row[i]) * sums[i])
+    seen, back = ([[(i == j) << BITS for j in range(size)] for i in range(size)] for _ in range(2))
+    for j, v in enumerate(row):
+        if j != place and row[place]:
+            seen[place][j] = (v << BITS) // row[place]
+            back[place][j] = -seen[place][j]
+    return place, Fixed(seen), Fixed(back)
+
+
+def whole_sums(left: Fixed, sums: list[int], place: int) -> Fixed:
+    """Some x with y + Dx <= x for the sums y and D = `left`, one row of which may be large."""
+    one, slow = 1 << BITS, left.rows[place][place]
+    need(slow < one, "the nominal loop must be stable. Its slowest mode is not")
+    found = list(sums)
+    for _ in range(TURNS):
+        own = [(y << BITS) + sum(map(int.__mul__, line, found)) for y, line in zip(sums, left.rows, strict=True)]
+        own[place] = (own[place] - slow * found[place]) * one // (one - slow)
+        found = [(v >> BITS) + 1 for v in own]
+    found = [v + v // ROOM + 1 for v in found]
+    closed = all(
+        (y << BITS) + sum(map(int.__mul__, line, found)) <= v << BITS
+        for y, line, v in zip(sums, left.rows, found, strict=True)
+    )
+    need(closed, "the nominal loop must be stable, and its past must fade")
+    return Fixed([[v] for v in found])
 
 
 def integral(flows: list[Flow], before: Past, rows: Fixed) -> list[int]:

@@ -9,9 +9,11 @@ continued periodically to the past and the integral taken over (−∞, t]. That
 - *A piece of length h of a flow.* y(σ) = row·e^{Aσ}b is within (σ − α)(β − σ)/2·max|y″| of its chord on [α, β], so
   ∫|y| ≤ h(|y(α)| + |y(β)|)/2 + h³/12·max|y″|, and |y″| ≤ |row|·|A²e^{Aσ}b| with absolute values entry by entry.
 - *All periods before.* With Ψ the map of one period, N(c) = Σ_k ‖cΨᵏU‖₁; the columns U are the ends of the pieces of
-  one period, weighted, and one column for every entry of the remainders. Terms up to k < K = 2^J are summed. Let y_j
-  be that sum for the unit row e_j, z_j the whole one and D = |Ψᴷ|. Then z ≤ y + Dz, and Dy ≤ q·y with q < 1 gives z ≤
-  y/(1 − q): sums over blocks of K periods are at most y, Dy, D²y … . So N(c) ≤ partial sum + |cΨᴷ|·y/(1 − q).
+  one period, weighted, and one column for every entry of the remainders. Terms up to k < K = 2^J are summed. Let W be
+  any invertible matrix, y_j that sum for its row j, z_j the whole one and D = |WΨᴷW⁻¹|. Sums over one block of K
+  periods, two and so on are at most y, y + Dy, …, so if y + Dx ≤ x, then z ≤ x, and N(c) ≤ partial sum + |cΨᴷW⁻¹|·x.
+  Rows of W are unit rows but for one, along which the slowest mode is seen alone: what is left of
+  that mode after K periods counts as it is, and K need not outlast it.
 - *Between two phases α < β of the output.* ce^{Aθ} is within (β − α)²/8·max|cA²e^{Aσ}| of the chord of its ends, and N
   is convex: at most the larger end and N of the remainder. The flow since the last jump adds ∫₀^θ|ce^{Aσ}b|dσ, whose
   derivative has the Lipschitz constant max|cAe^{Aσ}b|: it is within (β − α)²/8 times that of its chord. Both together
@@ -31,6 +33,7 @@ the trapezoidal sum. Of the flow since the last jump, a piece that has passed ad
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import reduce
 from itertools import accumulate
 from operator import mul
 from typing import Any
@@ -50,8 +53,9 @@ from quakedesign.errors import ParameterError
 from quakedesign.loop import PeriodicLoop
 
 _BITS = 128
-_SMALL = Fraction(1, 1 << 8)  # share of the sums that the tail may be
-_MOST_DOUBLINGS = 13
+_SMALL = Fraction(1, 1 << 10)  # share of the sums that the tail may be, but for the slowest mode
+_ROOM = Fraction((1 << 32) + 1, 1 << 32)  # for sums that are solved for to bound themselves
+_MOST_DOUBLINGS = 12
 
 
 def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
@@ -60,15 +64,16 @@ def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     Raises
     ------
     ParameterError
-        When the nominal loop is not found to be stable within 8192 periods.
+        When the nominal loop is not found to be stable within 4096 periods.
     """
     with ctx.workprec(_BITS):
         flow = matrix(loop.flow)
         rows = matrix(tuple(loop.outputs.values()))
         bounds: dict[tuple[str, str], tuple[Fraction, ...]] = {}
         flows, earlier = ([Flow.of(flow, part, past=past) for part in loop.segments] for past in (False, True))
+        slowest = _slowest(earlier)
         for name in (*loop.inputs, *loop.sampled, *loop.fading):
-            gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name)), rows)
+            gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name), slowest), rows)
             bounds |= {
                 (output, name): tuple(map(upper, worst)) for output, worst in zip(loop.outputs, gains, strict=True)
             }
@@ -85,29 +90,29 @@ class _Past:
     bound: Any
 
     @classmethod
-    def of(cls, parts: list[Response]) -> "_Past":
+    def of(cls, parts: list[Response], slowest: list[Any]) -> "_Past":
         size = parts[0].of.jump.nrows()
         later, ends, rest = identity(size), list[Any](), arb_mat(size, 1)
         for part in reversed(parts):
             own, remainder = part.columns(later)
             ends, rest, later = [*own, *ends], rest + remainder, later * part.of.whole
-        return cls._summed(parts, later, beside([*ends, _diagonal(rest)]))
+        return cls._summed(parts, later, beside([*ends, _diagonal(rest)]), slowest)
 
     @classmethod
-    def _summed(cls, parts: list[Response], period: Any, columns: Any) -> "_Past":
-        sums = _row_sums(columns)
+    def _summed(cls, parts: list[Response], period: Any, columns: Any, slowest: list[Any]) -> "_Past":
+        place, seen, back = _seen_alone(slowest, _row_sums(columns))
+        sums = _row_sums(seen * columns)
         for _ in range(_MOST_DOUBLINGS):
             following = period * columns
-            sums = [a + b for a, b in zip(sums, _row_sums(following), strict=True)]
+            sums = [a + b for a, b in zip(sums, _row_sums(seen * following), strict=True)]
             columns, period = beside([columns, following]), period * period
-            far = absolute(period) * _as_column(sums)
-            shares = [a / b for a, b in zip(far.entries(), sums, strict=True) if not a == 0]
-            if all(share < ball(_SMALL) for share in shares):
-                return cls(parts, columns, period, _as_column(sums) / (1 - ball(_SMALL)))
-        raise ParameterError(
-            f"the nominal loop must be stable. Received one that is not seen to be in {2**_MOST_DOUBLINGS} periods. "
-            "Change the gains, or shorten T_s."
-        )
+            far = period * back
+            left = absolute(seen * far)
+            quick = _as_column([v * (i != place) for i, v in enumerate(sums)])
+            shares = zip((left * quick).entries(), sums, strict=True)
+            if all(a == 0 or a / b < ball(_SMALL) for a, b in shares):
+                return cls(parts, columns, far, _whole(left, sums))
+        raise _unstable()
 
     def of_rows(self, rows: Any, segment: int) -> list[Any]:
         """N of every row that acts just before a segment: those before it in this period, and all that is earlier."""
@@ -118,6 +123,65 @@ class _Past:
         ends, rest = before.columns(identity(rows.ncols()))
         own = _row_sums(rows * beside([*ends, _diagonal(rest)]))
         return [a + b for a, b in zip(own, self.of_rows(rows * before.of.whole, segment - 1), strict=True)]
+
+
+def _slowest(flows: list[Flow]) -> list[Any]:
+    """What the slowest mode is seen along, if there is one: a row of what is left of all states after 2^12 periods.
+
+    Raises
+    ------
+    ParameterError
+        When that is more than there was.
+    """
+    period = reduce(lambda now, flow: flow.whole * now, flows[1:], flows[0].whole)
+    growth = 0.0
+    for _ in range(_MOST_DOUBLINGS):
+        period = period * period
+        largest = max(v.abs_upper() for v in period.entries())
+        if not largest > 0:
+            return [arb(0)] * period.nrows()
+        growth = 2 * growth + float(largest.log())
+        period = arb_mat([[(v / largest).mid() for v in row] for row in period.tolist()])
+    if not growth < 0:
+        raise _unstable()
+    return list(max(period.tolist(), key=lambda row: max(map(abs, row))))
+
+
+def _seen_alone(row: list[Any], sums: list[Any]) -> tuple[int, Any, Any]:
+    """W of `norms`, its inverse, and which of its rows, that of the state that counts most, is the given one."""
+    seen, back = identity(len(row)), identity(len(row))
+    place = max(range(len(row)), key=lambda i: (abs(row[i]) * sums[i]).mid())
+    for i, v in enumerate(row):
+        if i != place and row[place] != 0:
+            seen[place, i] = (v / row[place]).mid()
+            back[place, i] = -seen[place, i]
+    return place, seen, back
+
+
+def _whole(left: Any, sums: list[Any]) -> Any:
+    """Some x with y + Dx ≤ x.
+
+    Raises
+    ------
+    ParameterError
+        When the one that is tried is none.
+    """
+    own, size = _as_column(sums), len(sums)
+    try:
+        found = absolute((identity(size) - left).solve(own) * ball(_ROOM))
+    except ZeroDivisionError:
+        raise _unstable() from None
+    bounded = zip(own.entries(), (left * found).entries(), found.entries(), strict=True)
+    if not all(y + far <= x for y, far, x in bounded):
+        raise _unstable()
+    return found
+
+
+def _unstable() -> ParameterError:
+    return ParameterError(
+        f"the nominal loop must be stable. Received one that is not seen to be in {2**_MOST_DOUBLINGS} periods. "
+        "Change the gains, or shorten T_s."
+    )
 
 
 def _gains(parts: list[Response], past: _Past, outputs: Any) -> list[list[Any]]:

@@ -91,18 +91,32 @@ class Sums:
             rest, later = rest + np.abs(later) @ remainder, later @ self.whole(segment)
         return later, columns, rest
 
+    def seen(self, period, columns, rest):
+        """Unit rows but for what is left after 2^12 periods, in place of the one that counts most, and its number."""
+        left = period
+        for _ in range(12):
+            left = left @ left
+            left = left / np.abs(left).max()
+        row = left[np.abs(left).max(axis=1).argmax()]
+        place = np.argmax(np.abs(row) * [self.rows_of(unit, columns, rest) for unit in np.eye(len(row))])
+        found = np.eye(len(row))
+        found[place] = row / row[place]
+        return found, place
+
     def past(self, row):
-        """All earlier periods: 2, 4, 8 … of them until the 256th part is left."""
+        """All earlier periods: 2, 4, 8 … of them until the 1024th part is left but for the slowest mode."""
         period, columns, rest = self.period()
+        seen, place = self.seen(period, columns, rest)
         sums = lambda line, count: sum(  # noqa: E731
             self.rows_of(line @ np.linalg.matrix_power(period, k), columns, rest) for k in range(count)
         )
         count = 2
         while True:
-            units = np.array([sums(unit, count) for unit in np.eye(len(self.b))])
-            far = np.linalg.matrix_power(period, count)
-            if (np.abs(far) @ units <= units / 256).all():
-                return sums(row, count) + np.abs(row @ far) @ units * 256 / 255
+            units = np.array([sums(line, count) for line in seen])
+            far = np.linalg.matrix_power(period, count) @ np.linalg.inv(seen)
+            left = np.abs(seen @ far)
+            if (np.delete(left, place, axis=1) @ np.delete(units, place) <= units / 1024).all():
+                return sums(row, count) + np.abs(row @ far) @ np.linalg.solve(np.eye(len(left)) - left, units)
             count *= 2
 
     def before(self, row, segment):
