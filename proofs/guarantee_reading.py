@@ -51,14 +51,18 @@ def matrix(value: Any, where: str, height: int, width: int) -> list[Row]:
 
 def upper(value: Fraction) -> str:
     """Decimal with four digits that is not below the number."""
-    exponent = len(str(abs(value.numerator))) - len(str(value.denominator)) - 4
+    bits = value.numerator.bit_length() - value.denominator.bit_length()
+    exponent = bits * 30103 // 100000 - 5  # of a number of any length; log10(2) = 0.30103
     digits = -(-value // Fraction(10) ** exponent)
     while abs(digits) >= 10**4:
         exponent += 1
         digits = -(-value // Fraction(10) ** exponent)
+    if abs(exponent) > 300:  # beyond what a float holds
+        return f"{digits}e{exponent}" if digits else "0"
     return f"{float(f'{digits}e{exponent}'):.4g}"
 
 
 def lower(value: Fraction) -> str:
     """Decimal with four digits that is not above the number."""
-    return f"{0 - float(upper(-value)):.4g}"
+    text = upper(-value)
+    return text[1:] if text.startswith("-") else text if text == "0" else f"-{text}"

@@ -342,6 +342,18 @@ def test_four_digits_are_the_nearest_on_the_outer_side(value, sign):
     assert (checker.upper(F(12345)), checker.lower(F(12345))) == ("1.235e+04", "1.234e+04")
 
 
+def test_numbers_beyond_those_of_floats_and_longer_than_python_writes_are_not_rounded_inward():
+    small, large = F(1, 10**340), 10**340 + F(1, 3)  # 0 and infinity as floats
+    assert (checker.upper(small), checker.lower(small), checker.upper(-small)) == (
+        "1000e-343",
+        "1000e-343",
+        "-1000e-343",
+    )
+    assert (checker.upper(large), checker.lower(large), checker.lower(-large)) == ("1001e337", "1000e337", "-1001e337")
+    long = F(3**10_000 + 1, 7 * 3**10_000)  # 4772 digits, more than Python writes
+    assert (checker.upper(long), checker.lower(long)) == ("0.1429", "0.1428")
+
+
 def test_a_slow_gain_is_read_to_its_limits_and_needs_friction_of_slip_and_samples():
     steady, held = changed(HELD, (("fault", "friction", "rate_slope"), "0")), HELD["loop"]
     task, jumpy = checker.read_task(steady), checker.read_task(HELD)
