@@ -1,5 +1,6 @@
 """What a campaign is about: one closed loop, and how its samples differ."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -197,6 +198,14 @@ class Problem:
 
     def _result(self, end: Any) -> SampleResult:
         watched = self._watched.watched(end)
+        return SampleResult(figures=self._figures(watched), events=events(watched))
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """Names of what every sample has that does not diverge."""
+        return tuple(self._figures(defaultdict(lambda: 1.0, diverged=-1.0)))
+
+    def _figures(self, watched: dict[str, float]) -> dict[str, Any]:
         measured = metrics(
             watched,
             controlled=self.controller is not None,
@@ -207,8 +216,7 @@ class Problem:
             sticks=self._watched.loop.sticks,
             further=self._watched.scheme.described,
         ).to_dict()
-        figures = {name: value for name, value in measured.items() if value is not None and name not in _NOT_COMPARED}
-        return SampleResult(figures=figures, events=events(watched))
+        return {name: value for name, value in measured.items() if value is not None and name not in _NOT_COMPARED}
 
     def trajectory(self, sample: Sample, samples: int) -> Trajectory:
         """Run of a sample with about that many instants, with the digits that it has in the campaign."""

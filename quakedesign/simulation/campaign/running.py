@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import fields
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -25,7 +24,6 @@ from quakedesign.simulation.campaign.space import Sample, Space, require_count, 
 from quakedesign.simulation.campaign.worker import advance
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.loading import Load
-from quakedesign.simulation.metrics import ActuatorMetrics
 from quakedesign.simulation.setting import Setting
 from quakedesign.temporary import temporary_folder
 from quakedesign.workers import Crew, Processes
@@ -149,7 +147,7 @@ def run_campaign(
     """
     require_count(samples)
     if metric is not None:
-        require_metric(metric, [field.name for field in fields(ActuatorMetrics)])
+        require_metric(metric, problem.metrics)
     if scheduler and executor:
         raise ParameterError("give a scheduler or an executor. Received both. Leave one out.")
     began = perf_counter()

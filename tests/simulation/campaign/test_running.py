@@ -102,6 +102,7 @@ def test_more_samples_begin_with_those_that_are_there(serial, tmp_path):
     few = run_campaign(PROBLEM, 10, tmp_path, executor=SerialExecutor())
     more = run_campaign(PROBLEM, COUNT, tmp_path, executor=SerialExecutor())
     assert (few.resumed, more.resumed) == (0, 10)
+    assert more.metrics == PROBLEM.metrics
     assert more.results == serial[0].results
 
 
@@ -246,6 +247,9 @@ def test_what_makes_no_sense_is_refused(tmp_path):
         run_campaign(PROBLEM, 1, tmp_path, scheduler="tcp://here:1", executor=SerialExecutor())
     with pytest.raises(ParameterError, match="metric must be one of"):
         run_campaign(PROBLEM, 2, tmp_path / "a", executor=SerialExecutor(), metric="beauty")
+    with pytest.raises(ParameterError, match=r"metric must be one of .*max_slip_error.*Received 'max_well_pressure'"):
+        run_campaign(PROBLEM, 2, tmp_path / "a", executor=SerialExecutor(), metric="max_well_pressure")
+    assert not (tmp_path / "a").exists()  # before any work
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError):
         run_campaign(PROBLEM, 1, tmp_path / "file" / "folder", executor=SerialExecutor())
