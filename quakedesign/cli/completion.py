@@ -3,11 +3,12 @@
 import sys
 from typing import Literal
 
+from quakedesign.cli.options import PLAIN, Output
 from quakedesign.cli.shared import app
 
 
 @app.command
-def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
+def completion(shell: Literal["bash", "zsh", "fish"], /, *, output: Output = PLAIN) -> int:
     """Print a script that completes commands and options in a shell.
 
     For example: quakedesign completion bash > ~/.local/share/bash-completion/completions/quakedesign
@@ -17,5 +18,6 @@ def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
     shell
         bash, zsh or fish.
     """
-    sys.stdout.write(app.generate_completion(shell=shell) + "\n")
+    script = app.generate_completion(shell=shell)
+    output.show({"shell": shell, "script": script}, lambda: sys.stdout.write(f"{script}\n"))
     return 0

@@ -102,12 +102,13 @@ def _power_of_ten(value: float) -> float:
 
 
 def _decades(axis: Any) -> Any:
-    """Ticks at zero and at every other power of ten."""
-    from matplotlib.ticker import SymmetricalLogLocator
+    """Ticks at zero and at every other power of ten beyond the linear part, or further apart: at most five."""
+    from matplotlib.ticker import FixedLocator
 
-    locator = SymmetricalLogLocator(transform=axis.yaxis.get_transform(), subs=[1.0])
-    locator.set_params(numticks=5)
-    return locator
+    last = int(np.floor(np.log10(max(np.abs(axis.get_ylim())))))
+    first = int(np.log10(axis.yaxis.get_transform().linthresh)) + 1
+    powers = [10.0**power for power in range(last, first - 1, -max(2, (last - first) // 2 + 1))] or [10.0**first]
+    return FixedLocator([*(-power for power in powers), 0.0, *powers])
 
 
 def _time_below(column: Any, drawing: Any, unit: str) -> None:

@@ -18,6 +18,7 @@ NATURAL, INDUCED = "#000000", "#CC79A7"
 ORIGINS = {"published": (0, (4, 2)), "designed": "solid"}
 """Line style of every origin, in the order in which they stand side by side."""
 PALE = 0.45
+_NOTE = 115  # of the smallest letters in a line of the width of a figure
 _LINE = 0.125  # height of a line of the smallest letters [in]
 _PALETTE = ("#0072B2", "#009E73", "#D55E00", "#E69F00", "#56B4E9", "#777777")
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
@@ -68,7 +69,7 @@ def finish(drawing: Any, title: str, runs: Sequence["Trajectory"], note: str = "
     """Give a figure its title above, and below the legend of one axis (three columns) and how the runs were made."""
     drawing.suptitle(title, fontsize=SMALL + 2)
     whole = "; ".join(part for part in (note, made(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
-    told = wrap(whole, 135, break_on_hyphens=False)
+    told = wrap(whole, _NOTE, break_on_hyphens=False)
     height, bottom = drawing.get_figheight(), 0.05 + _LINE * len(told)
     drawing.text(0.5, 0.03 / height, "\n".join(told), ha="center", va="bottom", fontsize=SMALL - 1, color="#444444")
     if legend is not None:

@@ -95,7 +95,7 @@ def friction_law(comparison: "Compared") -> Any:
     drawing, ((axis,),) = figure(1, 3.0)
     axis.plot(slips / size, values, color=NATURAL, label=f"{fault.friction.name} at rest")
     axis.plot(slips / size, spring, color="grey", linestyle="--", linewidth=1, label="unloading of the spring")
-    axis.set_ylim(bottom=max(0.0, 2 * values.min() - values.max()))
+    axis.set_ylim(bottom=max(0.0, values.min() - (values.max() - values.min()) / 4))
     axis.set_xlabel(f"slip [{unit}]")
     axis.set_ylabel("friction coefficient [-]")
     axis.legend(fontsize=SMALL)

@@ -1,6 +1,7 @@
 """Comparisons: headlines say what holds and what does not; figures and pages have units."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -59,6 +60,21 @@ def test_every_axis_of_every_figure_has_a_label_with_a_unit(comparison):
             labelled = axis.get_ylabel() if name != "metrics" else axis.get_xlabel()
             assert "[" in labelled, name
         assert any("[" in axis.get_xlabel() for axis in figure.axes)
+
+
+def test_no_tick_label_covers_another_and_no_text_leaves_its_figure(comparison):
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    for name, figure in comparison.figures().items():
+        FigureCanvasAgg(figure).draw()
+        for side in (side for axis in figure.axes for side in (axis.xaxis, axis.yaxis)):
+            low, high = side.get_view_interval()
+            shown = [tick.label1 for tick in side.get_major_ticks() if low <= tick.get_loc() <= high]
+            boxes = [label.get_window_extent() for label in shown if label.get_visible() and label.get_text()]
+            assert not any(one.overlaps(other) for one, other in pairwise(boxes)), (name, side.axes.get_title())
+        for text in (*figure.texts, figure._suptitle):
+            box = text.get_window_extent()
+            assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1, (name, text.get_text())
 
 
 def test_the_folder_appears_whole_and_is_not_overwritten(comparison, tmp_path, monkeypatch):

@@ -45,7 +45,8 @@ def _distribution(axis: Any, name: str, values: Any, marks: Mapping[float, float
     if len(finite) and finite[0] > 0 and finite[-1] > _DECADES * finite[0]:
         axis.set_xscale("log")
     else:
-        axis.locator_params(axis="x", nbins=5)
+        axis.locator_params(axis="x", nbins=4)
+        axis.ticklabel_format(axis="x", scilimits=(-2, 4), useMathText=True)
     axis.set_xlabel(name)
     if axis.get_subplotspec().is_first_col():
         axis.set_ylabel("share of samples [-]")
