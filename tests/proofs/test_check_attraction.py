@@ -112,7 +112,14 @@ def test_a_proof_is_accepted_and_no_entry_can_change_or_go(make):
 
 
 def test_a_point_refutes_where_v_does_not_fall_or_is_not_positive():
-    for document in (refuted(), refuted("-1"), refuted("2", "5"), refuted("3", ""), refuted("1/2", "1", "-1")):
+    for document in (
+        refuted(),
+        refuted("-1"),
+        refuted("2", "5"),
+        refuted("3", ""),
+        refuted("1/2", "1", "-1"),
+        refuted("2", "1", "-1"),
+    ):
         assert decided(document) == "refuted"
 
 
@@ -124,6 +131,9 @@ def test_a_point_refutes_where_v_does_not_fall_or_is_not_positive():
         refuted("1/2"),  # V falls there
         refuted("1", "0"),
         refuted("1", "-1"),
+        refuted("1", "0", "-1"),
+        everywhere() | {"variables": ["x", "x"]},
+        everywhere() | {"multiplier": {}},
         refuted() | {"multiplier": {"0": "1"}},
         refuted() | {"negative": {"point": ["1", "1"]}},
         refuted() | {"V": {"2": "1", "0": "1"}},
