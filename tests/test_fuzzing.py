@@ -298,7 +298,7 @@ def certificates(draw):
             parent = parent[key]
         kind = draw(st.sampled_from(["replace", "replace", "copy", "lose"]))
         if kind == "replace":
-            parent[last] = draw(VALUES)
+            parent[last] = copy.deepcopy(draw(VALUES))
         elif kind == "lose":
             del parent[last]
         elif isinstance(parent, list):

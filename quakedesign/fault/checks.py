@@ -118,12 +118,13 @@ def _require(values: dict[str, Any], fine: Callable[[Any], bool], what: str, rem
         with problems.collected():
             if not isinstance(value, Real) or isinstance(value, bool):
                 raise ParameterError(f"{name} must be a number in SI units, {what}. Received {shown(value)}.")
-            if not (_is_finite(value) and fine(value)):
+            if not (is_finite(value) and fine(value)):
                 raise ParameterError(f"{name} must be {what}. Received {shown(value)} (SI units). {remedy}".strip())
     problems.refuse()
 
 
-def _is_finite(value: Real) -> bool:
+def is_finite(value: Real) -> bool:
+    """Whether a number is one that a float holds."""
     try:
         return math.isfinite(value)
     except OverflowError:

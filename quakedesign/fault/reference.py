@@ -40,7 +40,7 @@ class Reference:
         ParameterError
             For anything that has no powers.
         """
-        if not hasattr(stage, "__pow__"):
+        if isinstance(stage, type) or not hasattr(stage, "__pow__"):
             raise ParameterError(
                 f"stage must be a number, an array or an expression. Received {shown(stage)}. Give t/t_op."
             )

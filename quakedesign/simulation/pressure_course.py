@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from quakedesign.errors import ParameterError, UnitError
+from quakedesign.fault.checks import is_finite
 from quakedesign.fault.units import si_value
 from quakedesign.input import read_text
 from quakedesign.text import shown
@@ -44,7 +45,7 @@ class PressureCourse:
                 f"a course of pressure must have 1 to {MOST_POINTS} instants, each with a pressure. "
                 f"Received {len(self.times)} and {len(self.pressures)}. Leave out those on a straight line."
             )
-        if not np.all(np.isfinite((*self.times, *self.pressures))):
+        if not all(map(is_finite, (*self.times, *self.pressures))):
             raise ParameterError("times [s] and pressures [Pa] must be finite. Received others. Check the numbers.")
         thrice = any(late <= early for early, late in zip(self.times, self.times[2:], strict=False))
         if thrice or any(late < early for early, late in pairwise(self.times)):

@@ -35,7 +35,7 @@ def test_both_must_be_positive(name, value):
         Reference(**{"target_slip": 1.0, "operation_time": 1.0} | {name: value})
 
 
-@pytest.mark.parametrize("stage", [None, "1/2", [0.5], {}])
+@pytest.mark.parametrize("stage", [None, int, "1/2", [0.5], {}])
 def test_a_stage_without_powers_is_refused(stage):
     with pytest.raises(ParameterError, match=r"stage must be a number, an array or an expression\. Received"):
         REFERENCE.shape(stage)

@@ -1,5 +1,8 @@
 """Courses of pressure by hand."""
 
+import math
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -72,3 +75,9 @@ def test_other_files_are_refused(tmp_path, content, said):
     path.write_text(content)
     with pytest.raises((ParameterError, UnitError), match=said):
         pressure_course(str(path))
+
+
+def test_pressures_may_be_any_numbers_that_are_finite():
+    assert PressureCourse.constant(Fraction(1, 4)).after(3.0) == 0.25
+    with pytest.raises(ParameterError, match="must be finite"):
+        PressureCourse.constant(math.nan)
