@@ -8,7 +8,15 @@ from quakedesign.errors import QuakedesignError
 
 
 def read_text(path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError]) -> str:
-    """Text of a file in UTF-8.
+    """Text of a file in UTF-8; parameters as in `read_bytes`."""
+    try:
+        return read_bytes(path, what, largest=largest, refusal=refusal).decode()
+    except UnicodeDecodeError:
+        raise refusal(f"{what} cannot be read: {path}: its text is not UTF-8. Give a readable file.") from None
+
+
+def read_bytes(path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError]) -> bytes:
+    """Content of a file.
 
     Parameters
     ----------
@@ -28,9 +36,9 @@ def read_text(path: str | Path, what: str, *, largest: int, refusal: type[Quaked
         if len(data) > largest:
             size = f"{largest >> 20} MiB" if largest >> 20 else f"{largest >> 10} KiB"
             raise refusal(f"{what} must be at most {size}. Received {path}, which is larger. Give a smaller one.")
-        return data.decode()
+        return data
     except QuakedesignError:
         raise
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "its name or its text is not UTF-8"
+        reason = getattr(error, "strerror", None) or "its name is none that a file can have"
         raise refusal(f"{what} cannot be read: {path}: {reason}. Give a readable file.") from None

@@ -123,7 +123,7 @@ def _require(values: dict[str, Any], fine: Callable[[Any], bool], what: str, rem
     problems.refuse()
 
 
-def is_finite(value: Real) -> bool:
+def is_finite(value: Real | float) -> bool:
     """Whether a number is one that a float holds."""
     try:
         return math.isfinite(value)

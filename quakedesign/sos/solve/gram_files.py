@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import PolynomialError
+from quakedesign.input import read_bytes
 from quakedesign.rationals import rational
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.solve.verification import verify
@@ -53,12 +54,7 @@ def read_gram(path: str | Path) -> GramFile:
         When the file cannot be read, or has other contents.
     """
     path = Path(path)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise PolynomialError(f"{path} must be a file that can be read. Received: {error.strerror}.") from None
-    if len(content) > _LARGEST:
-        raise PolynomialError(f"a file with a Gram matrix must have at most {_LARGEST} bytes. Received {path}.")
+    content = read_bytes(path, "a file with a Gram matrix", largest=_LARGEST, refusal=PolynomialError)
     try:
         raw = _matlab(content) if path.suffix == ".mat" else json.loads(content)
     except Exception as error:  # a broken file raises anything

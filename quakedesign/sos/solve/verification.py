@@ -1,6 +1,6 @@
 """Gram matrices that somebody else's solver has found: rounded and put right exactly, or answered otherwise."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from time import perf_counter
@@ -22,6 +22,7 @@ from quakedesign.sos.solve.faces import Block, at_kernels
 from quakedesign.sos.solve.moment import Solution
 from quakedesign.sos.solve.rounding import rounded
 from quakedesign.sos.solve.scaling import Scaled, decimal_units, scaled
+from quakedesign.text import shown
 
 
 def verify(
@@ -59,7 +60,7 @@ def verify(
     names, exact, inequalities, equalities, _ = read(polynomial, on, None, variables)
     if equalities:
         raise PolynomialError("constraints of a given proof must be inequalities. Received an equality. Use prove.")
-    grams, bases = ([gram], [basis]) if not inequalities else (list(gram), list(basis))
+    grams, bases = (_listed(gram), _listed(basis)) if inequalities else ([gram], [basis])
     if not len(grams) == len(bases) == 1 + len(inequalities):
         raise PolynomialError(
             f"1 + {len(inequalities)} Gram matrices and bases are needed, for 1 and for every inequality. "
@@ -75,13 +76,19 @@ def verify(
     return replace(_verified(asked, squares), seconds=perf_counter() - start)
 
 
+def _listed(given: Any) -> list[Any]:
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise PolynomialError(f"matrices and bases must be sequences. Received {shown(given)}.")
+    return list(given)
+
+
 def _degree(element: Element) -> int:
     return degree(as_polynomial(element))
 
 
 def _square(product: tuple[int, ...], gram: Any, basis: Any, names: tuple[str, ...]) -> Square:
     """Given matrix, as exact as its floats, with a basis in which every element has a monomial of its own."""
-    elements = tuple(read_element(b, names) for b in basis)
+    elements = tuple(read_element(b, names) for b in _listed(basis))
     matrix = _matrix(gram, len(elements))
     upper = tuple(Fraction(float(matrix[i, j])) for i in range(len(elements)) for j in range(i, len(elements)))
     distinct = {tuple(sorted(as_polynomial(b).items())) for b in elements}

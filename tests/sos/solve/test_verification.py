@@ -196,7 +196,7 @@ def test_a_file_that_is_not_there_too_long_or_no_matlab_is_refused(tmp_path):
     with pytest.raises(PolynomialError, match="No such file"):
         sos.read_gram(tmp_path / "none.json")
     (tmp_path / "long.json").write_bytes(b" " * ((4 << 20) + 1))
-    with pytest.raises(PolynomialError, match="bytes"):
+    with pytest.raises(PolynomialError, match="at most 4 MiB"):
         sos.read_gram(tmp_path / "long.json")
     (tmp_path / "gram.mat").write_bytes(b"MATLAB 7.3 MAT-file")
     with pytest.raises(PolynomialError, match="MATLAB's save -v7"):
@@ -247,3 +247,16 @@ def test_everything_on_the_page_runs(tmp_path, monkeypatch):
         exec(compile(block, "own_certificate.md", "exec"), here)
         assert here["answer"].remark.startswith("proved by the given matrix")
         assert here["answer"].check()
+
+
+@pytest.mark.parametrize(("gram", "basis"), [(None, None), ([[1.0]], None), ([[1.0]], 3), ([[1.0]], "x")])
+def test_what_is_no_sequence_is_no_basis(gram, basis):
+    with pytest.raises(PolynomialError, match="matrices and bases must be sequences"):
+        sos.verify("x**2", gram, basis)
+    with pytest.raises(PolynomialError, match="matrices and bases must be sequences"):
+        sos.verify("x**2", gram, basis, on=["x >= 0"])
+
+
+def test_a_name_that_no_file_has_is_refused():
+    with pytest.raises(PolynomialError, match="its name is none that a file can have"):
+        sos.read_gram("\0")
