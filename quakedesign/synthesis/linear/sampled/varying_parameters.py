@@ -13,8 +13,8 @@ from quakedesign.synthesis.linear.sampled.input_delay import DelayProof, delay_p
 from quakedesign.synthesis.linear.sampled.stability import LargestStep, hold_verdict
 
 CLAIM = (
-    "p held, integrals summed over the samples as in the scheme explicit, parameters measurable in time anywhere in "
-    "the box, also inside a period"
+    "p held, integrals summed over the samples as in the scheme explicit, beta, s and w measurable in time anywhere in "
+    "their ranges over the box, also inside a period"
 )
 _SHARES = tuple(Fraction(n, 100) for n in (99, 98, 96, 93, 88, 80))
 """Of the limit for constant parameters, where a V that depends on the clock is tried; degree 8 reaches 98 or 99 %."""
