@@ -1,13 +1,23 @@
 """The command about the loop that runs."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Output
-from quakedesign.cli.shared import ExactMetres, ExactMetresPerSecond, ExactSeconds, Gains, app, new_file
+from quakedesign.cli.shared import (
+    ExactMetres,
+    ExactMetresPerSecond,
+    ExactPascals,
+    ExactSeconds,
+    Gains,
+    app,
+    new_file,
+)
 from quakedesign.rationals import rational
+
+_USUAL = ("tracking", "amplitude")
 
 
 @app.command
@@ -27,6 +37,8 @@ def guarantee(
     slip_noise: ExactMetres = "0",
     rate_noise: ExactMetresPerSecond = "0",
     disturbance_class: Annotated[Literal["amplitude", "rate"], Parameter(name="--class")] = "amplitude",
+    stress: ExactPascals | None = None,
+    spread: str = "0",
     box: Box = None,
     out: Path | None = None,
     force: Force = False,
@@ -65,6 +77,11 @@ def guarantee(
         The same of the measured slip rate.
     disturbance_class
         amplitude: any disturbance as large as the fault's; rate: one that starts at 0 and is no faster either.
+    stress
+        Of a fault with rate-and-state friction, held in slow sliding by an e-LQR through rock or a lag: bound of the
+        shear stress disturbance, such as '25 kPa'; the largest that the design stands unless given.
+    spread
+        Of such a fault: by how much of their values a, b and D_c may be off, such as 0.1.
     out
         Certificate file to write.
     """
@@ -72,28 +89,62 @@ def guarantee(
 
     from quakedesign.certificates.guarantee import Guarantee
     from quakedesign.certificates.guarantee.files import save_guarantee
+    from quakedesign.certificates.slow_sliding import SlidingGuarantee, save_sliding
+    from quakedesign.errors import ParameterError
     from quakedesign.fault import load_fault
-    from quakedesign.synthesis import answer
+    from quakedesign.synthesis import answer, answer_sliding
 
     new_file(out, "certificate file", force=force)
-    began = perf_counter()
-    found = answer(
-        load_fault(fault, box=box),
+    began, chosen = perf_counter(), load_fault(fault, box=box)
+    held_over = None if step is None else rational(step, "step")
+    times = {
+        "delay": rational(delay, "delay"),
+        "lag": rational(lag, "lag"),
+        "diffusion": rational(diffusion, "diffusion"),
+        "slip_noise": rational(slip_noise, "slip noise"),
+    }
+    if chosen.friction.state_names:
+        if gains or scheme or rational(rate_noise, "rate noise") or (objective, disturbance_class) != _USUAL:
+            raise ParameterError(
+                "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude. "
+                "Received gains, a scheme, noise of the slip rate, an objective or a class. Leave them out."
+            )
+        told = None if stress is None else rational(stress, "stress")
+        sliding = answer_sliding(
+            chosen,
+            controller=controller,
+            step=held_over,
+            stress=told,
+            spread=rational(spread, "spread"),
+            **times,
+        )
+        if out is not None and isinstance(sliding.proof, SlidingGuarantee):
+            save_sliding(sliding.proof, out)
+        return _shown(sliding, out, began, output)
+    if stress is not None or rational(spread, "spread"):
+        raise ParameterError(
+            f"stress and spread need friction with a state. Received {chosen.friction.name}. Leave them out."
+        )
+    proof = answer(
+        chosen,
         controller=controller,
         gains=gains,
         objective=objective,
         scheme=scheme,
-        step=None if step is None else rational(step, "step"),
-        delay=rational(delay, "delay"),
-        lag=rational(lag, "lag"),
-        diffusion=rational(diffusion, "diffusion"),
+        step=held_over,
         measured=measured,
-        slip_noise=rational(slip_noise, "slip noise"),
         rate_noise=rational(rate_noise, "rate noise"),
         disturbance_class=disturbance_class,
+        **times,
     )
-    if out is not None and isinstance(found.found, Guarantee):
-        save_guarantee(found.found, out)
-    written = str(out) if out is not None and found.proved else None
-    output.show({**found.to_dict(), "certificate": written, "seconds": perf_counter() - began}, found.lines())
-    return 0 if found.proved else 1
+    if out is not None and isinstance(proof.found, Guarantee):
+        save_guarantee(proof.found, out)
+    return _shown(proof, out, began, output)
+
+
+def _shown(proof: Any, out: Path | None, began: float, output: Output) -> int:
+    from time import perf_counter
+
+    written = str(out) if out is not None and proof.proved else None
+    output.show({**proof.to_dict(), "certificate": written, "seconds": perf_counter() - began}, proof.lines())
+    return 0 if proof.proved else 1

@@ -11,8 +11,19 @@ if TYPE_CHECKING:
     from quakedesign.synthesis.designed import Design
     from quakedesign.synthesis.gains.synthesise import synthesise
     from quakedesign.synthesis.guarantee import answer
+    from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
     from quakedesign.synthesis.methods.base import designable
 
-__all__ = ["Design", "answer", "assess", "certify", "design", "designable", "stated_problems", "synthesise"]
+__all__ = [
+    "Design",
+    "answer",
+    "answer_sliding",
+    "assess",
+    "certify",
+    "design",
+    "designable",
+    "stated_problems",
+    "synthesise",
+]
 
 face(__name__)

@@ -38,6 +38,7 @@ _STARTS = (
 _SIMPLEX = (0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.05, 0.05, 0.05)
 _EVALUATIONS = 120
 _FORGETTING = 0.972  # largest eigenvalue of a period, so that the proof need not sum many
+_PER_AGEING = 20  # periods in D/V that are few enough to be summed and many enough to control
 _GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}  # over Y, pressures in 2a of the normal stress
 _TURNS = 6
 _ROOM = 1.05  # of claims over what an estimate gives
@@ -122,7 +123,11 @@ def designed_sliding(
     reached = minimize(cost, best, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": _EVALUATIONS})
     chosen = held(reached.x)
     if chosen is None or reached.fun >= _FAILED / 2:
-        reason = "no law was found that holds slow sliding: shorten the step or the way through the rock"
+        suits = float(task.ranges["critical_slip"][0] / task.rate) / _PER_AGEING
+        reason = (
+            f"no law held over {float(step):g} s was found whose loop is stable and forgets within some hundred "
+            f"periods; T_s near D_c/{_PER_AGEING}V, here {suits:.2g} s, suits"
+        )
         return NoGuarantee(reason=reason, small_gain=None)
     return chosen
 

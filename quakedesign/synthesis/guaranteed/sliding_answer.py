@@ -1,0 +1,107 @@
+"""What is guaranteed of a law that holds a rate-and-state fault in slow sliding, as `guarantee` says it."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Unpack
+
+from quakedesign.certificates.guarantee import NoGuarantee
+from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.slow_sliding import SlidingGuarantee, sliding_task
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.fault import Fault
+from quakedesign.rationals import rational
+from quakedesign.synthesis.guaranteed.slow_sliding import designed_sliding, largest_stress, proved_sliding
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingAnswer:
+    """Guarantee of slow sliding, or why there is none.
+
+    Attributes
+    ----------
+    proof : SlidingGuarantee or NoGuarantee
+    """
+
+    proof: SlidingGuarantee | NoGuarantee
+
+    @property
+    def proved(self) -> bool:
+        """Whether there is a guarantee."""
+        return isinstance(self.proof, SlidingGuarantee)
+
+    def lines(self) -> list[str]:
+        """For people."""
+        sentence = self.proof.sentence()
+        return [f"proved: {sentence}" if self.proved else sentence]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; exact numbers as texts."""
+        if not isinstance(self.proof, SlidingGuarantee):
+            return {"verdict": "undecided", "reason": self.proof.reason}
+        held = self.proof.held
+        return {
+            "verdict": "proved",
+            "guarantee": self.proof.sentence(),
+            **self.proof.to_dict(),
+            "step": str(held.step),
+            "diffusion": str(held.diffusion),
+            "lag": str(held.lag),
+            "delay": str(held.delay),
+            "slip_noise": str(held.slip_noise),
+            "measured": "slip",
+        }
+
+
+def answer_sliding(
+    fault: Fault,
+    *,
+    controller: str = "elqr",
+    step: Fraction | None = None,
+    stress: Fraction | None = None,
+    spread: Fraction = Fraction(0),
+    **around: Unpack[Around],
+) -> SlidingAnswer:
+    """Design and prove a law for a rate-and-state fault at the mean rate of its task.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : str
+        ``elqr``.
+    step : Fraction, optional
+        T_s [s]; the fault's unless given.
+    stress : Fraction, optional
+        Bound of the shear stress disturbance [Pa]; the largest that the design is seen to stand unless given.
+    spread : Fraction
+        By how much of their values a, b and D_c may be off [-].
+    **around : Fraction
+        As in `design_held`; a lag or a diffusion is needed.
+
+    Raises
+    ------
+    ParameterError, UnsupportedError
+    """
+    box = fault.box
+    if controller != "elqr" or any((box.stiffness, box.damping, box.authority)):
+        raise UnsupportedError(
+            "slow sliding is guaranteed of elqr, with the box of a, b and D_c that a spread gives. Received "
+            f"{controller} and the box {box.name}. Give --controller elqr, --box paper and --spread."
+        )
+    if not 0 <= spread < 1 or (stress is not None and stress <= 0):
+        raise ParameterError(
+            f"a spread must be from 0 to below 1, a stress above 0. Received {float(spread):g} and "
+            f"{float(stress or 0):g} Pa. Change them."
+        )
+    if not (around.get("lag") or around.get("diffusion")):
+        raise ParameterError(
+            "slow sliding is guaranteed through rock or a lag between well and fault. Received neither. Give "
+            "--diffusion, such as '833 s', or --lag."
+        )
+    held_over = rational(fault.sampling_time) if step is None else step
+    task = sliding_task(fault, stress or Fraction(1), spread)
+    design = designed_sliding(task, held_over, **around)
+    if isinstance(design, NoGuarantee):
+        return SlidingAnswer(proof=design)
+    if stress is None:
+        task = sliding_task(fault, largest_stress(task, design) or Fraction(1), spread)
+    return SlidingAnswer(proof=proved_sliding(task, design))

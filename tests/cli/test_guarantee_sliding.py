@@ -1,0 +1,59 @@
+"""``guarantee`` of faults with rate-and-state friction: the sentence first, and one line for what does not apply."""
+
+import json
+from fractions import Fraction
+
+import pytest
+
+from quakedesign.certificates import Verdict
+from quakedesign.certificates.slow_sliding import parse_sliding
+from quakedesign.cli import main
+
+LAGGED = ("guarantee", "creeping-patch", "--lag", "200 s", "--step", "4000 s")
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main(list(arguments))
+    captured = capsys.readouterr()
+    return stop.value.code, captured.out, captured.err
+
+
+@pytest.mark.slow
+def test_a_creeping_patch_is_held_below_1_65_times_its_rate(capsys, tmp_path):
+    path = tmp_path / "sliding.json"
+    code, out, _ = run(capsys, *LAGGED, "--stress", "10 kPa", "--out", str(path), "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["verdict"] == "proved"
+    assert answer["stress"] == "10000"
+    assert 1e-7 < Fraction(answer["peak_slip_rate"]) < Fraction("1.65e-7")
+    assert parse_sliding(path.read_text()).check() is Verdict.PROVED
+
+
+def test_a_step_that_is_too_short_is_said_to_be(capsys):
+    code, out, _ = run(capsys, "guarantee", "creeping-patch", "--lag", "200 s", "--step", "10 s", "--stress", "10 kPa")
+    assert code == 1
+    assert out.startswith("none: no law held over 10 s")
+    assert "4e+03 s, suits" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("guarantee", "crustal-patch"), "through rock or a lag"),
+        ((*LAGGED, "--stress", "0 Pa"), "a stress above 0"),
+        ((*LAGGED, "--spread", "1"), "a spread must be from 0 to below 1"),
+        ((*LAGGED, "--controller", "cta"), "Give --controller elqr"),
+        ((*LAGGED, "--box", "ten-percent"), "--box paper and --spread"),
+        ((*LAGGED, "--class", "rate"), "Leave them out"),
+        ((*LAGGED, "--gains", "1", "2", "3", "4"), "Leave them out"),
+        (("guarantee", "real-fault", "--stress", "1 kPa"), "need friction with a state"),
+        (("guarantee", "real-fault", "--spread", "0.1"), "need friction with a state"),
+    ],
+)
+def test_what_does_not_apply_is_one_line(arguments, said, capsys):
+    code, out, err = run(capsys, *arguments)
+    assert code == 2
+    assert not out
+    assert said in " ".join(err.split())
