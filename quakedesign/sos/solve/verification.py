@@ -24,6 +24,8 @@ from quakedesign.sos.solve.rounding import rounded
 from quakedesign.sos.solve.scaling import Scaled, decimal_units, scaled
 from quakedesign.text import shown
 
+_NEAR = Fraction(1, 100)  # of the largest coefficient: a matrix with a larger error is about another polynomial
+
 
 def verify(
     polynomial: Any, gram: Any, basis: Any, *, on: Sequence[Any] = (), variables: Sequence[Any] | None = None
@@ -122,7 +124,8 @@ def _verified(asked: Statement, squares: Sequence[Square]) -> Answer:
     matrix = (
         f"the given matrix (largest error in a coefficient {float(error):.2g}, least eigenvalue {least:.2g} scaled)"
     )
-    for how, proof in _proposed(moved, blocks, grams):
+    near = error <= _NEAR * max(map(abs, asked.polynomial.values()), default=Fraction(1))
+    for how, proof in _proposed(moved, blocks, grams) if near else ():
         found = Answer(statement=asked, proof=proof, remark=f"proved by {matrix}, {how}", versions=versions())
         if proof is not None and found.check():
             return found

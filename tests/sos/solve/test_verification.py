@@ -68,6 +68,7 @@ def test_only_the_symmetric_part_counts():
         ("x^2 - 3*x*y + y^2", [[1, -1.5], [-1.5, 1]], ["x", "y"], "negative"),
         (MOTZKIN, np.diag([1.0, 1.0, 1.0, -3.0]), ["1", "x^2*y", "x*y^2", "x*y"], "not-sos"),
         (TEXT, np.zeros((3, 3)), BASIS, "sos"),
+        (TEXT, EXACT, BASIS[::-1], "sos"),
         ("x^4 - 2*x^2*y + 2*y^2", np.eye(2), ["x", "y"], "sos"),
         ("x^4 - 3*x^2 + 9/4 + 1/1000000", [[2.25, -1.6], [-1.6, 1]], ["1", "x^2"], "sos"),
     ],
