@@ -370,7 +370,7 @@ PATHS += [(NOISY_RAW, ("loop", "noise", name)) for name in ("slip", "rate")]
 @pytest.fixture
 def coarse(monkeypatch):
     """Few parts of the unit interval: cheap, and as strict."""
-    monkeypatch.setattr(checker.beside("guarantee"), "HALVINGS", 2)
+    monkeypatch.setattr(checker.beside("guarantee_task"), "HALVINGS", 2)
     monkeypatch.setattr(package_task, "_HALVINGS", 2)
 
 
