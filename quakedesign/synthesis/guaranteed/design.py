@@ -25,7 +25,8 @@ _CREEPING = 0.1  # what the slip error over a period counts beside the slip-rate
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
 _MOST_GROWTH = 50.0  # logarithm; no law of samples answers that, and predictions far beyond it overflow
 _FAILED = 1e6
-_HOPELESS = 1.2  # small gain of a whole search after which `first_held` tries no other start
+_HOPELESS = 1.2  # small gain of a whole search after which no other start is tried
+_FAR, _ENOUGH = 3.0, 40  # small gain that a search gives up at after so many evaluations
 
 
 def first_held(
@@ -53,9 +54,13 @@ def first_held(
         return _peak_cost(_seen(task, family, template, x), family.period)
 
     for start in family.starts if near is None else (near,):
-        reached, x = _search(cost, start, enough=_FAILED / 2, evaluations=_EVALUATIONS if near is None else _FEW)
-        if reached < _FAILED / 2 or _HOPELESS * _FAILED < reached < 9 * _FAILED:
+        evaluations = _EVALUATIONS if near is None else _FEW
+        reached, x = _search(cost, start, enough=_FAILED / 2, evaluations=evaluations, far=_far(template))
+        if reached < _FAILED / 2 or _hopeless(reached):
             break
+    last = _seen(task, family, template, x)
+    if last is not None and isinstance(last.bounds, NoGuarantee) and _hopeless(reached):
+        return last.bounds, x
     held = replace(template, law=family.law(x))
     # through a layer a guarantee needs a slow input gain; elsewhere one with any gain is much sooner found
     return best_guarantee(task, held) if held.diffusion else guarantee(task, held), x
@@ -116,15 +121,30 @@ def design_held(
     def seen(x: np.ndarray) -> Estimate | None:
         return _seen(task, family, template, x)
 
-    best = min(
-        (_search(lambda x: _peak_cost(seen(x), family.period), start) for start in family.starts), key=lambda f: f[0]
-    )
+    best = 10 * _FAILED, np.array(family.starts[0])
+    for start in family.starts:
+        reached = _search(lambda x: _peak_cost(seen(x), family.period), start, far=_far(template))
+        best = min(best, reached, key=lambda f: f[0])
+        if template.diffusion and _hopeless(best[0]):
+            break
     found = seen(best[1])
+    if template.diffusion and found is not None and isinstance(found.bounds, NoGuarantee) and _hopeless(best[0]):
+        return found.bounds  # a proof of that takes a minute
     if objective == "tracking" and found is not None and isinstance(found.bounds, Bounds):
         limit = (room or family.room) * float(found.bounds.slip_rate_error)
         starts = (best[1], family.starts[1])
         best = min((_search(lambda x: _drift_cost(seen(x), limit), start) for start in starts), key=lambda f: f[0])
     return best_guarantee(task, replace(template, law=family.law(best[1])))
+
+
+def _far(held: Held) -> float:
+    """Cost above which a search gives up; through a layer, where every evaluation takes a tenth of a second."""
+    return _FAR * _FAILED if held.diffusion else inf
+
+
+def _hopeless(cost: float) -> bool:
+    """Whether a whole search ends at a small gain from which nothing was seen to lead to a guarantee."""
+    return _HOPELESS * _FAILED < cost < 9 * _FAILED
 
 
 def _unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
@@ -159,15 +179,23 @@ def _search(
     *,
     enough: float = -inf,
     evaluations: int = _EVALUATIONS,
+    far: float = inf,
 ) -> tuple[float, np.ndarray]:
-    """Smallest cost found and where; the search ends below `enough`."""
+    """Smallest cost found and where; the search ends below `enough`, or after a while still above `far`."""
+    least, count = inf, 0
+
+    def counted(x: np.ndarray) -> float:
+        nonlocal least, count
+        count, found = count + 1, cost(x)
+        least = min(least, found)
+        return found
 
     def stop(intermediate_result: OptimizeResult) -> None:
-        if intermediate_result.fun < enough:
+        if intermediate_result.fun < enough or (count >= _ENOUGH and far < least < 9 * _FAILED):
             raise StopIteration
 
     options = {"maxfev": evaluations, "xatol": 2e-3, "fatol": 1e-3}
-    found = minimize(cost, np.array(start), method="Nelder-Mead", options=options, callback=stop)
+    found = minimize(counted, np.array(start), method="Nelder-Mead", options=options, callback=stop)
     return float(found.fun), found.x
 
 

@@ -14,6 +14,8 @@ from quakedesign.loop import PeriodicLoop
 _PIECES = 4
 _MOST_PERIODS = 4096
 _FORGOTTEN = 1e-4  # share of the past that is left out
+_ALIKE = 0.99  # decays of modes that are not told apart
+_SOON = 1024  # periods
 _ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # of the range of a slow input gain, with whose loops it is judged
 _SPREAD = Fraction(1, 16)  # of the range by which it is off theirs
 
@@ -68,16 +70,49 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
         jump, step = np.array(segment.jump, dtype=float), expm(flow * piece)
         flows.append(_Flow(jump, step, np.linalg.matrix_power(step, _PIECES) @ jump, piece))
         period = flows[-1].whole @ period
-    radius = max(abs(np.linalg.eigvals(period)))
-    if not radius < 1 - np.log(1 / _FORGOTTEN) / _MOST_PERIODS:
+    slowest = _Slowest.of(period)
+    if not max(slowest.decay, slowest.others) < 1 - np.log(1 / _FORGOTTEN) / _MOST_PERIODS:
         return None
-    doublings = int(np.ceil(np.log2(max(np.log(_FORGOTTEN) / np.log(max(radius, 0.1)), 2))))
+    doublings = int(np.ceil(np.log2(max(np.log(_FORGOTTEN) / np.log(max(slowest.others, 0.1)), 2))))
     rows = np.array(list(loop.outputs.values()), dtype=float)
     return {
         (output, name): tuple(map(float, found))
         for name, entry, enters in _entries(loop)
-        for output, found in zip(loop.outputs, _of_input(entry, flows, doublings, rows, enters), strict=True)
+        for output, found in zip(loop.outputs, _of_input(entry, flows, doublings, rows, enters, slowest), strict=True)
     }
+
+
+@dataclass(frozen=True, slots=True)
+class _Slowest:
+    """Decay of the slowest mode over a period and of all others, and the directions to which and by which it is moved.
+
+    Of a pair of modes that turn, or two that are alike, nothing is told apart: all count as others, as
+    they do where all is soon forgotten anyway.
+    """
+
+    decay: float
+    others: float
+    along: np.ndarray
+    seen: np.ndarray
+
+    @classmethod
+    def of(cls, period: np.ndarray) -> "_Slowest":
+        values, vectors = np.linalg.eig(period)
+        first, *rest = np.argsort(-abs(values))
+        decay, others = float(abs(values[first])), float(max(abs(values[rest]), default=0.0))
+        none = np.zeros(len(period))
+        if values[first].imag or others > _ALIKE * decay or decay**_SOON < _FORGOTTEN:
+            return cls(0.0, decay, none, none)
+        try:
+            seen = np.linalg.solve(vectors.T, np.eye(len(period))[first]).real
+        except np.linalg.LinAlgError:
+            return cls(0.0, decay, none, none)
+        return cls(decay, others, vectors[:, first].real, seen)
+
+    def left(self, columns: np.ndarray, periods: int) -> np.ndarray:
+        """What it leaves, in all, of the columns of a period after so many."""
+        size = np.abs(self.seen @ columns).sum() * self.decay**periods / (1 - self.decay)
+        return np.asarray(self.along * size)
 
 
 def _entries(loop: PeriodicLoop) -> Iterator[tuple[str, np.ndarray, int | None]]:
@@ -92,7 +127,7 @@ def _entries(loop: PeriodicLoop) -> Iterator[tuple[str, np.ndarray, int | None]]
 
 
 def _of_input(
-    entry: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray, enters: int | None
+    entry: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray, enters: int | None, slowest: _Slowest
 ) -> np.ndarray:
     responses = [_response(entry * (enters in (None, i)), flow) for i, flow in enumerate(flows)]
     sums = [_Sums(response, flow.piece, enters is not None) for response, flow in zip(responses, flows, strict=True)]
@@ -101,8 +136,10 @@ def _of_input(
         own.append(later @ part.columns)
         later = later @ flow.whole
     before = np.hstack(own)
+    left = slowest.left(before, 2**doublings)[:, None]
     for _ in range(doublings):
         before, later = np.hstack([before, later @ before]), later @ later
+    before = np.hstack([before, left])
     found = []
     for flow, part in zip(flows, sums, strict=True):
         since, row = part.since(rows), rows

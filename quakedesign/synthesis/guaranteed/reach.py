@@ -103,6 +103,8 @@ def reached(
 ) -> tuple[Guarantee, ...]:
     """Guarantees at growing times: twice the first and so on or half of it, then by bisection.
 
+    It ends without any where half the time brings the small gain too little nearer to 1.
+
     Parameters
     ----------
     attempt : callable
@@ -114,18 +116,25 @@ def reached(
         Number of times at most.
     """
     found: list[Guarantee] = []
-    time, good, bad = first, None, None
+    time, good, bad, small_gain = first, None, None, None
     for _ in range(attempts):
         answer = attempt(time)
         if isinstance(answer, Guarantee):
             found.append(answer)
             good = time
         else:
-            bad = time
+            if good is None and not _nearer(answer.small_gain, small_gain):
+                break
+            bad, small_gain = time, answer.small_gain
         if good is not None and (good == most or (bad is not None and bad - good <= _NEAR * bad)):
             break
         time = _next(good, bad, most)
     return tuple(found)
+
+
+def _nearer(now: Fraction | None, before: Fraction | None) -> bool:
+    """Whether twice what half the time has brought would bring the small gain below 1, or may: nothing is known."""
+    return now is None or before is None or now - 2 * (before - now) < 1
 
 
 def _next(good: Fraction | None, bad: Fraction | None, most: Fraction | None) -> Fraction:

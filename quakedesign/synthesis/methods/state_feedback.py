@@ -100,7 +100,7 @@ class StateFeedback(Method[ExtendedLQR]):
         found = design_held(task, step, objective=wanted.objective, **told)
         if isinstance(found, Guarantee):
             return attacked(fault, found)
-        longest = longest_step(task, step, **told)
+        longest = longest_step(task, step, most=step, **told)
         return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest, wanted.objective))
 
 

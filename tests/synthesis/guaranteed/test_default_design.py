@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
+from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
 from quakedesign.errors import ParameterError
@@ -164,3 +165,16 @@ def test_no_longer_time_than_allowed_is_tried():
     assert asked == [1, 2, 4, 7]
     assert found == 7
     assert searched(F(0), F(1)) == ([F(1, 2**n) for n in range(12)], None)
+
+
+@pytest.mark.parametrize(("small_gains", "tried"), [((6, 5.9), 2), ((6, 4, 3.9), 3), ((None, 6, 3), 5), ((3, 0), 5)])
+def test_times_that_bring_a_loop_no_nearer_to_a_guarantee_are_not_halved_on(small_gains, tried):
+    told, asked = iter((*small_gains, *[None] * 5)), []
+
+    def attempt(time):
+        asked.append(time)
+        gain = next(told)
+        return NoGuarantee(reason="too long", small_gain=None if gain is None else UpperBound(F(gain)))
+
+    assert reached(attempt, F(1), attempts=5) == ()
+    assert asked == [F(1, 2**n) for n in range(tried)]
