@@ -92,7 +92,7 @@ def test_both_checkers_have_the_same_limits():
 
     assert standalone(*LIMITS) == [term_files.LIMITS[name] for name in LIMITS.values()]
     assert standalone("POLYNOMIAL", "VARIABLES", "CONSTRAINTS", "PRODUCTS", "REDUCED") == [
-        files._TERMS, files._VARIABLES, files._CONSTRAINTS, files._PRODUCTS, files._BASIS
+        files.TERMS, files._VARIABLES, files._CONSTRAINTS, files._PRODUCTS, files._BASIS
     ]  # fmt: skip
     assert standalone("BYTES", "DENOMINATOR_BITS", "NESTING") == [strict.LARGEST_FILE, strict._GRID_BITS, strict._DEPTH]
     assert standalone("STEPS", "POLYNOMIAL", "MONOMIALS") == [work.STEPS, work.TERMS, reduction._MONOMIALS]

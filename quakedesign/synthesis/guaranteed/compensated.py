@@ -13,6 +13,7 @@ from quakedesign.certificates.guarantee.sector import holds
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.controllers import Sampling, SlidingMode
 from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.fault.checks import require_ordinary
 from quakedesign.loop import ImplicitRoot, Power
 from quakedesign.loop import compensated as compensated_law
 from quakedesign.synthesis.guaranteed.design import OBJECTIVES
@@ -150,6 +151,7 @@ def design_compensated(
     ------
     ParameterError
     """
+    require_ordinary(step=step)
     weight, authority, errors = _deadbeat(task, step, objective, weights, **around)
     settings = ("weight", weight), ("authority", authority)
     sampling = Sampling(step=step, scheme=GUARANTEED, settings=settings)

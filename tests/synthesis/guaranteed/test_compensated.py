@@ -160,6 +160,8 @@ def test_a_smaller_peak_is_an_objective_too():
     assert peak.claims.slip_rate_error < tracking.claims.slip_rate_error <= peak.claims.slip_rate_error * F(126, 100)
     with pytest.raises(ParameterError, match="tracking, peak"):
         design_compensated(TASK, law("cta", CTA, 1), STEP, objective="speed")
+    with pytest.raises(ParameterError, match=r"step must be of a size between 1e-40 and 1e\+40 in SI units\."):
+        design_compensated(TASK, law("cta", CTA, 1), F(10) ** 400)
 
 
 def test_a_scale_that_is_too_small_says_what_fails():
