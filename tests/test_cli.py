@@ -356,10 +356,14 @@ fastest_rate = "1 m/s"
     assert "rest slip" not in told
     found = json.loads(run(capsys, "fault", str(path), "--json")[1])
     assert [found[name] for name in ("seismic_moment", "magnitude", "rest_slip")] == [None] * 3
-    for command in (("design", str(path), "--out", str(tmp_path / "out")), ("guarantee", str(path))):
+    refused = {
+        ("design", str(path), "--out", str(tmp_path / "out")): "Use fault, derive, simulate or guarantee",
+        ("guarantee", str(path)): "Give --diffusion, such as '833 s', or --lag",
+    }
+    for command, remedy in refused.items():
         code, _, err = run(capsys, *command)
         assert code == 2
-        assert "Use fault, derive or simulate" in err
+        assert remedy in err
     assert [p.name for p in tmp_path.iterdir()] == ["state.toml"]
 
 

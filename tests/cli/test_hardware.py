@@ -87,8 +87,7 @@ def test_people_see_the_units_of_what_flows(run):
     ("guarantee", "Bound of the error of the measured slip", "simulate takes a standard deviation by this name"),
     ("design", "Bound of the error of the slip", "simulate takes a standard deviation by this name"),
 ])  # fmt: skip
-def test_help_says_which_kind_of_number_noise_is(command, kind, other, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "160")
+def test_help_says_which_kind_of_number_noise_is(command, kind, other, capsys):
     with pytest.raises(SystemExit):
         main([command, "--help"])
     said = " ".join(capsys.readouterr().out.replace("│", " ").split())

@@ -101,7 +101,7 @@ class _Slowest:
         first, *rest = np.argsort(-abs(values))
         decay, others = float(abs(values[first])), float(max(abs(values[rest]), default=0.0))
         none = np.zeros(len(period))
-        if values[first].imag or others > _ALIKE * decay or decay**_SOON < _FORGOTTEN:
+        if decay >= 1 or values[first].imag or others > _ALIKE * decay or decay**_SOON < _FORGOTTEN:
             return cls(0.0, decay, none, none)
         try:
             seen = np.linalg.solve(vectors.T, np.eye(len(period))[first]).real
