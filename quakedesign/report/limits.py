@@ -35,7 +35,7 @@ def limits_lines(limits: Limits) -> list[str]:
 
 def _meaning(limits: Limits) -> list[str]:
     if limits.peak_slip_rate_error.impossible_beyond is None:
-        return ["without a disturbance nothing is impossible"]
+        return ["without a disturbance no limit is known"]
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
     told = [
         "impossible for every controller, linear or not, for some friction of the box",
