@@ -8,7 +8,7 @@ from markupsafe import Markup
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Guarantee
 from quakedesign.report.grade import grade
-from quakedesign.report.headlines import domain_sentence, feedforward_rows, guarantee_lines, headline, limit_lines
+from quakedesign.report.headlines import domain_sentence, feedforward_rows, guarantee_lines, limit_lines, sentences
 from quakedesign.report.mathml import mathml
 from quakedesign.report.outcomes import run_sentences
 from quakedesign.report.units import unit_html
@@ -80,7 +80,6 @@ def _account(entry: "Entry") -> Account:
     run = run_sentences(entry.run, design.fault) if entry.run else []
     said, limits = guarantee_lines(entry), limit_lines(entry)
     compensated = [entry.answer.compensation.sentence()] if entry.answer and entry.answer.compensation else []
-    verdict = headline(entry).removeprefix("; ".join(run)).removeprefix("; ")
     domain = [domain_sentence(design.domain)] if design.domain else []
     return Account(
         label=entry.label,
@@ -89,7 +88,7 @@ def _account(entry: "Entry") -> Account:
         guarantee=[line for line in said if line not in (*limits, *compensated)],
         run=run,
         limits=limits,
-        verdict=[verdict],
+        verdict=[sentence for sentence in sentences(entry) if sentence not in run],
         proof=[*compensated, *_stepping(design.controller), *domain],
         law=[mathml(equation) for equation in law_latex(design.controller)],
         gains=_gains(entry),

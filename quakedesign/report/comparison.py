@@ -5,7 +5,7 @@ from typing import Any
 
 from quakedesign.fault import Fault
 from quakedesign.report.figures import figures
-from quakedesign.report.headlines import headline, said
+from quakedesign.report.headlines import headline, remarks, said
 from quakedesign.report.page import table_html
 from quakedesign.simulation import simulation_scheme
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared, designs_of
@@ -18,7 +18,7 @@ class Comparison(Compared):
     def to_dict(self) -> dict[str, Any]:
         """Keys of the command ``design`` in DESIGN.md."""
         by_origin = {
-            o: {e.design.name: e.to_dict() | {"headline": headline(e)} for e in self.of(o)}
+            o: {e.design.name: e.to_dict() | {"headline": headline(e), "remarks": remarks(e)} for e in self.of(o)}
             for o in ("designed", "published")
         }
         return {

@@ -1,16 +1,18 @@
 """What is said of a comparison: outcome and verdict of every controller with what breaks it, domains, schemes."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from itertools import accumulate
 from typing import Any
 
 from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premises import Domain, Variant
-from quakedesign.report.linear import held_sentence, peaks_sentence
+from quakedesign.report.linear import held_sentences, peaks_sentence
 from quakedesign.report.outcomes import run_sentences
 from quakedesign.simulation import Trajectory
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, Entry
+from quakedesign.synthesis import Design
 
 
 def guarantee_lines(entry: "Entry") -> list[str]:
@@ -43,38 +45,84 @@ def said(entry: "Entry") -> str:
     return "; ".join([*guarantee_lines(entry)[:2], headline(entry)])
 
 
+HEADLINE = 200
+"""Characters of a headline at most: two lines and a half of a terminal."""
+
+
 def headline(entry: "Entry") -> str:
-    """One sentence: outcome and pressure of the run, the verdict, and every premise that fails."""
+    """Outcome of the run, the verdict, and of the `sentences` that follow as many as `HEADLINE` characters hold."""
+    told = sentences(entry)
+    return "; ".join(told[: _fitting(told)])
+
+
+def remarks(entry: "Entry") -> list[str]:
+    """The `sentences` for which the headline has no place."""
+    told = sentences(entry)
+    return told[_fitting(told) :]
+
+
+def _fitting(told: Sequence[str]) -> int:
+    """How many sentences, joined, make a headline."""
+    lengths = accumulate(len(sentence) + len("; ") for sentence in told)
+    return max(1, sum(length <= HEADLINE + len("; ") for length in lengths))
+
+
+def sentences(entry: "Entry") -> list[str]:
+    """All that is said of a run and of its proof, what matters most first, without full stops."""
     design = entry.design
     if design.controller is None:
-        return f"undecided: {design.details.get('reason', 'no gains with a proof were found')}"
-    sampled = design.controller.sampling_time is not None
-    verdict = {
-        Verdict.PROVED: "proved for the loop that ran, for ever" if sampled else "proved in continuous time",
-        Verdict.REFUTED: f"refuted: {design.details.get('reason', 'a counterexample checks in exact arithmetic')}",
-        Verdict.UNDECIDED: f"undecided: {design.details.get('reason', 'no certificate')}",
-    }[design.verdict]
-    parts = [
-        *(run_sentences(entry.run, design.fault) if entry.run else ()),
-        verdict,
-        *_broken(design.conditions),
-        *([] if sampled else _held(entry.run)),
-    ]
-    if design.verdict is Verdict.PROVED and all(p.holds for p in design.conditions):
-        parts.append("every premise holds")
-    if sampled and design.certificate is not None:
-        parts.append("its base gains are proved in continuous time too")
-    if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
-        parts.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
+        return _because(Verdict.UNDECIDED, design.details.get("reason", "no gains with a proof were found"))
+    outcome, *of_run = run_sentences(entry.run, design.fault) if entry.run else ("",)
+    told = [outcome, *_verdict(design), *_step_verdict(entry), *_premises(entry), *of_run, *_bounds(entry)]
+    return [sentence for sentence in (*told, *_reversed(entry.run)) if sentence]
+
+
+def _verdict(design: Design) -> list[str]:
+    """Of the loop that ran or in continuous time, with the reason where it is not positive."""
+    if design.verdict is Verdict.PROVED:
+        return ["proved for the loop that ran, for ever" if _sampled(design) else "proved in continuous time"]
+    unsaid = {Verdict.REFUTED: "a counterexample checks in exact arithmetic", Verdict.UNDECIDED: "no certificate"}
+    return _because(design.verdict, design.details.get("reason", unsaid[design.verdict]))
+
+
+def _because(verdict: Verdict, reason: str) -> list[str]:
+    """In one sentence where that leaves half of the headline to others."""
+    told = f"{verdict}: {reason}"
+    return [told] if len(told) <= HEADLINE // 2 else [str(verdict), reason]
+
+
+def _step_verdict(entry: "Entry") -> list[str]:
+    """Whether the step that ran, or that of the fault, is stable."""
+    told = []
     if entry.growth_per_step is not None:
-        stable = "stable" if entry.growth_per_step < 1 else "UNSTABLE"
-        parts.append(f"{stable} at the step used")
-    if entry.peaks:
-        parts.append(peaks_sentence(entry.peaks))
+        told.append(f"{'stable' if entry.growth_per_step < 1 else 'UNSTABLE'} at the step used")
     if entry.held is not None:
         own = entry.run is None or entry.run.provenance["scheme"] in (AS_IN_THE_PAPER, "explicit")
-        parts.append(held_sentence(entry.held) if own else f"with scheme explicit {held_sentence(entry.held)}")
-    return "; ".join([*parts, *_reversed(entry.run)])
+        first, *others = held_sentences(entry.held)
+        told += [first if own else f"with scheme explicit {first}", *others]
+    return told
+
+
+def _premises(entry: "Entry") -> list[str]:
+    """Every premise that fails, and what the proof is about besides."""
+    design, told = entry.design, _broken(entry.design.conditions)
+    if design.verdict is Verdict.PROVED and all(p.holds for p in design.conditions):
+        told.append("every premise holds")
+    if _sampled(design):
+        told += ["its base gains are proved in continuous time too"] if design.certificate is not None else []
+    else:
+        told += _held(entry.run)
+    if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
+        told.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
+    return told
+
+
+def _bounds(entry: "Entry") -> list[str]:
+    return [peaks_sentence(entry.peaks)] if entry.peaks else []
+
+
+def _sampled(design: Design) -> bool:
+    return design.controller is not None and design.controller.sampling_time is not None
 
 
 def domain_sentence(domain: Domain) -> str:

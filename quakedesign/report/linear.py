@@ -10,15 +10,15 @@ from quakedesign.synthesis.linear.analysis.verdict import LinearVerdict
 from quakedesign.synthesis.linear.sampled.held import ConstantLoop, HeldLoop
 
 
-def held_sentence(held: HeldLoop) -> str:
+def held_sentences(held: HeldLoop) -> list[str]:
     """Whether the law that runs is stable when p is held over every step, and up to which step it is."""
-    step, end = f"{float(held.step):.12g}", _proved_up_to(held)
+    over = f"if p is held over T_s = {float(held.step):.12g} s"
     if held.runs.verdict is Verdict.REFUTED and held.runs.witness is not None:
-        return f"UNSTABLE if p is held over T_s = {step} s ({_near(held.runs.witness)}); {end}"
+        return [f"UNSTABLE {over} ({_near(held.runs.witness)})", _proved_up_to(held)]
     if held.runs.verdict is Verdict.UNDECIDED:
-        return f"undecided if p is held over T_s = {step} s; {end}"
+        return [f"undecided {over}", _proved_up_to(held)]
     course = "any course of the parameters, integrals summed over the samples"
-    return f"stable if p is held over T_s = {step} s, proved for {course}; {end}"
+    return [f"stable {over}, proved for {course}", _proved_up_to(held)]
 
 
 def _proved_up_to(held: HeldLoop) -> str:
@@ -60,7 +60,7 @@ def verdict_lines(judged: LinearVerdict) -> list[str]:
         f"{judged.analysis.verdict}: elqr {gains} on {fault.name}, box {fault.box.name}",
         *(f"  {line}" for line in margin_lines(judged.analysis)),
         f"  optimal for a Q that covers the uncertainty: {optimal} (the printed test: {tests['printed']['verdict']})",
-        f"  {held_sentence(judged.held)}",
+        f"  {'; '.join(held_sentences(judged.held))}",
         f"  {constant_sentence(judged.held.constant)}",
     ]
     if judged.asked is None or judged.peaks is None:

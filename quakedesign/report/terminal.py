@@ -13,6 +13,7 @@ from quakedesign.report.headlines import (
     feedforward_rows,
     guarantee_lines,
     headline,
+    remarks,
     scheme_sentence,
 )
 from quakedesign.report.outcomes import run_sentences
@@ -39,6 +40,8 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
         for line in guarantee_lines(entry):
             console.print(line, end="\n  ")
         console.print(headline(entry))
+        for remark in remarks(entry):
+            console.print(f"  {remark}")
         console.print(f"  gains: {gains or 'none'}")
         for premise in entry.design.conditions:
             console.print(f"  {_line(premise)}")

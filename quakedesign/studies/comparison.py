@@ -85,6 +85,7 @@ class Entry:
             "domain": design.domain.to_dict() if design.domain else None,
             "feedforward": {v.feedforward.name: v.to_dict() for v in self.variants},
             "headline": None,
+            "remarks": [],
             "largest_sampling_time": self.largest_step,
             "growth_per_step": self.growth_per_step,
             "held": self.held.to_dict() if self.held else None,

@@ -12,6 +12,7 @@ from quakedesign.errors import OutputError
 from quakedesign.fault import Reference
 from quakedesign.report import Comparison, Entry, headline
 from quakedesign.report.folder import write_folder
+from quakedesign.report.headlines import remarks
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.synthesis import Design
 
@@ -135,3 +136,17 @@ def test_no_gains_with_a_proof_is_undecided():
 
 def test_an_unstable_step_is_shouted():
     assert "UNSTABLE at the step used" in headline(entry(Verdict.PROVED, growth_per_step=1.2))
+
+
+@pytest.mark.parametrize("length", [3, 91, 92, 163, 164, 500])
+@pytest.mark.parametrize("controller", [CONTROLLER, None])
+def test_a_headline_has_at_most_two_hundred_characters_and_loses_no_sentence(length, controller):
+    told = entry(Verdict.UNDECIDED, controller=controller, growth_per_step=1.2)
+    told = replace(told, design=replace(told.design, details={"reason": "x" * length}))
+    first, rest = headline(told), remarks(told)
+    told = "; ".join([first, *rest])
+    assert told.startswith("undecided: xxx" if length <= 100 - len("undecided: ") else "undecided; xxx")
+    assert told.count("x") == length
+    assert told.endswith("UNSTABLE at the step used" if controller else "x")
+    assert len(first) <= 200
+    assert bool(rest) is (len(told) > 200)

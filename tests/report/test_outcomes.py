@@ -13,6 +13,7 @@ from quakedesign.controllers import control_law
 from quakedesign.fault import load_fault
 from quakedesign.report import Entry, headline
 from quakedesign.report.grade import grade
+from quakedesign.report.headlines import sentences
 from quakedesign.report.outcomes import outcome_cells, outcome_sentence, pressure_sentence
 from quakedesign.simulation import simulate
 from quakedesign.synthesis import Design
@@ -47,15 +48,16 @@ def test_a_proved_design_whose_run_is_an_earthquake_is_no_positive_answer(slow, 
     assert answers == [False, True]
 
 
-def test_the_headline_says_outcome_and_pressure_before_the_verdict(slow):
-    parts = headline(entry(slow, FINE)).split("; ")
+def test_the_headline_says_the_outcome_before_the_verdict_and_the_pressure_is_not_lost(slow):
+    parts = sentences(entry(slow, FINE))
     assert parts[0] == outcome_sentence(slow)
     share = 100 * slow.outcome.share_of_natural
     peak = slow.metrics.peak_slip_rate
     assert parts[0] == f"earthquake: peak slip rate {peak:.3g} m/s, {share:.3g} % of the natural earthquake's 0.313 m/s"
-    assert parts[1].startswith("pressure from -")
-    assert "(withdrawal) to" in parts[1]
-    assert parts[2] == "proved in continuous time"
+    assert parts[1:3] == ["proved in continuous time", "every premise holds"]
+    assert parts[3].startswith("pressure from -")
+    assert "(withdrawal) to" in parts[3]
+    assert headline(entry(slow, FINE)).startswith("; ".join(parts[:3]))
     assert entry(slow).to_dict()["outcome"] == slow.outcome.to_dict()
 
 

@@ -10,8 +10,8 @@ import quakedesign as qd
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premise import Premise
-from quakedesign.report.headlines import domain_sentence, headline
-from quakedesign.report.linear import held_sentence, peaks_sentence, verdict_lines
+from quakedesign.report.headlines import domain_sentence, sentences
+from quakedesign.report.linear import held_sentences, peaks_sentence, verdict_lines
 from quakedesign.report.terminal import _line
 from quakedesign.studies.comparison import Entry
 from quakedesign.synthesis.linear.analysis.verdict import judge
@@ -56,7 +56,7 @@ def test_every_certified_number_in_the_lines_about_a_linear_law(linear):
     for pattern, bounds in expected.items():
         shown = numbers(pattern, said)
         assert all(outward(bound, text) for bound, text in zip(bounds, shown, strict=True)), pattern
-    assert held_sentence(held) in said
+    assert "; ".join(held_sentences(held)) in said
     assert peaks_sentence({"rate": peaks}) in said
 
 
@@ -103,8 +103,8 @@ def test_equal_sides_of_a_premise_are_not_said_to_differ():
     assert "<td>at most 0.3334 m</td><td>the same number</td>" in held._repr_html_()
 
 
-def test_headline_and_domain_of_a_sliding_mode(sliding):
-    said = headline(Entry(label="x", origin="designed", design=sliding, run=None))
+def test_sentences_and_domain_of_a_sliding_mode(sliding):
+    said = "; ".join(sentences(Entry(label="x", origin="designed", design=sliding, run=None)))
     failing = [p for p in sliding.premises if not p.holds]
     shown = re.findall(rf"{NUMBER}-fold", said)
     assert len(shown) == len(failing)
