@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Force, Output
+from quakedesign.cli.options import PLAIN, Force, Formats, Output
 from quakedesign.cli.shared import Gains, Whole, app, progress
 from quakedesign.errors import ParameterError
 
@@ -28,6 +28,7 @@ def gain_map(
     seed: Whole = 0,
     workers: Whole = 2,
     out: Path | None = None,
+    format: Formats = ("png",),
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
@@ -65,6 +66,7 @@ def gain_map(
         Folder; ./quakedesign-map-LAW unless given.
     """
     from quakedesign.controllers import family
+    from quakedesign.report.figure_files import file_names
     from quakedesign.report.folder import prepare
     from quakedesign.report.gain_map import gain_map_lines, write_gain_map
     from quakedesign.synthesis.analysis.gain_map import gain_map as mapped
@@ -89,7 +91,8 @@ def gain_map(
             workers=workers,
             tell=tell,
         )
-    facts = write_gain_map(drawn, folder)
-    output.show(facts, [*gain_map_lines(drawn), f"written: {folder}/ (map.png, map.csv, results.json, certificates)"])
+    facts = write_gain_map(drawn, folder, format)
+    written = f"written: {folder}/ ({file_names('map', format)}, map.csv, results.json, certificates)"
+    output.show(facts, [*gain_map_lines(drawn), written])
     proved = all(level["edge_proved"] == level["edge"] for level in facts["levels"])
     return 0 if proved and any(level["screened"] for level in facts["levels"]) else 1

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Output
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output
 from quakedesign.cli.shared import Pascals, SquareMetresPerSecond, app
 
 
@@ -15,6 +15,7 @@ def limits(
     diffusivity: SquareMetresPerSecond = 1.0,
     box: Box = None,
     out: Path | None = None,
+    format: Formats = ("png",),
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
@@ -39,12 +40,13 @@ def limits(
         from quakedesign.report.folder import prepare
 
         prepare(out, force=force)
+    from quakedesign.report.figure_files import file_names
     from quakedesign.report.limits import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits
 
     answer = all_limits(loaded, pressure=pressure, diffusivity=diffusivity)
     if out is not None:
-        write_limits(answer, out)
-    written = [] if out is None else [f"written: {out}/ (limits.png, results.json)"]
+        write_limits(answer, out, format)
+    written = [] if out is None else [f"written: {out}/ ({file_names('limits', format)}, results.json)"]
     output.show(answer.to_dict(), [*limits_lines(answer), *written])
     return 0

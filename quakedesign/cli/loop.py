@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.cli.hardware import ActuatorOptions, EstimateOptions, SensorOptions
-from quakedesign.cli.options import PLAIN, FaultName, Force, LawOptions, NoLawOptions, Output, RunOptions
+from quakedesign.cli.options import PLAIN, FaultName, Force, Formats, LawOptions, NoLawOptions, Output, RunOptions
 from quakedesign.cli.shared import (
     Gains,
     Seconds,
@@ -149,6 +149,7 @@ def sampling(
     schemes: Texts = ("explicit", "implicit", "semi-implicit", "compensated"),
     duration: Seconds | None = None,
     out: Path | None = None,
+    format: Formats = ("png",),
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
@@ -190,7 +191,7 @@ def sampling(
             else chosen_controller(loaded, controller, gains)
         )
         report = sampling_report(loaded, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
-        results = write_sampling(report, folder)
+        results = write_sampling(report, folder, format)
 
     def told() -> None:
         print_sampling(report, console())

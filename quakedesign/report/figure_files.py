@@ -1,6 +1,8 @@
 """Figures as files that journals accept: letters of 8 pt to 9 pt, fonts embedded, no date, at the width of a page."""
 
 import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Literal
 
 Format = Literal["svg", "pdf", "png"]
@@ -33,3 +35,15 @@ def figure_bytes(drawing: Any, kind: str, name: str) -> bytes:
     with mpl.rc_context(style):
         drawing.savefig(stream, format=kind, metadata=_UNDATED[kind])
     return stream.getvalue()
+
+
+def write_figures(folder: Path, drawn: Mapping[str, Any], formats: Sequence[str]) -> None:
+    """Write figures, each by its name, in every format into a folder that exists."""
+    for name, drawing in drawn.items():
+        for kind in formats:
+            (folder / f"{name}.{kind}").write_bytes(figure_bytes(drawing, kind, name))
+
+
+def file_names(name: str, formats: Sequence[str]) -> str:
+    """Of one figure, as a message lists them."""
+    return ", ".join(f"{name}.{kind}" for kind in formats)

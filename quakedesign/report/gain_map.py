@@ -1,6 +1,7 @@
 """A map of certified gains as a figure, a table and a folder; what was screened and what was proved look different."""
 
 import json
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from quakedesign.controllers import LoopField, law
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.drawing import SMALL, WIDTH
+from quakedesign.report.figure_files import write_figures
 from quakedesign.report.numbers import csv_text
 from quakedesign.synthesis.analysis.gain_map import GainMap
 from quakedesign.synthesis.analysis.gain_map_workers import Place
@@ -211,8 +213,8 @@ def gain_map_lines(drawn: GainMap) -> list[str]:
     return lines
 
 
-def write_gain_map(drawn: GainMap, folder: Path) -> dict[str, Any]:
-    """Write ``map.png``, ``map.csv``, ``results.json`` and all certificates into a folder that appears whole.
+def write_gain_map(drawn: GainMap, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
+    """Write the figure ``map``, ``map.csv``, ``results.json`` and all certificates into a folder that appears whole.
 
     Returns
     -------
@@ -228,7 +230,7 @@ def write_gain_map(drawn: GainMap, folder: Path) -> dict[str, Any]:
         (partial / "certificates").mkdir()
         for place, text in drawn.certificates.items():
             write_whole(partial / _file(place), text)
-        gain_map_figure(drawn).savefig(partial / "map.png", metadata={"Software": None})
+        write_figures(partial, {"map": gain_map_figure(drawn)}, formats)
         write_whole(partial / "map.csv", gain_map_csv(drawn))
         write_whole(partial / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
     return facts

@@ -1,6 +1,5 @@
 """An identified law on a terminal and as a figure of the residuals."""
 
-import io
 import math
 from pathlib import Path
 from textwrap import wrap
@@ -12,8 +11,8 @@ from quakedesign.errors import OutputError
 from quakedesign.identification import Estimate, Identification
 from quakedesign.output import write_whole
 from quakedesign.report.drawing import NATURAL, SMALL, clock, figure, finish
+from quakedesign.report.figure_files import FORMATS, figure_bytes
 
-FORMATS = (".svg", ".png", ".pdf")
 _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _MOST_OUTLIERS = 8
 
@@ -99,8 +98,8 @@ def require_format(path: Path) -> None:
     ------
     OutputError
     """
-    if path.suffix not in FORMATS:
-        raise OutputError(f"a figure must end in {', '.join(FORMATS)}. Received {path}. Write {path.stem}.svg, say.")
+    if path.suffix[1:] not in FORMATS:
+        raise OutputError(f"a figure must end in .{', .'.join(FORMATS)}. Received {path}. Write {path.stem}.svg, say.")
 
 
 def save_figure(identification: Identification, path: Path) -> None:
@@ -111,6 +110,4 @@ def save_figure(identification: Identification, path: Path) -> None:
     OutputError
     """
     require_format(path)
-    drawn, undated = io.BytesIO(), {".svg": {"Date": None}, ".png": {"Software": None}, ".pdf": {"CreationDate": None}}
-    identification_figure(identification).savefig(drawn, format=path.suffix[1:], metadata=undated[path.suffix])
-    write_whole(path, drawn.getvalue())
+    write_whole(path, figure_bytes(identification_figure(identification), path.suffix[1:], path.stem))

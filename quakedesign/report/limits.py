@@ -1,6 +1,7 @@
 """Limits of a fault as lines, as a figure and as a folder."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from quakedesign.bounds import Bound, LowerBound, UpperBound
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.drawing import NATURAL, figure, finish
+from quakedesign.report.figure_files import write_figures
 from quakedesign.studies import Limits
 
 _FORBIDDEN, _PROVED = "#F3C6B2", "#0072B2"
@@ -90,8 +92,8 @@ def limits_figure(limits: Limits) -> Any:
     return finish(drawing, f"{limits.fault.name}: what a held pressure can do", [], note, legend=axis)
 
 
-def write_limits(limits: Limits, folder: Path) -> dict[str, Any]:
-    """Write ``limits.png`` and ``results.json`` into a folder that appears whole; return what the latter holds.
+def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
+    """Write the figure ``limits`` and ``results.json`` into a folder that appears whole; return what the latter holds.
 
     Raises
     ------
@@ -99,6 +101,6 @@ def write_limits(limits: Limits, folder: Path) -> dict[str, Any]:
     """
     facts = limits.to_dict()
     with whole_folder(folder) as partial:
-        limits_figure(limits).savefig(partial / "limits.png", metadata={"Software": None})
+        write_figures(partial, {"limits": limits_figure(limits)}, formats)
         write_whole(partial / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
     return facts

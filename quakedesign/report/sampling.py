@@ -1,12 +1,14 @@
 """A sampling report on a terminal and in a folder."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
 from quakedesign.output import whole_folder, write_whole
+from quakedesign.report.figure_files import write_figures
 from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells
 from quakedesign.simulation import Study
 from quakedesign.simulation.sensitivity import QUANTITIES
@@ -40,8 +42,8 @@ FOOTNOTE = (
 )
 
 
-def write_sampling(report: SamplingReport, folder: Path) -> dict[str, Any]:
-    """Write ``results.json`` and ``figures/*.png`` into a folder that appears whole; return what the former holds.
+def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
+    """Write ``results.json`` and a folder ``figures`` into a folder that appears whole; return what the former holds.
 
     Raises
     ------
@@ -50,8 +52,7 @@ def write_sampling(report: SamplingReport, folder: Path) -> dict[str, Any]:
     facts = report.to_dict()
     with whole_folder(folder) as partial:
         (partial / "figures").mkdir()
-        for name, drawing in report.figures().items():
-            drawing.savefig(partial / "figures" / f"{name}.png", metadata={"Software": None})
+        write_figures(partial / "figures", report.figures(), formats)
         write_whole(partial / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
     return facts
 

@@ -67,7 +67,7 @@ def test_what_cannot_be_told_is_said_and_no_file_written(tmp_path, capsys):
     [
         (("--law", "rate-and-state-agin"), "friction law must be one of"),
         (("--stiffness", "5 GPa"), "stiffness must be"),
-        (("--figure", "x.bmp"), "must end in .svg, .png, .pdf"),
+        (("--figure", "x.bmp"), "must end in .svg, .pdf, .png"),
         (("--fault", "nowhere"), "fault must be a preset"),
         (("--out", "nowhere/found.toml"), "must be in a folder that can be written"),
         ((), "needs the motion of the load point"),

@@ -36,8 +36,8 @@ def test_json_has_both_sides(capsys):
 
 def test_a_folder_with_a_figure(tmp_path, capsys):
     folder = tmp_path / "limits"
-    assert run("lab-fault", "--out", str(folder)) == 0
-    assert {path.name for path in folder.iterdir()} == {"limits.png", "results.json"}
+    assert run("lab-fault", "--out", str(folder), "--format", "pdf", "png") == 0
+    assert {path.name for path in folder.iterdir()} == {"limits.pdf", "limits.png", "results.json"}
     assert "written" in capsys.readouterr().out
     assert run("lab-fault", "--out", str(folder)) == 2
     assert "must be new" in capsys.readouterr().err

@@ -39,10 +39,12 @@ OVER, FIVE, ONE = ("--over", "k1", "k2"), ("--points", "5"), ("--lipschitz", "1"
 
 def test_a_map_is_a_folder_with_figure_table_and_certificates(capsys, tmp_path):
     folder = tmp_path / "m"
-    code, said, err = run(capsys, *MAP, *OVER, *FIVE, *ONE, "--range", "0.4", "3", "0.8", "4", "--out", str(folder))
+    code, said, err = run(
+        capsys, *MAP, *OVER, *FIVE, *ONE, "--range", "0.4", "3", "0.8", "4", "--out", str(folder), "--format", "svg"
+    )
     assert code == 0
     assert "proved exactly, among them" in said
-    assert {p.name for p in folder.iterdir()} == {"map.png", "map.csv", "results.json", "certificates"}
+    assert {p.name for p in folder.iterdir()} == {"map.svg", "map.csv", "results.json", "certificates"}
     files = [str(p) for p in sorted((folder / "certificates").iterdir())]
     assert run(capsys, "check", *files)[0] == 0
     assert run(capsys, *MAP, *OVER, *FIVE, *ONE, "--out", str(folder))[0] == 2
