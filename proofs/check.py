@@ -32,8 +32,8 @@ IMPORTS = {
     "guarantee_gains": ("guarantee_reading", "guarantee_numbers", "guarantee_loop", "guarantee_flows"),
     "guarantee_slow": ("guarantee_reading", "guarantee_task", "guarantee_loop", "guarantee_gains"),
     "guarantee_bounds": (
-        *("guarantee_reading", "guarantee_task", "guarantee_loop"),
-        *("guarantee_gains", "guarantee_slow"),
+        *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
+        *("guarantee_loop", "guarantee_gains", "guarantee_slow"),
     ),
     "guarantee": (
         *("guarantee_reading", "guarantee_task", "guarantee_root"),

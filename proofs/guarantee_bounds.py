@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from math import ceil
 
 from guarantee_gains import input_gains
 from guarantee_loop import Loop
+from guarantee_numbers import BITS
 from guarantee_reading import Refused, Row, need, upper
 from guarantee_slow import Slow, slow_gains
 from guarantee_task import Task
@@ -64,6 +66,12 @@ def of_class(
     if spread:
         own.append(Fraction(0))
         shares.append([Fraction(0), Fraction(0), spread[1], *[Fraction(0)] * (len(loop.outputs) - 3)])
+    peaks, small = peaks_of(found, own, shares)
+    return [peaks[0], peaks[1], sum(peaks[2:]) + shifted], small
+
+
+def peaks_of(found: list[list[list[Fraction]]], own: Row, shares: list[Row]) -> tuple[Row, Fraction]:
+    """Bounds of the outputs, and the small gain, from gains by input, output and piece, and what bounds the inputs."""
     table = [
         [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
         for share in shares
@@ -75,7 +83,7 @@ def of_class(
         max(sum(g * v for g, v in zip(at, sizes, strict=True)) for at in zip(*of, strict=True))
         for of in zip(*found, strict=True)
     ]
-    return [peaks[0], peaks[1], sum(peaks[2:]) + shifted], small
+    return peaks, small
 
 
 def solve(table: list[Row], own: Row) -> Row:
@@ -91,7 +99,11 @@ def solve(table: list[Row], own: Row) -> Row:
 
 
 def radius(table: list[Row]) -> Fraction:
-    """Upper bound of the spectral radius of M >= 0, by halving: it is below v where M/v passes `solve`."""
+    """Upper bound of the spectral radius of M >= 0, by halving: it is below v where M/v passes `solve`.
+
+    M is rounded up first: it is solved many times.
+    """
+    table = [[Fraction(ceil(v * (1 << BITS)), 1 << BITS) for v in line] for line in table]
     low, high = Fraction(0), max(sum(line) for line in table) + 1
     for _ in range(48):
         middle = (low + high) / 2

@@ -9,7 +9,7 @@ from fractions import Fraction
 from itertools import accumulate
 from typing import Any
 
-from guarantee_bounds import radius, solve
+from guarantee_bounds import peaks_of
 from guarantee_gains import gains
 from guarantee_loop import Fade, Loop, read_loop
 from guarantee_numbers import unit
@@ -306,17 +306,7 @@ def bounds(plain: Loop, cell: Cell, valve: int) -> tuple[dict[str, Fraction], Fr
     found, more = found_gains(loop, cell, times, late), cell.soon(late)
     own, shares = shares_of(loop, cell)
     own = [v + sum(c * m for c, m in zip(share, more, strict=False)) for v, share in zip(own, shares, strict=True)]
-    table = [
-        [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
-        for share in shares
-    ]
-    small = radius(table)
-    need(small < 1, f"the small gain must be below 1 on every cell. It is {upper(small)}")
-    sizes = solve(table, own)
-    peaks = [
-        max(sum(g * v for g, v in zip(at, sizes, strict=True)) for at in zip(*of, strict=True))
-        for of in zip(*found, strict=True)
-    ]
+    peaks, small = peaks_of(found, own, shares)
     y, _, _, z, slip, push, asked, *left = peaks
     values = (y + more[0], z, slip, push + sum(left), asked)
     return dict(zip(CLAIMS, values, strict=True)), small
