@@ -4,7 +4,17 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.cli.hardware import ActuatorOptions, EstimateOptions, SensorOptions
-from quakedesign.cli.options import PLAIN, FaultName, Force, Formats, LawOptions, NoLawOptions, Output, RunOptions
+from quakedesign.cli.options import (
+    PLAIN,
+    FaultName,
+    Force,
+    Formats,
+    LawOptions,
+    NoLawOptions,
+    Output,
+    RunOptions,
+    StartOptions,
+)
 from quakedesign.cli.shared import (
     Gains,
     Seconds,
@@ -21,7 +31,7 @@ from quakedesign.cli.state import NO_STATE, StateOptions, require_no_state_optio
 from quakedesign.errors import ParameterError
 
 _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
-_NONE, _LAW, _USUAL = NoLawOptions(), LawOptions(), RunOptions()
+_NONE, _LAW, _USUAL, _REST = NoLawOptions(), LawOptions(), RunOptions(), StartOptions()
 
 
 @app.command
@@ -31,6 +41,7 @@ def simulate(
     *,
     law: NoLawOptions = _NONE,
     run: RunOptions = _USUAL,
+    start: StartOptions = _REST,
     scheme: str | None = None,
     weight: float | None = None,
     authority: float | None = None,
@@ -78,6 +89,7 @@ def simulate(
     if loaded.friction.state_names:
         return show_state_run(loaded, simulate, options)
     require_no_state_options(state, loaded)
+    loaded = start.task(loaded)
     chosen, load = law.choose(loaded), run.load()
     way, step, _ = own_way(chosen.controller if chosen else None, scheme, run.step, "continuous")
     period = loaded.sampling_time if step is None else step
@@ -97,6 +109,7 @@ def simulate(
             substeps=run.substeps,
             actuator=chain,
             noise=told,
+            initial=start.state(),
             tuning={name: v for name, v in {"weight": weight, "authority": authority}.items() if v is not None},
         )
     if out is not None:

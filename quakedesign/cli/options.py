@@ -1,12 +1,12 @@
 """Options that several commands share, each told once."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Gains, MetresPerSecond, Push, Seconds, Whole, hush, print_json, print_lines
+from quakedesign.cli.shared import Gains, Metres, MetresPerSecond, Push, Seconds, Whole, hush, print_json, print_lines
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
@@ -140,3 +140,34 @@ class RunOptions:
         from quakedesign.simulation import Load, perturbation
 
         return Load(drift=self.drift, perturbation=self.perturbation and perturbation(self.perturbation))
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class StartOptions:
+    """Where a closed loop starts, and where it is to go.
+
+    Parameters
+    ----------
+    initial_slip
+        Slip at the start, such as '7.5 mm'; none unless given.
+    initial_slip_rate
+        Slip rate at the start, such as '1 mm/s'.
+    target_slip
+        Slip at the end of the task, such as '5 cm', instead of the fault's own.
+    """
+
+    initial_slip: Metres = 0.0
+    initial_slip_rate: MetresPerSecond = 0.0
+    target_slip: Metres | None = None
+
+    def state(self) -> dict[str, float]:
+        """Slip and slip rate at the start, where they are given."""
+        told = {"initial_slip": self.initial_slip, "initial_slip_rate": self.initial_slip_rate}
+        return {name: value for name, value in told.items() if value}
+
+    def task(self, fault: "Fault") -> "Fault":
+        """The fault with the target that is given."""
+        if self.target_slip is None:
+            return fault
+        return replace(fault, reference=replace(fault.reference, target_slip=self.target_slip))

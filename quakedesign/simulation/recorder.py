@@ -78,11 +78,14 @@ class Recorder:
     scheme : Scheme
     step : float
         T_s [s].
+    initial : tuple of float
+        x1 [m] and x2 [m/s] at the start; rest unless given.
     """
 
     loop: ClosedLoop
     scheme: Scheme
     step: float
+    initial: tuple[float, float] = (0.0, 0.0)
 
     @cached_property
     def memory(self) -> dict[str, float]:
@@ -117,8 +120,8 @@ class Recorder:
         return self.loop.with_factors(self.parts(vector).factors)
 
     def start(self, settled_from: float) -> list[float]:
-        """Vector at rest at time zero; `settled_from` is a time [s]."""
-        state = [*[0.0] * (self.state_size - len(self.memory)), *self.memory.values()]
+        """Vector at time zero; `settled_from` is a time [s]."""
+        state = [*self.initial, *[0.0] * len(self.loop.integrals), *self.memory.values()]
         return [0.0, settled_from, *state, *self.watching.values(), *self.loop.factors]
 
     def watched(self, vector: Any) -> dict[str, float]:
@@ -132,10 +135,14 @@ class Recorder:
         return replace(now, watched={name: after[name] for name in self.watching}).joined()
 
     def energy(self, end: Any) -> EnergyBudget:
-        """Energy budget of a run from its last vector."""
+        """Energy budget of a run from its last vector: that from rest, less what it took to get to the start."""
         last = self.parts(end)
         slip, rate = (float(v) for v in last.state[:2])
-        return self.loop.budget(self.watched(end), float(last.counter) * self.step, slip, rate)
+        whole = self.loop.budget(self.watched(end), float(last.counter) * self.step, slip, rate)
+        if self.initial == (0.0, 0.0):
+            return whole
+        now, before = whole.to_dict(), self.loop.budget(dict.fromkeys(WORKS, 0.0), 0.0, *self.initial).to_dict()
+        return EnergyBudget.of(**{name: now[name] - before[name] for name in now if name != "residual"})
 
     def advance(self, vector: Any, method: type[Integrator]) -> Any:
         """Vector (SX) after its own instant has been watched and one step has been taken."""

@@ -125,6 +125,8 @@ def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveInte
     varied = {f"variation_{name}": value for name, value in zip(names(), recorder.loop.factors, strict=False)}
     pushed: dict[str, Any] = {"drift": load.drift} if load.drift else {}
     pushed |= {} if load.perturbation is None else {"perturbation": str(load.perturbation)}
+    starts = zip(("initial_slip", "initial_slip_rate"), recorder.initial, strict=True)
+    pushed |= {name: value for name, value in starts if value}
     return (
         {
             "fault": recorder.loop.fault.name,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault, require_fault
+from quakedesign.fault.checks import require_nonnegative
 from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, own_way
 from quakedesign.loop.sensing import Sensor
@@ -39,8 +40,10 @@ def simulate(
     substeps: int = 1,
     actuator: Actuator | None = None,
     measurement: Sensor | None = None,
+    initial_slip: float = 0.0,
+    initial_slip_rate: float = 0.0,
 ) -> Trajectory:
-    """Simulate a fault under a controller, from rest, with the fault's own disturbance and reference.
+    """Simulate a fault under a controller, from rest unless told, with the fault's own disturbance and reference.
 
     Parameters
     ----------
@@ -87,6 +90,8 @@ def simulate(
     measurement : Measurement or Sensor, optional
         Noise of what the controller sees, or a sensor that tells it estimates from the slip alone, for a named scheme
         that samples.
+    initial_slip, initial_slip_rate : float
+        x1 [m] and x2 [m/s] at the start, zero or positive. The reference starts at zero all the same.
 
     Returns
     -------
@@ -98,8 +103,8 @@ def simulate(
     ------
     ParameterError
         For a step, duration or number of samples that is not positive and finite, an unknown scheme, method or plant,
-        a variation outside the box, a sensor made for another step, or a loop that is not smooth with a method that
-        needs one.
+        an initial state that is negative, a variation outside the box, a sensor made for another step, or a loop that
+        is not smooth with a method that needs one.
     SimulationError
         When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
         cannot go on, or when the checkpoint is that of another run.
@@ -112,7 +117,9 @@ def simulate(
     factors = variation.values if variation else ()
     criterion = OutcomeCriterion.of(fault, natural_peak(fault))
     loop = loop_class(plant)(fault, controller, load=load or Load(), factors=factors)
-    recorder = Recorder(loop, sampled_scheme(scheme, substeps, actuator, measurement, **own), setting.step)
+    require_nonnegative(initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
+    carried = sampled_scheme(scheme, substeps, actuator, measurement, **own)
+    recorder = Recorder(loop, carried, setting.step, (float(initial_slip), float(initial_slip_rate)))
     chosen = any_integrator(method)
     if issubclass(chosen, AdaptiveIntegrator):
         return run_adaptive(recorder, setting, chosen, criterion, rtol=rtol, progress=progress, checkpoint=checkpoint)

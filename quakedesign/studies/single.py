@@ -132,6 +132,7 @@ def run_single(
     noise: Sensor = EXACT,
     actuator: Actuator = DIRECT,
     tuning: Mapping[str, float] | None = None,
+    initial: Mapping[str, float] | None = None,
     **settings: Any,
 ) -> tuple[Trajectory, list[Premise]]:
     """Run a loop, and say which premises hold that a run decides.
@@ -153,6 +154,8 @@ def run_single(
         What lies between law and fault.
     tuning : mapping of str to float, optional
         Settings of the scheme itself, such as ``weight`` and ``authority`` of ``compensated``.
+    initial : mapping of str to float, optional
+        ``initial_slip`` [m] and ``initial_slip_rate`` [m/s], where the run does not start from rest.
     **settings
         ``step, scheme, method, plant, substeps`` of `quakedesign.simulation.simulate`.
 
@@ -169,7 +172,8 @@ def run_single(
     around: dict[str, Any] = {"measurement": noise} if noise.noisy else {}
     around |= {"actuator": actuator} if actuator.stages else {}
     if law is None and duration is None:
-        return _natural(fault, settings, around | dict(tuning or {}) | ({"load": load} if load else {})), []
+        more = dict(tuning or {}) | dict(initial or {}) | ({"load": load} if load else {})
+        return _natural(fault, settings, around | more), []
     name = settings["scheme"]
     if tuning:
         substeps = settings.pop("substeps")
@@ -177,6 +181,7 @@ def run_single(
         settings, around = settings | {"scheme": simulation_scheme(name, **tuning, **around)}, {}
     known = law if isinstance(law, Choice) or law is None else Choice(controller=law)
     own = known.controller if known else None
+    around |= dict(initial or {})
     run = run_loop(fault, own, duration=duration, load=load, progress=tell, **settings, **around)
     if known is None:
         return run, []

@@ -35,6 +35,18 @@ def test_every_scheme_runs_with_options_after_the_gains(run, scheme):
     assert isinstance(answer["events"], dict)
 
 
+def test_a_start_and_a_target_are_told(run):
+    begin = ("--initial-slip", "0.2 mm", "--initial-slip-rate", "1 mm/s", "--target-slip", "2 mm")
+    code, out, _ = run(*SHORT, "--controller", "elqr", *begin)
+    answer = json.loads(out)
+    assert (code, answer["run"]["initial_slip"], answer["run"]["initial_slip_rate"]) == (0, 2e-4, 1e-3)
+    assert answer["metrics"]["peak_slip_rate"] >= 1e-3
+    code, _, err = run("simulate", "lab-fault", "--initial-slip", "1 mm")
+    assert code == 2
+    assert "initial_slip" in err
+    assert run(*SHORT, "--controller", "elqr", "--target-slip", "0 m")[0] == 2
+
+
 def test_the_adaptive_method_and_a_perturbation_are_chosen(run):
     pushed = ("--drift", "1e-6", "--perturbation", "1e-3*sin(9*time)")
     code, out, _ = run(*SHORT, "--controller", "elqr", "--method", "cvodes", *pushed)

@@ -38,10 +38,10 @@ def field(fault, gains):
     return rates
 
 
-def oracle(fault, gains, run, method, rtol):
+def oracle(fault, gains, run, method, rtol, start=(0.0, 0.0)):
     scale = np.array([np.max(np.abs(run.slip)), np.max(np.abs(run.slip_rate)), 1e-6, 1e-3])
     options = {"method": method, "rtol": rtol, "atol": scale * rtol * 1e-2, "max_step": 1.0}
-    return solve_ivp(field(fault, gains), (0, run.time[-1]), np.zeros(4), t_eval=run.time, **options).y
+    return solve_ivp(field(fault, gains), (0, run.time[-1]), [*start, 0.0, 0.0], t_eval=run.time, **options).y
 
 
 @pytest.mark.parametrize("method", ADAPTIVE)
@@ -63,6 +63,25 @@ def test_an_earthquake_agrees_with_scipy(method, scipy_method, rtol):
     expected = oracle(fault, [0.0] * 4, run, scipy_method, rtol)
     assert run.slip[-1] > 0.7
     assert np.max(np.abs(run.slip - expected[0])) < 1e-7 * run.slip[-1]
+
+
+@pytest.mark.parametrize(("method", "step"), [("dormand-prince", 0.01), ("cvodes", None)])
+def test_a_start_away_from_rest_agrees_with_scipy(method, step):
+    controller, start = published("real-fault")["elqr"], (7.5e-3, 2e-3)
+    begin = {"initial_slip": start[0], "initial_slip_rate": start[1]}
+    run = simulate(REAL, controller, duration=60.0, samples=30, method=method, step=step, rtol=1e-11, **begin)
+    expected = oracle(REAL, [float(g) for g in controller.gains.values()], run, "LSODA", 1e-10, start)
+    assert (run.slip[0], run.slip_rate[0]) == start
+    assert np.max(np.abs(run.slip - expected[0])) < 1e-7 * np.max(np.abs(expected[0]))
+    assert run.energy.kinetic == pytest.approx(REAL.mass * (expected[1][-1] ** 2 - start[1] ** 2) / 2, rel=1e-6)
+    assert run.energy.relative_residual < 1e-7
+    assert {name: run.provenance[name] for name in begin} == begin
+
+
+@pytest.mark.parametrize("wrong", [{"initial_slip": -1e-9}, {"initial_slip_rate": math.inf}])
+def test_a_start_outside_the_model_is_refused(wrong):
+    with pytest.raises(ParameterError, match=f"{next(iter(wrong))} must be zero or positive, and finite"):
+        simulate(REAL, duration=1.0, **wrong)
 
 
 @pytest.mark.slow

@@ -18,7 +18,6 @@ from quakedesign.simulation.campaign.program import STEP, Program
 from quakedesign.simulation.campaign.reseeding import reseeded
 from quakedesign.simulation.campaign.space import MOST_SAMPLES, Sample, Space, noise_seed, point
 from quakedesign.simulation.earthquake import natural_peak
-from quakedesign.simulation.energy import WORKS, EnergyBudget
 from quakedesign.simulation.integrators import Integrator
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.metrics import events, metrics
@@ -30,33 +29,6 @@ from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.simulation.variation import Variation
 
 _NOT_COMPARED = ("settled_from", "steps", "seconds")
-
-
-@dataclass(frozen=True)
-class ReleasedRecorder(Recorder):
-    """A recorder whose loop does not start from rest.
-
-    Attributes
-    ----------
-    loop, scheme, step
-        As in `Recorder`.
-    initial : tuple of float
-        x1 [m] and x2 [m/s] at the start.
-    """
-
-    initial: tuple[float, float] = (0.0, 0.0)
-
-    def start(self, settled_from: float) -> list[float]:
-        """Vector at time zero; `settled_from` is a time [s]."""
-        vector = super().start(settled_from)
-        vector[2:4] = self.initial
-        return vector
-
-    def energy(self, end: Any) -> EnergyBudget:
-        """Energy budget of a run from its last vector: that from rest, less what it took to get to the start."""
-        whole = super().energy(end).to_dict()
-        before = self.loop.budget(dict.fromkeys(WORKS, 0.0), 0.0, *self.initial).to_dict()
-        return EnergyBudget.of(**{name: whole[name] - before[name] for name in whole if name != "residual"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,11 +107,11 @@ class Problem:
         """
         return self.space.sample(self.point(index), noise_seed(self.seed, index))
 
-    def recorder(self, sample: Sample) -> ReleasedRecorder:
+    def recorder(self, sample: Sample) -> Recorder:
         """Loop of a sample with all that is watched."""
         initial = sample.initial_slip, sample.initial_slip_rate
         scheme = reseeded(self.scheme, sample.noise_seed)
-        return ReleasedRecorder(self._loop(sample.variation), scheme, self.setting.step, initial)
+        return Recorder(self._loop(sample.variation), scheme, self.setting.step, initial)
 
     def start(self, sample: Sample) -> "np.ndarray":
         """Vector of a sample at time zero."""
