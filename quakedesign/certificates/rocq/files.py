@@ -7,7 +7,6 @@ from typing import Any
 
 from quakedesign.certificates.claim import Evidence
 from quakedesign.certificates.files import evidence_of, read_json
-from quakedesign.certificates.guarantee.files import is_guarantee
 from quakedesign.certificates.obligations import claimed, different
 from quakedesign.certificates.rocq import gallina
 from quakedesign.certificates.rocq.integers import in_integers
@@ -16,7 +15,6 @@ from quakedesign.certificates.rocq.multipliers import reason
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.output import write_whole
-from quakedesign.sos.exact.attraction_files import is_about_attraction
 from quakedesign.sos.exact.files import is_about_polynomial
 from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.polynomial import evaluate
@@ -150,7 +148,7 @@ def _nonnegative(asked: Statement, proof: SumOfSquares) -> Iterator[str]:
 
 
 def _loop(raw: Any) -> Iterator[str]:
-    if is_guarantee(raw) or is_about_attraction(raw) or (isinstance(raw, dict) and "refutation" in raw):
+    if isinstance(raw, dict) and ("kind" in raw or "refutation" in raw):
         raise UnsupportedError(
             "a certificate for coqc must be sos, negative or a proof for a closed loop. "
             f"Received a {raw.get('kind', 'refutation')}. Use check.py."
