@@ -35,7 +35,7 @@ def attraction(
     everywhere
         Prove that the solutions from everywhere do, or refute V (without one, all V) by a point.
     relative
-        Width of the last step of the bisection.
+        Width of the last step of the bisection, from 1e-6 to below 1.
     out
         File for the proof (proofs/FORMAT.md); for the refutation where nothing is proved, unless --above is given.
     above

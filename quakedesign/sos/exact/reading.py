@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from math import floor
 from numbers import Real
 from typing import Any
 
@@ -28,6 +29,8 @@ def read(
         on = (on,)
     inputs = [polynomial, *on, *([] if multiplier in (None, _AUTO) else [multiplier])]
     names = tuple(map(str, variables)) if variables is not None else _names(inputs)
+    if len(set(names)) < len(names):
+        raise PolynomialError(f"variables must be different. Received {', '.join(names)}. Rename one.")
     exact = _polynomial(polynomial, names)
     constraints = [_constraint(c, names) for c in on]
     factor = multiplier if multiplier in (None, _AUTO) else _polynomial(multiplier, names)
@@ -49,8 +52,7 @@ def read_element(given: Any, names: tuple[str, ...]) -> Element:
 
 def _whole(exponent: Any) -> Any:
     """Integer of an exponent that another programme wrote as a float."""
-    number = float(exponent) if isinstance(exponent, Real) else 0.5
-    return int(number) if number.is_integer() else exponent
+    return floor(exponent) if isinstance(exponent, Real) and exponent % 1 == 0 else exponent
 
 
 def _names(inputs: Sequence[Any]) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ _SHARES = tuple(
 )
 _UNBOUNDED = tuple(Fraction(10) ** power for power in range(6, -7, -1))  # levels where nothing refutes
 _MORE = (0, 2)  # degrees beyond the least that fits
+_FINEST = 1e-6  # step of a bisection whose levels are of few digits
 
 
 def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int] = (2, 4)) -> Attraction:
@@ -69,7 +70,7 @@ def region_of_attraction(field: Mapping[Any, Any], V: Any = None, *, relative: f
     field, V
         As for `stability`, but V solves AᵀP + PA = −I for the linearised field x' = Ax unless given.
     relative : float
-        Width of the last step of the bisection, between proved and not proved.
+        Width of the last step of the bisection, between proved and not proved; from 1e-6 to below 1.
 
     Returns
     -------
@@ -79,8 +80,12 @@ def region_of_attraction(field: Mapping[Any, Any], V: Any = None, *, relative: f
     Raises
     ------
     PolynomialError
-        As for `stability`.
+        As for `stability`, or for another width.
     """
+    if not _FINEST <= relative < 1:
+        raise PolynomialError(
+            f"relative must be from {_FINEST:g} to below 1. Received {relative!r}. Leave it out for 1e-4."
+        )
     claim = _claim(field, V)
     if V is None:
         own = _of_linearised(claim)
@@ -170,7 +175,7 @@ def _bisected(claim: Attraction, ceiling: Fraction, relative: float) -> Attracti
 
 
 def _short(level: Fraction) -> Fraction:
-    """Fraction of few digits within a part in ten million below a level."""
+    """Fraction of few digits within a part in ten million below a level, less than a bisection steps."""
     return simplest_between(level * (1 - Fraction(1, 10**7)), level)
 
 

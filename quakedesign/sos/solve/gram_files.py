@@ -92,7 +92,7 @@ def _terms(raw: Any, size: int) -> dict[tuple[int, ...], Fraction]:
 
 def _is_whole(exponent: Any) -> bool:
     number = isinstance(exponent, Real) and not isinstance(exponent, bool)
-    return number and exponent >= 0 and float(exponent).is_integer()
+    return number and exponent >= 0 and exponent % 1 == 0
 
 
 def _matlab(content: bytes) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from quakedesign.bounds import UpperBound
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.definiteness import full_matrix
@@ -62,6 +63,8 @@ def verify(
     names, exact, inequalities, equalities, _ = read(polynomial, on, None, variables)
     if equalities:
         raise PolynomialError("constraints of a given proof must be inequalities. Received an equality. Use prove.")
+    if len({frozenset(g.items()) for g in inequalities}) < len(inequalities):
+        raise PolynomialError("constraints of a given proof must differ. Received one twice. Add up their matrices.")
     grams, bases = (_listed(gram), _listed(basis)) if inequalities else ([gram], [basis])
     if not len(grams) == len(bases) == 1 + len(inequalities):
         raise PolynomialError(
@@ -105,15 +108,15 @@ def _square(product: tuple[int, ...], gram: Any, basis: Any, names: tuple[str, .
 def _matrix(gram: Any, size: int) -> Any:
     """Symmetric part of a matrix."""
     try:
-        matrix = np.asarray(gram, dtype=float)
-    except (TypeError, ValueError):
+        matrix = np.asarray(gram, dtype=object).astype(float)  # one by one, so that no imaginary part is dropped
+    except (TypeError, ValueError, OverflowError):
         raise PolynomialError("a Gram matrix must be an array of real numbers. Received something else.") from None
     if matrix.shape != (size, size) or not np.all(np.isfinite(matrix)):
         raise PolynomialError(
             f"a Gram matrix must be {size} x {size}, as its basis has {size} elements, and finite. "
             f"Received shape {matrix.shape}, {np.count_nonzero(~np.isfinite(matrix))} entries not finite."
         )
-    return (matrix + matrix.T) / 2
+    return matrix / 2 + matrix.T / 2
 
 
 def _verified(asked: Statement, squares: Sequence[Square]) -> Answer:
@@ -121,9 +124,8 @@ def _verified(asked: Statement, squares: Sequence[Square]) -> Answer:
     moved = scaled(asked)
     blocks, grams = zip(*(_block(moved.statement, moved.square(s)) for s in squares), strict=True)
     least = min(float(np.linalg.eigvalsh(g)[0]) for g in grams)
-    matrix = (
-        f"the given matrix (largest error in a coefficient {float(error):.2g}, least eigenvalue {least:.2g} scaled)"
-    )
+    sizes = f"largest error in a coefficient {UpperBound(error):.2g}, least eigenvalue {least:.2g} scaled"
+    matrix = f"the given matrix ({sizes})"
     near = error <= _NEAR * max(map(abs, asked.polynomial.values()), default=Fraction(1))
     for how, proof in _proposed(moved, blocks, grams) if near else ():
         found = Answer(statement=asked, proof=proof, remark=f"proved by {matrix}, {how}", versions=versions())

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import solve_ivp
 
 from quakedesign import sos
@@ -18,6 +19,7 @@ from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.attraction_files import load, text
 from quakedesign.sos.exact.field_files import read_field
 from quakedesign.sos.exact.proofs import Point
+from quakedesign.sos.solve import attraction
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "howto" / "region_of_attraction.md").read_text(encoding="utf-8")
@@ -150,6 +152,27 @@ def test_what_is_not_proved_says_why():
 def test_another_field_is_refused(field, V, said):
     with pytest.raises(PolynomialError, match=said):
         sos.region_of_attraction(field, V)
+
+
+@pytest.mark.parametrize("relative", [float("nan"), float("inf"), 1.0, 0.0, -1.0, 1e-7])
+def test_a_step_of_no_bisection_is_refused(relative):
+    with pytest.raises(PolynomialError, match=r"relative must be from 1e-06 to below 1\. Received"):
+        sos.region_of_attraction({"x": "-x + x^3"}, "x^2", relative=relative)
+
+
+def test_a_level_is_bisected_where_less_is_proved_than_is_not_refuted(monkeypatch):
+    """Proofs only below 77/100; the finest step that is taken."""
+    monkeypatch.setattr(
+        attraction, "_proved", lambda claim, **_: claim if claim.level and claim.level < F(77, 100) else None
+    )
+    found = sos.region_of_attraction({"x": "-x + x^3"}, "x^2", relative=1e-6)
+    assert F(77, 100) * (1 - F(2, 10**6)) < found.level < F(77, 100)
+
+
+def test_states_of_one_name_are_refused():
+    plain, real = sp.Symbol("x"), sp.Symbol("x", real=True)
+    with pytest.raises(PolynomialError, match="variables must be different"):
+        sos.stability({plain: -plain, real: -real})
 
 
 # ---------------------------------------------------------------- the command, and the page

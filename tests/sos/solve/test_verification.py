@@ -111,6 +111,8 @@ def test_under_constraints_there_is_a_matrix_for_every_inequality():
         ((TEXT, np.eye(2), BASIS), "must be 3 x 3"),
         ((TEXT, np.full((3, 3), np.nan), BASIS), "9 entries not finite"),
         ((TEXT, [["a"]], ["x"]), "array of real numbers"),
+        ((TEXT, [[1.0 + 2.0j]], ["x"]), "array of real numbers"),
+        ((TEXT, [[10**400]], ["x"]), "array of real numbers"),
         ((TEXT, np.eye(2), ["x^2", "x^2"]), "different elements"),
         ((TEXT, np.zeros((0, 0)), []), "different elements"),
         ((TEXT, np.eye(3), ["x", "y", "x + y"]), "linearly independent"),
@@ -129,6 +131,15 @@ def test_constraints_that_do_not_fit_are_refused():
         sos.verify("x", [[1.0]], ["x"], on=["x == 0"])
     with pytest.raises(PolynomialError, match="Received 1 and 1"):
         sos.verify("x", [[[1.0]]], [["x"]], on=["x >= 0"])
+    with pytest.raises(PolynomialError, match="Received one twice"):
+        sos.verify("2*x", [[[1.0]]] * 3, [["1"]] * 3, on=["x >= 0", "-x <= 0"])
+
+
+def test_matrices_at_the_ends_of_floats_are_answered():
+    for gram in (np.full((2, 2), 1e308), np.diag([1e308, 1.0]), np.diag([5e-324, 1.0])):
+        answer = sos.verify("x^2 + y^2", gram, ["x", "y"])
+        assert answer.verdict is sos.Positivity.SOS
+        assert answer.remark.startswith("no proof comes from the given matrix (largest error in a coefficient ")
 
 
 # ---------------------------------------------------------------- files
@@ -179,6 +190,8 @@ def test_a_file_of_json(tmp_path, changes):
         (json.dumps(in_json(polynomial=[[1, [1]]])), "a coefficient and 2 exponents"),
         (json.dumps(in_json(polynomial=[[1, 0.5, 1]])), "a coefficient and 2 exponents"),
         (json.dumps(in_json(polynomial=[[1, [float("inf"), 1]]])), "a coefficient and 2 exponents"),
+        (json.dumps(in_json(polynomial=[[1, [10**400, 1]]])), "Lower the degree"),
+        (json.dumps(in_json(basis=[[10**400, 1], [1, 1], [0, 2]])), "Lower the degree"),
         (json.dumps(in_json(polynomial=3)), "a coefficient and 2 exponents"),
         (json.dumps(in_json(polynomial=[[float("nan"), [1, 1]]])), "coefficient must be a finite number"),
         (json.dumps(in_json(gram=[[1, None]])), "3 x 3"),
