@@ -6,14 +6,16 @@ from random import Random
 
 import numpy as np
 import pytest
-from flint import ctx
+from flint import arb, ctx
 from mpmath import mp
 from scipy.linalg import expm
 from standalone_guarantee import checker
 
 from quakedesign.certificates.guarantee import ball_matrices, sector
+from quakedesign.certificates.guarantee import norms as package
 from quakedesign.certificates.guarantee.flow_norms import flow_norms
 from quakedesign.certificates.guarantee.norms import norms
+from quakedesign.errors import ParameterError
 from quakedesign.loop import ImplicitRoot, PeriodicLoop, Power, Segment
 
 
@@ -105,6 +107,17 @@ def test_the_tail_of_the_past_is_the_rest_of_a_geometric_series(share, time, sud
     whole = (entry if sudden else time) * q / (1 - q)
     exact = [whole + (entry if sudden else F(time, 8) * (i + 1)) for i in range(8)]
     assert all(e <= v <= e * (1 + F(1, 10**4)) for gains in found for v, e in zip(gains, exact, strict=True))
+
+
+@pytest.mark.parametrize("sudden", [False, True])
+def test_a_slow_mode_that_several_states_see_counts_as_it_is(sudden):
+    """Beside a state that is reset: q = 1 − 2⁻¹⁵ and r = 1/3, seen by (1, 2) and (1, 1), make qᵏ + rᵏ of the entry."""
+    q, r = 1 - F(1, 2**15), F(1, 3)
+    jump = [[0, 0, 0], [0, 2 * r - q, 2 * r - 2 * q], [0, q - r, 2 * q - r]]
+    found = gains_of_both([[0] * 3] * 3, [jump], [8], [1, 1, 0], [0, 2, 3], sudden=sudden)
+    earlier = q / (1 - q) + r / (1 - r)
+    exact = [2 + earlier if sudden else 8 * earlier + 2 * (i + 1) for i in range(8)]
+    assert all(e <= v <= e * (1 + F(1, 10**3)) for gains in found for v, e in zip(gains, exact, strict=True))
 
 
 @pytest.mark.parametrize("sudden", [False, True])
@@ -535,18 +548,49 @@ def test_the_slowest_mode_is_seen_alone():
 
 def test_sums_that_bound_themselves_are_solved_for():
     """x = 10 + x/2 and y = 6 + x/4 + y/4096: 20 and 11·4096/4095."""
-    left = checker.Fixed([[UNIT // 2, 0], [UNIT // 4, UNIT // 4096]])
-    (slow,), (quick,) = checker.whole_sums(left, [10 << 50, 6 << 50], 0).rows
-    assert 20 <= F(slow, 1 << 50) < 20 + F(1, 1 << 34)
-    assert F(11 * 4096, 4095) <= F(quick, 1 << 50) < F(11 * 4096, 4095) + F(1, 1 << 30)
+    left = [[F(1, 2), F(0)], [F(1, 4), F(1, 4096)]]
+    theirs = checker.whole_sums(checker.Fixed([[int(v * UNIT) for v in row] for row in left]), [10 << 50, 6 << 50], 0)
+    ours = package._whole(ball_matrices.matrix(left), [arb(10), arb(6)]).entries()
+    found = [[F(v, 1 << 50) for (v,) in theirs.rows], [ball_matrices.upper(v) for v in ours]]
+    for slow, quick in found:
+        assert 20 <= slow < 20 + F(1, 1 << 27)
+        assert F(11 * 4096, 4095) <= quick < F(11 * 4096, 4095) + F(1, 1 << 27)
 
 
 @pytest.mark.parametrize(
-    ("left", "words"), [([[UNIT, 0], [0, 0]], "slowest mode"), ([[0, 0], [0, UNIT]], "past must fade")]
+    ("left", "words"),
+    [
+        ([[1, 0], [0, 0]], "slowest mode"),
+        ([[2, 0], [0, 0]], "slowest mode"),
+        ([[0, 0], [0, 1]], "past must fade"),
+        ([[0, 0], [0, 2]], "past must fade"),
+        ([[0, 2], [2, 0]], "past must fade"),
+    ],
 )
 def test_sums_that_grow_beyond_themselves_are_refused(left, words):
     with pytest.raises(checker.Refused, match=words):
-        checker.whole_sums(checker.Fixed(left), [1, 1], 0)
+        checker.whole_sums(checker.Fixed([[v * UNIT for v in row] for row in left]), [1, 1], 0)
+    with pytest.raises(ParameterError, match="not seen to be in 4096 periods"):
+        package._whole(ball_matrices.matrix(left), [arb(1), arb(1)])
+
+
+@pytest.mark.parametrize("mode", [1, 2])
+def test_a_loop_that_grows_or_stays_is_refused_before_anything_is_summed(mode, monkeypatch):
+    monkeypatch.setattr(package._Past, "of", None)
+    with pytest.raises(ParameterError, match="nominal loop must be stable"):
+        gains_of_both([[0]], [[[mode]]], [1], [1], [1])
+
+
+def test_a_loop_of_two_slow_modes_is_refused(monkeypatch):
+    """9/10 and 8/10 after 2³ periods: one alone can be seen as it is."""
+    monkeypatch.setattr(package, "_MOST_DOUBLINGS", 3)
+    monkeypatch.setattr(checker, "DOUBLINGS", 3)
+    jump = [[F(9, 10), F(0)], [F(0), F(8, 10)]]
+    with pytest.raises(ParameterError, match="not seen to be in 8 periods"):
+        gains_of_both([[0] * 2] * 2, [jump], [1], [1, 1], [1, 1])
+    loop = checker.Loop([[F(0)] * 2] * 2, [(jump, F(1))], [[F(1)] * 2] * 3, [], None, F(1))
+    with pytest.raises(checker.Refused, match="seen to be within 8 periods"):
+        checker.gains(loop, [F(1), F(1)], False)
 
 
 @pytest.mark.parametrize("bits", [24, 27, 32])

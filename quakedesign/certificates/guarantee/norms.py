@@ -134,15 +134,15 @@ def _slowest(flows: list[Flow]) -> list[Any]:
         When that is more than there was.
     """
     period = reduce(lambda now, flow: flow.whole * now, flows[1:], flows[0].whole)
-    growth = 0.0
+    growth = before = 0.0
     for _ in range(_MOST_DOUBLINGS):
         period = period * period
         largest = max(v.abs_upper() for v in period.entries())
         if not largest > 0:
             return [arb(0)] * period.nrows()
-        growth = 2 * growth + float(largest.log())
+        before, growth = growth, 2 * growth + float(largest.log())
         period = arb_mat([[(v / largest).mid() for v in row] for row in period.tolist()])
-    if not growth < 0:
+    if not growth < before:
         raise _unstable()
     return list(max(period.tolist(), key=lambda row: max(map(abs, row))))
 

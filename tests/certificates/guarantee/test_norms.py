@@ -71,6 +71,11 @@ def test_a_loop_that_is_barely_stable_has_its_large_gain():
     assert just_above(gain([["-1/100"]], [[[1]]], [1], [1], [1]), 100)
 
 
+def test_a_loop_that_first_grows_and_then_falls_slowly_has_its_gain():
+    """x → qx, y → x + y/2 at every second, q = 1 − 2⁻¹⁵: all of 1/((1 − q)(1 − 1/2)) is positive."""
+    assert just_above(gain([[0, 0], [0, 0]], [[["32767/32768", 0], [1, "1/2"]]], [1], [1, 0], [0, 1]), 2**16)
+
+
 def sampled_gain(flow, jumps, durations, entry, row):
     given = loop(flow, jumps, durations, [0] * len(entry), row)
     return norms(replace(given, sampled={"v": tuple(map(F, entry))}))["y", "v"]
