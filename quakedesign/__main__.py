@@ -1,12 +1,17 @@
 """``python -m quakedesign``, and the command ``quakedesign``."""
 
+import gc
 import sys
 
 from quakedesign.interruption import ending, leave
 
+OBJECTS = 100_000
+"""Made between two searches for cycles: nearly all that a command makes is kept, and is not looked through again."""
+
 
 def main() -> None:
     """Run the command line; an interruption is one line from the first import on."""
+    gc.set_threshold(OBJECTS)
     try:
         with ending(process=True):
             _run()
