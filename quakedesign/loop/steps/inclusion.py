@@ -12,11 +12,13 @@ monotone, F is strongly monotone, and there is exactly one solution.
   is there; in that case the selection from [−1, 1] follows from a linear equation. Thereby all signs are known.
 - With the signs fixed, w = g(w) with g continuous and not rising. The solution lies between 0 and g(0): for g(0) ≥ 0
   is 0 − g(0) ≤ 0 and g(0) − g(g(0)) ≥ 0, as g(g(0)) ≤ g(0); likewise with the signs reversed. Cutting this bracket
-  to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; three points at once keep a processor busier than one does.
+  to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; three points at once keep a processor busier than one does. Where the
+  solution lies at a jump, that is left out: a loop that is held there by its signs spends most of its time on it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from typing import Any
 
 import casadi as ca
@@ -124,7 +126,8 @@ class Inclusion:
             share = -(high + low) / ca.if_else(high > low, high - low, 1)
             there.append((at, point | self._signs(jumps, number, share)))
             sides.append(ca.if_else(high < 0, 1, -1))
-        smooth = self._smooth(known | dict(zip(self.signs, sides, strict=True)))
+        elsewhere = ca.logic_not(reduce(ca.logic_or, (at for at, _ in there), ca.SX(0)))
+        smooth = self._smooth(known | dict(zip(self.signs, sides, strict=True)), elsewhere)
         return known | reduce(lambda other, case: _choose(case[0], case[1], other), reversed(there), smooth)
 
     def _jump(self, argument: sp.Expr, known: Values) -> Values:
@@ -160,16 +163,19 @@ class Inclusion:
         """F on one side of a jump."""
         return to_casadi([excess], known | jumps[number] | self._signs(jumps, number, side))[0]
 
-    def _smooth(self, known: Values) -> Values:
-        """Solution with all signs fixed."""
+    def _smooth(self, known: Values, needed: Any) -> Values:
+        """Solution with all signs fixed; where it is not needed, any number."""
         target = self.free + self.selected(self.pull)
-        width = self._value(target, known, 0.0)
         straight = sp.Poly(_straight(target, self.slip_error, self.step), end_rate) if _is_straight(target) else None
         if straight is None:
-            end = self._quarter(target - end_rate, known, width)
+            end = _where(needed, known, partial(self._free_end, target))
         else:
             end = to_casadi([straight.coeff_monomial(1) / (1 - straight.coeff_monomial(end_rate))], known)[0]
         return {sign: known[sign] for sign in self.signs} | self._ends(known, end)
+
+    def _free_end(self, target: sp.Expr, known: Values) -> Any:
+        """Zero of target − w."""
+        return self._quarter(target - end_rate, known, self._value(target, known, 0.0))
 
     def _quarter(self, falling: sp.Expr, known: Values, width: Any) -> Any:
         """Zero of a falling function of the end of the step, between 0 and `width`."""
@@ -190,6 +196,16 @@ class Inclusion:
 
 def _choose(at: Any, case: Values, other: Values) -> Values:
     return {symbol: ca.if_else(at, case[symbol], other[symbol]) for symbol in other}
+
+
+def _where(needed: Any, known: Values, solution: Callable[[Values], Any]) -> Any:
+    """Solution (SX) where it is needed, 0 elsewhere: a call that runs one of two branches."""
+    given = ca.SX.sym("given", len(known))
+    found = solution(dict(zip(known, ca.vertsplit(given), strict=True)))
+    told = [ca.MX.sym("needed"), ca.MX.sym("given", len(known))]
+    solved, left_out = (ca.Function(name, [given], [v]) for name, v in (("solved", found), ("left_out", ca.SX(0))))
+    either = ca.Function.if_else("either", solved, left_out)(*told)
+    return ca.Function("where_needed", told, [either], {"never_inline": True})(needed, ca.vertcat(*known.values()))
 
 
 def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:

@@ -131,6 +131,18 @@ def test_the_states_reach_every_branch():
     assert found == {"free", "slip", "rate"}
 
 
+@pytest.mark.parametrize("name", GAINS)
+def test_the_smooth_solution_is_computed_only_where_it_is_needed(name):
+    step = step_function(name, F(1))
+    alone, inside = step.n_instructions(), step.find_function("solved").n_instructions()
+    assert inside > 27 * 3 * 5  # rounds, points, and a few operations for each
+    assert alone < inside / 2
+    called = step.find_function("where_needed")
+    known = np.linspace(0.1, 0.9, called.size1_in(1))
+    assert float(called(0, known)) == 0
+    assert float(called(1, known)) == float(step.find_function("solved")(known)) != 0
+
+
 def test_direction_knows_odd_powers_and_gives_up_on_the_rest():
     k = sp.Symbol("k", positive=True)
     assert direction(k * end_rate + SignedPower(end_slip, sp.Rational(1, 3))) == 1
