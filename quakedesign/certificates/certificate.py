@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from quakedesign.certificates.checking import check
 from quakedesign.certificates.claim import Evidence, Verdict
 from quakedesign.certificates.files import evidence_of, read_json, save_certificate
-from quakedesign.controllers import Subject
 from quakedesign.sos.exact.strict import parse
+
+if TYPE_CHECKING:
+    from quakedesign.controllers import Law, LoopField
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -31,7 +34,7 @@ class Certificate(Evidence):
         """Certificate with the parts of evidence."""
         return cls(**{part.name: getattr(evidence, part.name) for part in fields(Evidence)})
 
-    def check(self, law: Subject | None = None) -> Verdict:
+    def check(self, law: "str | type[Law] | LoopField | None" = None) -> Verdict:
         """Re-decide the statement from nothing but its claim, in exact arithmetic; field against law as well.
 
         Parameters

@@ -3,23 +3,26 @@
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Verdict, loop_of, require
 from quakedesign.certificates.obligations import Obligation, claimed, different
 from quakedesign.certificates.witnesses import proves
-from quakedesign.controllers import LoopField, Subject, laws, model_of
+from quakedesign.controllers.known_fields import field_of, is_law
 from quakedesign.sos.exact.work import limited
 from quakedesign.symbolic.terms import Term, value
 
+if TYPE_CHECKING:
+    from quakedesign.controllers import Subject
 
-def check(certificate: Evidence, law: Subject | None = None) -> Verdict:
+
+def check(certificate: Evidence, law: "Subject | None" = None) -> Verdict:
     """Decide a certificate in exact arithmetic; see `Certificate.check`."""
     with limited():
         return _decided(certificate, law)
 
 
-def _decided(certificate: Evidence, law: Subject | None) -> Verdict:
+def _decided(certificate: Evidence, law: "Subject | None") -> Verdict:
     _check_roots(certificate.loop)
     _same_field(certificate.loop, law)
     if certificate.refutation is not None:
@@ -29,19 +32,20 @@ def _decided(certificate: Evidence, law: Subject | None) -> Verdict:
     return Verdict.PROVED
 
 
-def _same_field(loop: Loop, law: Subject | None) -> None:
-    """Re-derive the field from the law's own expressions and compare; a bare field has no name to compare."""
+def _same_field(loop: Loop, law: "Subject | None") -> None:
+    """Compare the field with the law's own, derived from its expressions; a bare field has no name to compare."""
     require(
-        law is not None or loop.law in laws(),
+        law is not None or is_law(loop.law),
         f"the law {loop.law!r} is not one of the package, so its field cannot be derived again. "
         "Give its class or its LoopField to check().",
     )
-    name, model = model_of(loop.law if law is None else law)
-    require(isinstance(law, LoopField) or name == loop.law, f"the certificate is about {loop.law!r}, not {name!r}.")
+    name, model = field_of(loop.law if law is None else law)
+    bare = not isinstance(law, str | type | None)
+    require(bare or name == loop.law, f"the certificate is about {loop.law!r}, not {name!r}.")
     names = (model.gains, model.constants, model.uncertain)
     given = (loop.gains, loop.constants, loop.uncertain)
     require(
-        all({s.name for s in symbols} == set(values) for symbols, values in zip(names, given, strict=True)),
+        all(set(own) == set(values) for own, values in zip(names, given, strict=True)),
         f"the gains, constants or uncertain parameters are not those of {loop.law}.",
     )
     derived = loop_of(loop.law, model, gains=loop.gains, uncertain=loop.uncertain, constants=loop.constants)

@@ -1,21 +1,25 @@
 """What a certificate is about, and what it consists of."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 from math import isqrt
+from typing import TYPE_CHECKING
 
-import sympy as sp
-
-from quakedesign.controllers import LoopField, laws
+from quakedesign import symbolic
+from quakedesign.controllers.field_terms import FieldTerms
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.rationals import fraction_of, six_digits
+from quakedesign.rationals import six_digits
 from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.proofs import Square
-from quakedesign.symbolic.balls import enclose
-from quakedesign.symbolic.terms import Term, from_terms, to_terms, without_nesting
+from quakedesign.symbolic.terms import Term
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from quakedesign.controllers.loop_field import LoopField
 
 Range = tuple[Fraction, Fraction]
 
@@ -73,10 +77,10 @@ class Loop:
         return f"Loop({'; '.join(part for part in (self.law, gains, ranges) if part)})"
 
     @property
-    def symbols(self) -> dict[str, sp.Symbol]:
+    def symbols(self) -> "dict[str, sp.Symbol]":
         """SymPy symbol of every name."""
         names = (*self.states, *self.gains, *self.constants, *self.uncertain, *self.roots, *self.lifts)
-        return {n: sp.Symbol(n, real=True) for n in names}
+        return symbolic.real_symbols(names)
 
     @property
     def ranges(self) -> dict[str, Range]:
@@ -151,59 +155,32 @@ class Evidence:
 
 def loop_of(
     law: str,
-    model: LoopField,
+    model: "LoopField | FieldTerms",
     *,
     gains: Mapping[str, Fraction],
     uncertain: Mapping[str, Range],
     constants: Mapping[str, Fraction] | None = None,
 ) -> Loop:
-    """Bind a symbolic loop to exact numbers.
+    """Bind a closed loop, in symbols or in terms, to exact numbers.
 
     Raises
     ------
     CertificateError
         When the law has parts that this format cannot express, such as nested powers.
     """
-    states = tuple(model.states)
-    names = [s.name for s in (*model.gains, *model.constants, *model.uncertain, *model.roots, *states)]
-    lifts, rates = without_nesting([model.field[s] for s in states], states, names)
-    powers = (*states, *lifts)
+    terms = model if isinstance(model, FieldTerms) else model.terms
     values = {**gains, **(constants or {})}
-    speeds = {s.name: to_terms(rate, powers) for s, rate in zip(states, rates, strict=True)}
-    _require_bounded(speeds)
-    arguments = {lift.name: to_terms(argument, powers) for lift, argument in lifts.items()}
     return Loop(
         law=law,
         gains=dict(gains),
         constants=dict(constants or {}),
-        states={s.name: w for s, w in model.states.items()},
-        domain=model.domain,
+        states=terms.states,
+        domain=terms.domain,
         uncertain=dict(uncertain),
-        field=speeds,
-        roots={root.name: (of.name, root_enclosure(values[of.name])) for root, of in model.roots.items()},
-        lifts=_occurring(arguments, speeds),
+        field=terms.field,
+        roots={root: (of, root_enclosure(values[of])) for root, of in terms.roots.items()},
+        lifts=terms.lifts,
     )
-
-
-def _require_bounded(speeds: Mapping[str, Iterable[Term]]) -> None:
-    """Refuse a negative power that no other factor of its product makes up for."""
-    for state, terms in speeds.items():
-        for of, exponent, kind in (factor for term in terms for factor in term.factors if factor[1] < 0):
-            power = f"|{of}|^({exponent})" if kind == "a" else f"⌈{of}⌋^({exponent})"
-            raise CertificateError(
-                f"every rate must be bounded near the origin. Received one of {state} with {power}, which is unbounded "
-                f"where {of} = 0. Multiply it by a power of {of} that makes up for it."
-            )
-
-
-def _occurring(
-    lifts: Mapping[str, tuple[Term, ...]], speeds: Mapping[str, Iterable[Term]]
-) -> dict[str, tuple[Term, ...]]:
-    """Lifts that the field, or one of these, needs: a sign squared is 1, and leaves its argument unused."""
-    used = {name for terms in speeds.values() for term in terms for name, _, _ in term.factors}
-    for lift, terms in reversed(list(lifts.items())):
-        used |= {name for term in terms for name, _, _ in term.factors} if lift in used else set()
-    return {lift: terms for lift, terms in lifts.items() if lift in used}
 
 
 def root_enclosure(number: Fraction) -> Range:
@@ -222,50 +199,6 @@ def root_enclosure(number: Fraction) -> Range:
     scale = 2 ** max(0, 20 + (number.denominator.bit_length() - number.numerator.bit_length()) // 2)
     low = Fraction(isqrt(number.numerator * scale**2 // number.denominator), scale)
     return low, low + Fraction(1, scale)
-
-
-def sympy_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:
-    """Vector field of a loop as SymPy expressions."""
-    symbols = loop.symbols
-    return {symbols[state]: from_terms(terms, symbols) for state, terms in loop.field.items()}
-
-
-def full_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:
-    """Vector field of a loop with every nested power written out."""
-    symbols = loop.symbols
-    field = sympy_field(loop)
-    for lift, terms in reversed(list(loop.lifts.items())):
-        argument = from_terms(terms, symbols)
-        field = {state: rate.subs(symbols[lift], argument) for state, rate in field.items()}
-    return field
-
-
-def error_units(loop: Loop, model: LoopField | None = None) -> dict[str, Range]:
-    """Interval of the error that one unit of each state stands for; one where the law says nothing else.
-
-    The units are those of a model, or of the law of the package that the loop names.
-    """
-    if model is None and loop.law in laws():
-        model = laws()[loop.law].loop_field()
-    return unit_ranges(loop, {str(state): unit for state, unit in model.units.items()} if model is not None else {})
-
-
-def unit_ranges(loop: Loop, units: Mapping[str, sp.Expr]) -> dict[str, Range]:
-    """Interval of the value of every unit, by the name of its state; one where there is none.
-
-    Raises
-    ------
-    CertificateError
-        For a unit that is not positive.
-    """
-    values = {**{n: (v, v) for n, v in loop.parameters.items()}, **{n: ends for n, (_, ends) in loop.roots.items()}}
-    ranges: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))
-    for state, unit in units.items():
-        ball = enclose(unit, {s: values[str(s)] for s in unit.free_symbols})
-        low, high = (fraction_of(end.fmpq()) for end in (ball.lower(), ball.upper()))
-        require(low > 0, f"the unit of {state} must be positive. Received {unit}.")
-        ranges[state] = (low, high)
-    return ranges
 
 
 def require(condition: bool, reason: str) -> None:

@@ -1,36 +1,28 @@
 """Re-checking files for people: a verdict and what exactly was verified."""
 
 from collections.abc import Sequence
-from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from quakedesign.bounds import UpperBound
+from quakedesign import certificates
+from quakedesign import fault as faults
+from quakedesign.certificates import guarantee, slow_sliding
 from quakedesign.certificates.certificate import Certificate
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.files import evidence_of, read_json
-from quakedesign.certificates.guarantee import task_of
-from quakedesign.certificates.guarantee.files import is_guarantee, read_guarantee
-from quakedesign.certificates.linear_premises import sectors
-from quakedesign.certificates.meaning import require_degree_of_slip
-from quakedesign.certificates.premises import (
-    Errors,
-    certified_lipschitz,
-    coefficient_range,
-    largest_matched_rate,
-    least_authority,
-)
-from quakedesign.certificates.slow_sliding import is_sliding, read_sliding, sliding_task
+from quakedesign.certificates.kinds import is_guarantee, is_sliding
 from quakedesign.errors import CertificateError, WorkError
-from quakedesign.fault import Fault, load_fault
-from quakedesign.sos import Answer, Positivity
+from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.attraction_files import is_about_attraction
 from quakedesign.sos.exact.attraction_files import read as read_attraction
 from quakedesign.sos.exact.attraction_words import claim_words
 from quakedesign.sos.exact.files import is_about_polynomial
 from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.words import sentences
-from quakedesign.symbolic.terms import from_terms
+from quakedesign.symbolic.terms import written
+
+if TYPE_CHECKING:
+    from quakedesign.fault import Fault
 
 
 def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tuple[str, list[str]]]:
@@ -43,11 +35,11 @@ def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tu
     QuakedesignError
         For a fault that cannot be read.
     """
-    plant = load_fault(fault) if fault else None
+    plant = faults.load_fault(fault) if fault else None
     return {str(path): _checked(path, plant) for path in paths}
 
 
-def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
+def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
     try:
         known = path.is_file()
     except (OSError, ValueError):
@@ -68,7 +60,7 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
             return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
         certificate = Certificate.of(evidence_of(raw))
         verdict = certificate.check()
-        more = _covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []
+        more = certificates.covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []
     except WorkError as error:
         return f"undecided: {error}", []
     except CertificateError as error:
@@ -76,28 +68,28 @@ def _checked(path: Path, fault: Fault | None) -> tuple[str, list[str]]:
     return str(verdict), [*statement(certificate), *more]
 
 
-def _guarantee(raw: Any, fault: Fault | None) -> tuple[str, list[str]]:
+def _guarantee(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     """Verdict on a file about a loop that runs, and whether its data are those of a fault."""
-    claim = read_guarantee(raw)
+    claim = guarantee.read_guarantee(raw)
     if claim.check() is not Verdict.PROVED:
         raise CertificateError("the claims do not follow from the loop and the fault's data")
     lines = [f"fault {claim.task.name}, by the data in the file", claim.sentence()]
     if fault is not None:
-        if claim.task != task_of(fault, rate_limited=claim.task.change is not None):
+        if claim.task != guarantee.task_of(fault, rate_limited=claim.task.change is not None):
             raise CertificateError(f"the data are not those of {fault.name}")
         lines.append(f"the data are those of {fault.name}, box {fault.box.name}")
     return str(Verdict.PROVED), lines
 
 
-def _sliding(raw: Any, fault: Fault | None) -> tuple[str, list[str]]:
+def _sliding(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     """Verdict on a file about slow sliding, and whether its data are those of a fault."""
-    claim = read_sliding(raw)
+    claim = slow_sliding.read_sliding(raw)
     if claim.check() is not Verdict.PROVED:
         raise CertificateError("the claims do not follow from the loop and the fault's data")
     lines = [f"fault {claim.task.name}, by the data in the file", claim.sentence()]
     if fault is not None:
         low, high = claim.task.ranges["direct_effect"]
-        if claim.task != sliding_task(fault, claim.task.stress, (high - low) / (high + low)):
+        if claim.task != slow_sliding.sliding_task(fault, claim.task.stress, (high - low) / (high + low)):
             raise CertificateError(f"the data are not those of {fault.name}")
         lines.append(f"the data are those of {fault.name}")
     return str(Verdict.PROVED), lines
@@ -121,43 +113,16 @@ def _attraction(raw: Any) -> tuple[str, list[str]]:
     return claim.verdict, claim_words(claim)
 
 
-def _covers(certificate: Certificate, fault: Fault) -> list[str]:
-    """Refuse a certificate whose constants or ranges do not cover a fault (designed gains, divisor μ_res·N̂_min).
-
-    A sliding mode's certificate is about the base gains; the scale λ that the fault needs is said.
-    """
-    require_degree_of_slip(certificate.loop)
-    loop, said = certificate.loop, [f"covers {certificate.loop.law} on {fault.name}, box {fault.box.name}"]
-    if loop.domain == "reals":
-        needed = sectors(fault)
-        if loop.constants != {"b": needed.authority}:
-            raise CertificateError(f"the control authority is not that of {fault.name}")
-        ranges = needed.ranges()
-    else:
-        divisor = least_authority(fault)
-        ranges = {"beta": coefficient_range(fault, divisor)}
-        zero = Errors(slip=Fraction(0), rate=Fraction(0), acceleration=Fraction(0))
-        if certified_lipschitz(certificate) <= 0:
-            raise CertificateError("the certified range of d = h' must hold 0 inside to cover a fault")
-        rate = largest_matched_rate(fault, divisor, zero)
-        least = UpperBound(rate / certified_lipschitz(certificate))
-        said.append(f"|h'| <= {UpperBound(rate):.4g} m/s^3 along the reference needs a scale of at least {least:.4g}")
-    for name, (low, high) in ranges.items():
-        if not loop.uncertain[name][0] <= low <= high <= loop.uncertain[name][1]:
-            raise CertificateError(f"the certified range of {name} does not cover {fault.name}")
-    return said
-
-
 def statement(certificate: Certificate) -> list[str]:
     """What a certificate says, in lines."""
-    loop, symbols = certificate.loop, certificate.loop.symbols
-    lines = [f"law {loop.law}, field re-derived from the law and equal to the file's"]
+    loop = certificate.loop
+    lines = [f"law {loop.law}, field equal to the law's own"]
     lines.append(", ".join(f"{name} = {v}" for name, v in loop.parameters.items()))
     lines.append(", ".join(f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()))
-    lines += [f"{state}' = {from_terms(terms, symbols)}" for state, terms in loop.field.items()]
+    lines += [f"{state}' = {written(terms)}" for state, terms in loop.field.items()]
     if certificate.refutation is not None:
         point = ", ".join(f"{name}: {v}" for name, v in certificate.refutation.point.items())
         return [*lines, f"Filippov equilibrium away from the origin, in cell coordinates {point}"]
-    lines.append("V = " + " + ".join(f"({from_terms([term], symbols)})" for term in certificate.lyapunov))
+    lines.append("V = " + " + ".join(f"({written([term])})" for term in certificate.lyapunov))
     lines.append(", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
     return lines

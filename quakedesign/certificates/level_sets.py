@@ -7,12 +7,12 @@ from typing import Any
 import sympy as sp
 
 from quakedesign.certificates.certificate import Certificate
-from quakedesign.certificates.claim import error_units, full_field
+from quakedesign.certificates.loop_expressions import error_units, full_field
 from quakedesign.certificates.matched import Errors
 from quakedesign.controllers import LoopField
 from quakedesign.rationals import fraction_of
 from quakedesign.symbolic.balls import enclose
-from quakedesign.symbolic.terms import from_terms
+from quakedesign.symbolic.term_expressions import from_terms
 
 _BASE, _OTHER = sp.symbols("x y", positive=True)
 

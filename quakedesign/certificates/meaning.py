@@ -4,7 +4,8 @@ from functools import cache
 
 import sympy as sp
 
-from quakedesign.certificates.claim import Loop, sympy_field
+from quakedesign.certificates.claim import Loop
+from quakedesign.certificates.loop_expressions import sympy_field
 from quakedesign.errors import CertificateError
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.relative_degree import relative_degree

@@ -12,14 +12,16 @@ from fractions import Fraction
 import sympy as sp
 
 from quakedesign.certificates.certificate import Certificate
-from quakedesign.certificates.claim import error_units, require
+from quakedesign.certificates.claim import require
 from quakedesign.certificates.forms import Form, Problem, largest_ratio
+from quakedesign.certificates.loop_expressions import error_units
 from quakedesign.certificates.obligations import Obligations, degree
 from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError, KinkError
 from quakedesign.rationals import fraction_of
 from quakedesign.symbolic.balls import enclose
-from quakedesign.symbolic.terms import Term, cell_polynomial, from_terms, lie_derivative, to_terms
+from quakedesign.symbolic.term_expressions import from_terms, lie_derivative, to_terms
+from quakedesign.symbolic.terms import Term, cell_polynomial
 
 _PUSHED = 1
 """Index of e2, on which ν acts."""

@@ -1,9 +1,8 @@
 """What every law offers to the proof, and what one that acts on a fault offers besides."""
 
-import dataclasses
 import tomllib
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import partial
@@ -14,13 +13,7 @@ from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, runtime_chec
 import sympy as sp
 
 from quakedesign.controllers.feed_forward import NONE, FeedForward
-from quakedesign.controllers.soundness import (
-    require_names,
-    require_roots,
-    require_units,
-    sound_field,
-    sound_states,
-)
+from quakedesign.controllers.loop_field import LoopField
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational, six_digits
@@ -72,62 +65,6 @@ class Sampling:
     def __str__(self) -> str:
         numbers = "".join(f", {name} {float(value)!r}" for name, value in self.settings)
         return f"{self.scheme}{numbers}"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoopField:
-    """A closed loop as an uncertain vector field, the subject of a certificate.
-
-    Attributes
-    ----------
-    states : dict of Symbol to int
-        States and their weights.
-    field : dict of Symbol to Expr
-        Time derivative of every state, in gains, constants and uncertain parameters.
-    gains, constants, uncertain : tuple of Symbol
-    domain : str
-        ``"cells"`` for signed powers, ``"reals"`` for polynomials.
-    roots : mapping of Symbol to Symbol
-        Symbols that stand for the positive square root of a gain.
-    units : mapping of Symbol to Expr
-        Error that one unit of a state stands for, where it is not one unit; in gains.
-
-    Raises
-    ------
-    ParameterError
-        For names that are equal or that a certificate file cannot hold, an unknown domain, states of one sign, weights
-        that are no integers from 1 to 12, a rate that is missing, inexact or holds an unknown symbol, a root of
-        anything but a gain or constant, a unit of anything but a state.
-    """
-
-    states: dict[sp.Symbol, int]
-    field: dict[sp.Symbol, sp.Expr]
-    gains: tuple[sp.Symbol, ...]
-    constants: tuple[sp.Symbol, ...]
-    uncertain: tuple[sp.Symbol, ...]
-    domain: str
-    roots: Mapping[sp.Symbol, sp.Symbol] = dataclasses.field(default_factory=dict)
-    units: Mapping[sp.Symbol, sp.Expr] = dataclasses.field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        numbers = (*self.gains, *self.constants)
-        known = (*self.states, *numbers, *self.uncertain, *self.roots)
-        object.__setattr__(self, "states", sound_states(self.states, self.domain))
-        require_names(known)
-        require_roots(self.roots, numbers)
-        require_units(self.units, self.states, (*numbers, *self.roots))
-        object.__setattr__(self, "field", sound_field(self.field, known, self.states))
-
-    @property
-    def degree(self) -> int:
-        """Lowest degree of the Lyapunov functions to try, see `lowest_degree`."""
-        return lowest_degree(self.states.values(), self.domain)
-
-
-def lowest_degree(weights: Iterable[int], domain: str) -> int:
-    """Degree of the product of the two heaviest states, from where on a V can couple them; 2 on the reals."""
-    *_, first, second = (1, *sorted(weights))
-    return first + second if domain == "cells" else 2
 
 
 L = TypeVar("L", bound="Law", covariant=True)

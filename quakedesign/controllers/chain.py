@@ -9,7 +9,8 @@ from typing import ClassVar
 
 import sympy as sp
 
-from quakedesign.controllers.base import Law, LoopField
+from quakedesign.controllers.base import Law
+from quakedesign.controllers.loop_field import LoopField
 from quakedesign.rationals import fraction_of
 
 beta, d = sp.symbols("beta d", real=True)

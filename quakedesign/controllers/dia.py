@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import sympy as sp
 
-from quakedesign.controllers.base import LoopField
+from quakedesign.controllers.loop_field import LoopField
 from quakedesign.controllers.sliding_mode import SlidingMode
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic import SignedPower

@@ -7,7 +7,8 @@ from typing import ClassVar
 
 import sympy as sp
 
-from quakedesign.controllers.base import Controller, LoopField, Signals
+from quakedesign.controllers.base import Controller, Signals
+from quakedesign.controllers.loop_field import LoopField
 from quakedesign.errors import ParameterError
 
 FEEDBACKS = ("error", "state")

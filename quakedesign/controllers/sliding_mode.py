@@ -7,8 +7,9 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
-from quakedesign.controllers.base import Controller, LoopField, Sampling, Signals
+from quakedesign.controllers.base import Controller, Sampling, Signals
 from quakedesign.controllers.feed_forward import NONE, FeedForward
+from quakedesign.controllers.loop_field import LoopField
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
 

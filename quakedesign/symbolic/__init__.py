@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from quakedesign.symbolic.normal_form import normal_form, solve_signed
     from quakedesign.symbolic.set_valued import SetValued, restrict
     from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, off_kinks
+    from quakedesign.symbolic.term_expressions import real_symbols
     from quakedesign.symbolic.weights import weights_for
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "lift",
     "normal_form",
     "off_kinks",
+    "real_symbols",
     "restrict",
     "solve_signed",
     "weights_for",

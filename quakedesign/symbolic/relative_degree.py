@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import sympy as sp
 
-from quakedesign.symbolic.terms import lie_derivative
+from quakedesign.symbolic.term_expressions import lie_derivative
 
 
 def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control: sp.Symbol) -> int | None:

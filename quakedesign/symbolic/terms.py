@@ -1,16 +1,10 @@
 """Sums of products of signed powers as plain data, and their polynomials on sign cells."""
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import count
-
-import sympy as sp
 
 from quakedesign.errors import CertificateError
-from quakedesign.rationals import fraction_of
-from quakedesign.symbolic.normal_form import normal_form
-from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 Factor = tuple[str, Fraction, str]
 """State, exponent, kind: ``s`` for ⌈x⌋^a, ``a`` for |x|^a."""
@@ -34,18 +28,6 @@ class Term:
     factors: tuple[Factor, ...]
 
 
-def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ...]:
-    """Expand an expression into terms, with equal products collected, in a fixed order.
-
-    Raises
-    ------
-    CertificateError
-        When a part is not a product of rational number, parameters and signed powers of single states.
-    """
-    parts = sp.Add.make_args(sp.expand(expression))
-    return collected((_split(part, set(states)) for part in parts), [state.name for state in states])
-
-
 def collected(terms: Iterable[Term], states: Sequence[str]) -> tuple[Term, ...]:
     """Sum with equal products collected, in a fixed order: parameters by name, factors in the order of their states."""
     order = {state: i for i, state in enumerate(states)}
@@ -56,75 +38,6 @@ def collected(terms: Iterable[Term], states: Sequence[str]) -> tuple[Term, ...]:
     return tuple(sorted(Term(c, *key) for key, c in coefficients.items() if c))
 
 
-def without_nesting(
-    expressions: Sequence[sp.Expr], states: Sequence[sp.Symbol], taken: Iterable[str] = ()
-) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr]]:
-    """Nested signed powers named: the argument of every power of a sum becomes a symbol of its own.
-
-    Powers of a product of states need none: ⌈x²⌋⁰ = 1 and ⌈xy⌋⁰ = ⌈x⌋⁰⌈y⌋⁰ where neither vanishes.
-
-    Parameters
-    ----------
-    expressions : sequence of Expr
-    states : sequence of Symbol
-    taken : iterable of str
-        Names that the new symbols must not have.
-
-    Returns
-    -------
-    lifts : dict of Symbol to Expr
-        Argument of every new symbol, in states and earlier symbols; empty without nesting.
-    expressions : list of Expr
-        The same, in states and new symbols.
-    """
-    lifts: dict[sp.Expr, sp.Symbol] = {}
-    names = (f"n{i}" for i in count(1))
-    free = (name for name in names if name not in set(taken))
-
-    def walk(e: sp.Expr) -> sp.Expr:
-        if not e.args:
-            return e
-        if isinstance(e, SignedPower | AbsolutePower) and e.args[0] not in states and e.args[0].has(*states):
-            argument = sp.expand(walk(e.args[0]))
-            if not argument.is_Add and argument.free_symbols <= set(states):
-                return normal_form(e.func(argument, e.args[1]))
-            if argument not in lifts:
-                lifts[argument] = sp.Symbol(next(free), real=True)
-            return e.func(lifts[argument], e.args[1])
-        return e.func(*(walk(a) for a in e.args))
-
-    plain = [walk(sp.sympify(e)) for e in expressions]
-    return {symbol: argument for argument, symbol in lifts.items()}, plain
-
-
-def _split(part: sp.Expr, states: Container[sp.Symbol]) -> Term:
-    coefficient, parameters = Fraction(1), list[str]()
-    powers = list[Factor]()
-    for factor in sp.Mul.make_args(part):
-        base, power = factor.as_base_exp()
-        if factor.is_Rational:
-            coefficient *= fraction_of(factor)
-        elif base.is_Symbol and base not in states and power.is_Integer and power > 0:
-            parameters += [base.name] * int(power)
-        else:
-            powers.append(_power(base, power, states))
-    return Term(coefficient, tuple(parameters), multiplied(powers))
-
-
-def _power(base: sp.Expr, power: sp.Expr, states: Container[sp.Symbol]) -> Factor:
-    if base in states and power.is_Integer and power > 0:
-        return base.name, Fraction(int(power)), "s" if power % 2 else "a"
-    if isinstance(base, SignedPower | AbsolutePower) and power.is_Integer and power > 0:
-        state, exponent = base.args
-        if state in states and exponent.is_Rational:
-            odd = isinstance(base, SignedPower) and power % 2 == 1
-            return state.name, fraction_of(exponent) * int(power), "s" if odd else "a"
-    raise CertificateError(
-        f"a certificate needs products of signed powers of single states. Received the factor {base**power}. "
-        "Nested powers need a change of coordinates first."
-    )
-
-
 def multiplied(factors: Iterable[Factor]) -> tuple[Factor, ...]:
     """Product of signed powers with every state once; ⌈x⌋⁰ is its sign, |x|⁰ is left out."""
     powers: dict[str, tuple[Fraction, bool]] = {}
@@ -132,31 +45,6 @@ def multiplied(factors: Iterable[Factor]) -> tuple[Factor, ...]:
         power, odd = powers.get(state, (Fraction(0), False))
         powers[state] = power + exponent, odd != (kind == "s")
     return tuple((state, a, "s" if odd else "a") for state, (a, odd) in powers.items() if a or odd)
-
-
-def from_terms(terms: Iterable[Term], symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """SymPy expression of terms; `symbols` gives the symbol of every name."""
-    kinds = {"s": SignedPower, "a": AbsolutePower}
-    total = sp.Integer(0)
-    for term in terms:
-        product = sp.Rational(term.coefficient.numerator, term.coefficient.denominator)
-        for name in term.parameters:
-            product *= symbols[name]
-        for state, exponent, kind in term.factors:
-            product *= kinds[kind](symbols[state], sp.Rational(exponent.numerator, exponent.denominator))
-        total += product
-    return total
-
-
-def lie_derivative(function: sp.Expr, field: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """Σ ∂V/∂x_i · f_i.
-
-    Raises
-    ------
-    KinkError
-        When the function is not continuously differentiable.
-    """
-    return sum((function.diff(state) * rate for state, rate in field.items()), start=sp.Integer(0))
 
 
 def lie_terms(function: Term, field: Mapping[str, tuple[Term, ...]]) -> Iterator[Term]:
@@ -171,6 +59,22 @@ def lie_terms(function: Term, field: Mapping[str, tuple[Term, ...]]) -> Iterator
             factors = multiplied([*others, slope, *speed.factors])
             coefficient = function.coefficient * a * speed.coefficient
             yield Term(coefficient, (*function.parameters, *speed.parameters), factors)
+
+
+def written(terms: Iterable[Term]) -> str:
+    """Sum as SymPy would read it, with signed and absolute powers as functions; what is added stands first."""
+    ordered = sorted(terms, key=lambda term: term.coefficient < 0)
+    words = [f" {'-' if term.coefficient < 0 else '+'} {_written_size(term)}" for term in ordered]
+    return "".join(words)[3:] if ordered and ordered[0].coefficient > 0 else "-" + "".join(words)[3:] if words else "0"
+
+
+def _written_size(term: Term) -> str:
+    """Term without its sign: numerator, parameters, powers, denominator."""
+    kinds = {"s": "SignedPower", "a": "AbsolutePower"}
+    powers = [s if kind == "s" and e == 1 else f"{kinds[kind]}({s}, {e})" for s, e, kind in term.factors]
+    numerator, denominator = abs(term.coefficient.numerator), term.coefficient.denominator
+    factors = [*([str(numerator)] if numerator != 1 else []), *term.parameters, *powers] or ["1"]
+    return "*".join(factors) + (f"/{denominator}" if denominator != 1 else "")
 
 
 def value(term: Term, parameters: Mapping[str, Fraction]) -> Fraction:

@@ -168,7 +168,7 @@ def test_a_function_with_a_kink_is_refused_even_if_its_terms_cancel(texts, stand
 def test_a_derivative_once_taken_off_the_kinks_does_not_prove_a_kink(texts):
     from quakedesign.certificates.obligations import Obligations
     from quakedesign.symbolic import off_kinks
-    from quakedesign.symbolic.terms import from_terms
+    from quakedesign.symbolic.term_expressions import from_terms
 
     raw = json.loads(texts["cta"])
     raw["V"].append(["1/1152921504606846976", [], [["e1", "1", "a"], ["e2", "1", "s"]]])

@@ -9,7 +9,8 @@ import sympy as sp
 
 from quakedesign.certificates import load_certificate
 from quakedesign.certificates.checking import _same_field, limit, touching_cells
-from quakedesign.certificates.claim import Equilibrium, Loop, error_units, loop_of, root_enclosure, unit_ranges
+from quakedesign.certificates.claim import Equilibrium, Loop, loop_of, root_enclosure
+from quakedesign.certificates.loop_expressions import error_units, unit_ranges
 from quakedesign.controllers import LoopField, laws
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.symbolic.terms import Term

@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from quakedesign.certificates import Verdict, loop_of
-from quakedesign.certificates.claim import error_units
+from quakedesign.certificates.loop_expressions import error_units
 from quakedesign.certificates.premises import least_authority
 from quakedesign.controllers.cta import ContinuousTwisting
 from quakedesign.controllers.dia import DiscontinuousIntegral

@@ -8,7 +8,8 @@ import pytest
 from standalone_guarantee import checker
 
 from quakedesign.certificates.guarantee import task as package_task
-from quakedesign.certificates.guarantee.files import guarantee_text, is_guarantee, parse_guarantee, read_guarantee
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, read_guarantee
+from quakedesign.certificates.kinds import is_guarantee
 from quakedesign.errors import CertificateError
 
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")

@@ -8,7 +8,8 @@ import sympy as sp
 
 from quakedesign.symbolic import AbsolutePower, SignedPower
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.symbolic.terms import Term, from_terms, lie_derivative
+from quakedesign.symbolic.term_expressions import from_terms, lie_derivative
+from quakedesign.symbolic.terms import Term
 
 WEIGHTS = {"e1": 3, "e2": 2, "e3": 1}
 SYMBOLS = {name: sp.Symbol(name, real=True) for name in WEIGHTS}

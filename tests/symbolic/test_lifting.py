@@ -15,7 +15,8 @@ from quakedesign.symbolic import FilippovField, SignedPower, filippov_derivative
 from quakedesign.symbolic.filippov import lie_derivative
 from quakedesign.symbolic.lifting import is_zero_on_cells, least_weights
 from quakedesign.symbolic.signed_power import AbsolutePower
-from quakedesign.symbolic.terms import cell_polynomial, to_terms
+from quakedesign.symbolic.term_expressions import to_terms
+from quakedesign.symbolic.terms import cell_polynomial
 
 R = sp.Rational
 x, y, z = STATES = sp.symbols("x y z", real=True)

@@ -11,18 +11,8 @@ from hypothesis import strategies as st
 
 from quakedesign.errors import CertificateError, KinkError
 from quakedesign.symbolic import AbsolutePower, SignedPower
-from quakedesign.symbolic.terms import (
-    Term,
-    cell_polynomial,
-    collected,
-    from_terms,
-    lie_derivative,
-    lie_terms,
-    multiplied,
-    real_polynomial,
-    to_terms,
-    value,
-)
+from quakedesign.symbolic.term_expressions import from_terms, lie_derivative, to_terms
+from quakedesign.symbolic.terms import Term, cell_polynomial, collected, lie_terms, multiplied, real_polynomial, value
 
 a, b, c = sp.symbols("a b c", real=True)
 k, q = sp.symbols("k q", real=True)

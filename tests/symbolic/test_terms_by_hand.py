@@ -7,18 +7,16 @@ import sympy as sp
 
 from quakedesign.errors import CertificateError, KinkError
 from quakedesign.symbolic import AbsolutePower, SignedPower
+from quakedesign.symbolic.term_expressions import from_terms, lie_derivative, to_terms, without_nesting
 from quakedesign.symbolic.terms import (
     Term,
     cell_polynomial,
     collected,
-    from_terms,
-    lie_derivative,
     lie_terms,
     multiplied,
     real_polynomial,
-    to_terms,
     value,
-    without_nesting,
+    written,
 )
 
 a, b, k, q = sp.symbols("a b k q", real=True)
@@ -133,6 +131,18 @@ def test_terms_are_the_expression_that_they_say():
     expected = -3 * k**2 * AbsolutePower(a, 2 * THIRD) * SignedPower(b, HALF) / 4 + 5 * q * SignedPower(a, THIRD) + 2
     assert from_terms(SUM, SYMBOLS) == expected
     assert from_terms((), SYMBOLS) == 0
+
+
+def test_terms_are_written_as_sympy_reads_them():
+    names = SYMBOLS | {"SignedPower": SignedPower, "AbsolutePower": AbsolutePower}
+    assert sp.sympify(written(SUM), names) == from_terms(SUM, SYMBOLS)
+    assert written(SUM) == "5*q*SignedPower(a, 1/3) + 2 - 3*k*k*AbsolutePower(a, 2/3)*SignedPower(b, 1/2)/4"
+    assert written(SUM[:1]) == "-3*k*k*AbsolutePower(a, 2/3)*SignedPower(b, 1/2)/4"
+    assert written([Term(F(-1), (), (signed("a", 1),)), Term(F(-1), (), (absolute("a", 1),))]) == (
+        "-a - AbsolutePower(a, 1)"
+    )
+    assert written([Term(F(1, 2), (), ())]) == "1/2"
+    assert written(()) == "0"
 
 
 def test_the_derivative_along_a_field():

@@ -5,7 +5,7 @@ from fractions import Fraction as F
 import pytest
 import sympy as sp
 
-from quakedesign.certificates.claim import sympy_field
+from quakedesign.certificates.loop_expressions import sympy_field
 from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic.signed_power import SignedPower

@@ -6,6 +6,7 @@ from quakedesign.faces import face
 
 if TYPE_CHECKING:
     from quakedesign.certificates.guarantee.continuous import ContinuousPeaks, continuous_peaks
+    from quakedesign.certificates.guarantee.files import read_guarantee
     from quakedesign.certificates.guarantee.slow_gain import SlowGain
     from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held, guarantee
     from quakedesign.certificates.guarantee.task import Task, task_of
@@ -23,6 +24,7 @@ __all__ = [
     "certified_bounds",
     "continuous_peaks",
     "guarantee",
+    "read_guarantee",
     "task_of",
 ]
 

@@ -29,11 +29,6 @@ _MOST_COEFFICIENTS = 13
 _MOST_STATES = 20
 
 
-def is_guarantee(raw: Any) -> bool:
-    """Whether a parsed file bounds the peaks of a loop, with samples or in continuous time."""
-    return isinstance(raw, dict) and raw.get("kind") == "guarantee"
-
-
 def guarantee_text(claim: Guarantee | ContinuousPeaks) -> str:
     """Text of the file."""
     task = claim.task

@@ -7,7 +7,6 @@ from quakedesign.faces import face
 if TYPE_CHECKING:
     from quakedesign.certificates.slow_sliding.cells import WHOLE, Cuts, cells, parts
     from quakedesign.certificates.slow_sliding.files import (
-        is_sliding,
         parse_sliding,
         read_sliding,
         save_sliding,
@@ -25,7 +24,6 @@ __all__ = [
     "SlidingTask",
     "cell_bounds",
     "cells",
-    "is_sliding",
     "parse_sliding",
     "parts",
     "read_sliding",

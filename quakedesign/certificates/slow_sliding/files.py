@@ -8,6 +8,7 @@ from typing import Any
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee.statement import Held
+from quakedesign.certificates.kinds import SLOW_SLIDING
 from quakedesign.certificates.slow_sliding.cells import MOST_CELLS, Cuts, cells
 from quakedesign.certificates.slow_sliding.statement import SlidingGuarantee
 from quakedesign.certificates.slow_sliding.task import AXES, SlidingTask
@@ -17,7 +18,6 @@ from quakedesign.loop import LinearLaw
 from quakedesign.output import write_whole
 from quakedesign.sos.exact.strict import NAME, listed, need, parse, read_rational, with_keys
 
-KIND = "slow_sliding"
 _ROCK = ("density", "shear_modulus", "length", "damping")
 _REFERENCE = ("rate", "distance", "ramp")
 _TIMES = ("step", "delay", "lag", "diffusion", "slip_noise")
@@ -28,18 +28,13 @@ _MOST_STATES = 20
 _ZERO = Fraction(0)
 
 
-def is_sliding(raw: Any) -> bool:
-    """Whether a parsed file is about slow sliding."""
-    return isinstance(raw, dict) and raw.get("kind") == KIND
-
-
 def sliding_text(claim: SlidingGuarantee) -> str:
     """Text of the file."""
     task, held = claim.task, claim.held
     law = held.law
     document = {
         "format": 1,
-        "kind": KIND,
+        "kind": SLOW_SLIDING,
         "fault": {
             "name": task.name,
             **{name: str(getattr(task, name)) for name in _ROCK},
@@ -81,7 +76,7 @@ def read_sliding(raw: Any) -> SlidingGuarantee:
     """
     with_keys(raw, {"format", "kind", "fault", "reference", "stress", "loop", "cells", "claims"})
     need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
-    need(raw["kind"] == KIND, f"kind must be {KIND}")
+    need(raw["kind"] == SLOW_SLIDING, f"kind must be {SLOW_SLIDING}")
     try:
         task, held = _task(raw), _held(raw["loop"])
         given = with_keys(raw["claims"], set(_CLAIMS))

@@ -7,12 +7,12 @@ from fractions import Fraction
 import sympy as sp
 
 from quakedesign.certificates import Certificate
-from quakedesign.certificates.claim import error_units
+from quakedesign.certificates.loop_expressions import error_units
 from quakedesign.certificates.obligations import Obligations, degree
 from quakedesign.controllers import LoopField, Subject, model_of
 from quakedesign.rationals import float_above, fraction_of, rational, to_sympy
 from quakedesign.symbolic.balls import enclose
-from quakedesign.symbolic.terms import from_terms
+from quakedesign.symbolic.term_expressions import from_terms
 from quakedesign.synthesis.analysis.certify import Number, closed_loop
 from quakedesign.synthesis.lyapunov.balancing import balance
 from quakedesign.synthesis.lyapunov.certify_exactly import with_largest_decay

@@ -10,7 +10,7 @@ import sympy as sp
 from scipy.optimize import nnls
 
 from quakedesign.certificates import Loop
-from quakedesign.certificates.claim import unit_ranges
+from quakedesign.certificates.loop_expressions import unit_ranges
 from quakedesign.certificates.obligations import Obligation, Obligations, degree, power_sum
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.sos import Polynomial

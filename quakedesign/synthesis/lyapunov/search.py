@@ -8,7 +8,7 @@ from quakedesign.certificates import Certificate, Equilibrium, Loop
 from quakedesign.certificates.obligations import Obligation, Obligations, power_sum
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.controllers import LoopField, Subject, law
-from quakedesign.controllers.base import lowest_degree
+from quakedesign.controllers.loop_field import lowest_degree
 from quakedesign.errors import CertificateError
 from quakedesign.rationals import nearest
 from quakedesign.sos import Polynomial

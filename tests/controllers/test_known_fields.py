@@ -1,0 +1,52 @@
+"""The closed loops that are kept are those that the laws derive."""
+
+import subprocess
+import sys
+from fractions import Fraction as F
+from pathlib import Path
+
+import pytest
+import sympy as sp
+
+from quakedesign.controllers import LoopField, known_fields, laws
+from quakedesign.controllers.known_fields import field_of, is_law
+from quakedesign.errors import UnknownNameError
+from quakedesign.symbolic.terms import Term
+
+
+def test_every_law_is_derived_again():
+    assert known_fields.derived_again() == known_fields.FILE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", laws())
+def test_what_is_read_is_what_the_law_derives(name):
+    assert field_of(name) == field_of(laws()[name]) == (name, laws()[name].loop_field().terms)
+
+
+def test_what_is_not_kept_is_derived(monkeypatch):
+    x = sp.Symbol("x", real=True)
+    bare = LoopField(states={x: 1}, field={x: -2 * x}, gains=(), constants=(), uncertain=(), domain="reals")
+    name, found = field_of(bare)
+    assert (name, found.field) == ("custom", {"x": (Term(F(-2), (), (("x", F(1), "s"),)),)})
+    expected = field_of("cta")
+    monkeypatch.setattr(known_fields, "_kept", dict)
+    assert field_of("cta") == expected
+    assert is_law("cta")
+    assert not is_law("nothing")
+    with pytest.raises(UnknownNameError):
+        field_of("nothing")
+
+
+ROOT = Path(__file__).parents[2]
+FRESH = """
+import sys
+from pathlib import Path
+from quakedesign.certificates.command import check_files
+((verdict, said),) = check_files([Path("proofs/certificates/super-twisting_1.5_1.1.json")]).values()
+print(verdict, *({"sympy", "numpy"} & set(sys.modules)))
+"""
+
+
+def test_checking_the_certificate_of_a_known_law_does_not_wait_for_sympy():
+    said = subprocess.run([sys.executable, "-c", FRESH], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert said.stdout == "proved\n"
