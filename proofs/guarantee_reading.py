@@ -49,20 +49,37 @@ def matrix(value: Any, where: str, height: int, width: int) -> list[Row]:
     return [row(v, where, width) for v in value]
 
 
-def upper(value: Fraction) -> str:
-    """Decimal with four digits that is not below the number."""
+def upper(value: Fraction, digits: int = 4) -> str:
+    """Decimal with so many digits, at most 15, that is not below the number."""
     bits = value.numerator.bit_length() - value.denominator.bit_length()
-    exponent = bits * 30103 // 100000 - 5  # of a number of any length; log10(2) = 0.30103
-    digits = -(-value // Fraction(10) ** exponent)
-    while abs(digits) >= 10**4:
+    exponent = bits * 30103 // 100000 - digits - 1  # of a number of any length; log10(2) = 0.30103
+    shown = -(-value // Fraction(10) ** exponent)
+    while abs(shown) >= 10**digits:
         exponent += 1
-        digits = -(-value // Fraction(10) ** exponent)
+        shown = -(-value // Fraction(10) ** exponent)
     if abs(exponent) > 300:  # beyond what a float holds
-        return f"{digits}e{exponent}" if digits else "0"
-    return f"{float(f'{digits}e{exponent}'):.4g}"
+        return f"{shown}e{exponent}" if shown else "0"
+    return f"{float(f'{shown}e{exponent}'):.{digits}g}"
 
 
-def lower(value: Fraction) -> str:
-    """Decimal with four digits that is not above the number."""
-    text = upper(-value)
+def lower(value: Fraction, digits: int = 4) -> str:
+    """Decimal with so many digits that is not above the number."""
+    text = upper(-value, digits)
     return text[1:] if text.startswith("-") else text if text == "0" else f"-{text}"
+
+
+def exact(value: Fraction) -> str:
+    """Decimal if one of 15 digits is the number itself, else p/q."""
+    text = upper(value, 15)
+    return text if Fraction(text) == value else str(value)
+
+
+def inside(low: Fraction, high: Fraction) -> str:
+    """A range that something was verified for: a point as it is, else the ends that are shown lie inside of it."""
+    if low == high:
+        return f"= {exact(low)}"
+    for digits in range(4, 16):
+        ends = upper(low, digits), lower(high, digits)
+        if Fraction(ends[0]) < Fraction(ends[1]):
+            return f"in [{ends[0]}, {ends[1]}]"
+    return f"in [{low}, {high}]"

@@ -13,7 +13,7 @@ from guarantee_bounds import peaks_of
 from guarantee_gains import gains
 from guarantee_loop import Fade, Loop, read_loop
 from guarantee_numbers import unit
-from guarantee_reading import Row, keys, lower, need, number, numbers, row, upper
+from guarantee_reading import Row, exact, inside, keys, lower, need, number, numbers, row, upper
 from guarantee_task import FAULT, Task
 
 MAX_CELLS = 64
@@ -345,11 +345,8 @@ def verify(document: dict[str, Any]) -> list[str]:
 def statement(
     document: dict[str, Any], fault: Fault, claims: dict[str, Fraction], cells: int, small: Fraction
 ) -> list[str]:
-    """What was verified, in ASCII; bounds on their outer side, those of the disturbance on its inner one."""
-    loop, ranges = document["loop"], []
-    for name in CONSTANTS:
-        low, high = fault.box[name]
-        ranges.append(f"{name} in [{lower(high) if low == high else upper(low)}, {lower(high)}]")
+    """What was verified, in ASCII; bounds on their outer side, what they hold for on its inner one."""
+    loop, ranges = document["loop"], [f"{name} {inside(*fault.box[name])}" for name in CONSTANTS]
     when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s, rock of L^2/D = {loop['diffusion']} s"
     off = f", measured slip within {loop['slip_noise']} m of the true one" if loop["slip_noise"] != "0" else ""
     peak = fault.rate * power_of_e(claims["log_rate"])
@@ -359,7 +356,7 @@ def statement(
         f"the ageing law, with inertia, every constant {', '.join(ranges)}; {cells} cells",
         f"law with {len(loop['states'])} states of the slip alone, {when}{off}",
         f"disturbance: any shear stress of at most {lower(fault.stress)} Pa; from steady sliding at "
-        f"{lower(fault.rate)} m/s over {lower(fault.distance)} m; small gain {upper(small)}",
+        f"{exact(fault.rate)} m/s over {lower(fault.distance)} m; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(peak)} m/s: |ln(v/V)| <= {upper(claims['log_rate'])}",
         f"|slip - reference| <= {upper(claims['slip_error'])} m, |ln(theta V/D)| <= {upper(claims['log_state'])}",
         f"pressure in the fault from {lower(-claims['push'])} Pa to {upper(highest)} Pa",

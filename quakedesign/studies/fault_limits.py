@@ -155,6 +155,7 @@ def limits(fault: Fault, *, pressure: float | None = None, diffusivity: float = 
     ParameterError
         For a negative pressure, a diffusivity that is not positive, or friction with a state.
     """
+    fault.require_memoryless("a limit of all controllers")
     task, step = task_of(fault), rational(fault.sampling_time)
     withdrawal = task.normal_stress if pressure is None else rational(pressure, "pressure")
     spread = rational(diffusivity, "diffusivity")

@@ -47,3 +47,11 @@ def test_a_folder_with_a_figure(tmp_path, capsys):
 def test_nonsense_is_refused_in_one_line(given, capsys):
     assert run("lab-fault", *given) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_friction_with_a_state_has_no_limits_and_the_line_names_what_it_has(capsys):
+    assert run("crustal-patch") == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "a limit of all controllers needs a friction law of slip and slip rate alone" in said
+    assert "Use fault, derive, simulate or guarantee for it." in said

@@ -413,3 +413,23 @@ def test_the_slip_error_on_which_a_slow_gain_rests_stays_below_its_claim(monkeyp
             verified(slow, slip)
     with pytest.raises(checker.Refused, match="the file"):
         verified(steady | {"more": "1"}, F(0))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "digits"),
+    [("1/3", "2/3", 4), ("0.60000122360451", "0.60000122360559", 13), ("0.0098", "0.0102", 4), ("2/3", "200001/3", 4)],
+)
+def test_ranges_are_shown_on_their_inner_side_with_as_many_digits_as_it_takes(low, high, digits):
+    low, high = F(low), F(high)
+    left, right = map(F, checker.inside(low, high).removeprefix("in [").removesuffix("]").split(", "))
+    assert low <= left < right <= high
+    assert max(left / low, high / right) <= 1 + F(1, 10 ** (digits - 1))
+
+
+def test_points_and_what_is_narrower_than_fifteen_digits_are_shown_exactly():
+    for value, shown in ((F(1, 125), "0.008"), (F(1, 3), "1/3"), (F(50 * 10**6), "50000000"), (F(10**330), "1e+330")):
+        assert F(checker.inside(value, value).removeprefix("= ")) == value == F(shown)
+    assert checker.inside(F(1, 125), F(1, 125)) == "= 0.008"
+    assert checker.inside(F(1, 3), F(1, 3)) == "= 1/3"
+    low, high = F(1, 3), F(1, 3) + F(1, 10**20)
+    assert checker.inside(low, high) == f"in [{low}, {high}]"

@@ -256,7 +256,7 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
     ParameterError
         For friction with a state, or a disturbance of the class ``rate`` that does not start at 0.
     """
-    fault.require_memoryless("a guarantee")
+    fault.require_memoryless("a guarantee of tracking")
     law, given, box = friction_bounds(fault.friction), fault.disturbance, fault.box
     amplitude, change = given.exact_bounds
     if rate_limited and given.constant:

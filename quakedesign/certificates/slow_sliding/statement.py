@@ -1,6 +1,7 @@
 """A guarantee of slow sliding: a fault, its box of constants in cells, the loop that runs, and its bounds."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -97,8 +98,17 @@ def _path(held: Held) -> str:
 def _box(task: SlidingTask) -> str:
     said = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
     wide = [
-        f"{short} from {float(task.ranges[axis][0]):.6g} to {float(task.ranges[axis][1]):.6g}"
+        f"{short} from {_inside(*task.ranges[axis])}"
         for axis, short in said.items()
         if task.ranges[axis][0] < task.ranges[axis][1]
     ]
     return f"for all constant {', '.join(wide)}" if wide else "for a, b and D_c as they are given"
+
+
+def _inside(low: Fraction, high: Fraction) -> str:
+    """Ends of a range on its inner side, with as many digits as it takes."""
+    for digits in range(6, 16):
+        ends = f"{UpperBound(low):.{digits}g}", f"{LowerBound(high):.{digits}g}"
+        if Fraction(ends[0]) < Fraction(ends[1]):
+            return " to ".join(ends)
+    return f"{low} to {high}"

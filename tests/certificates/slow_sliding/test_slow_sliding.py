@@ -100,6 +100,17 @@ def test_the_guarantee_is_proved_by_both_checkers_and_survives_its_file(tmp_path
     assert any("never exceeds 1.979e-06 m/s" in line for line in result.statement)
 
 
+@pytest.mark.parametrize("half", ["0.02", "1/3", "1e-9", "1e-20"])
+def test_the_ranges_that_are_said_lie_inside_those_that_are_proved(half):
+    one = task(half)
+    said = replace(CLAIM, task=one).sentence().split("for all constant ")[1].split(": ")[0]
+    for text, axis in zip(said.split(", "), ("direct_effect", "evolution_effect", "critical_slip"), strict=True):
+        low, high = one.ranges[axis]
+        left, right = map(F, text.split(" from ")[1].split(" to "))
+        assert low <= left < right <= high
+        assert max(left / low, high / right) < 1 + F(1, 10**5)
+
+
 def paired(one, held, given):
     """Bounds of both checkers for one cell."""
     document = json.loads(sliding_text(replace(CLAIM, task=one, held=held, claims=given)))
