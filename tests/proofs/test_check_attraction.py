@@ -3,18 +3,22 @@
 import copy
 import importlib.util
 import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
-from quakedesign.errors import CertificateError
-from quakedesign.sos.exact.attraction_files import load, text
+from quakedesign.errors import CertificateError, PolynomialError
+from quakedesign.sos.exact.attraction import Region
+from quakedesign.sos.exact.attraction_files import load, save_attraction, text
+from quakedesign.sos.exact.proofs import Point
 
 ROOT = Path(__file__).parents[2]
 SPECIFICATION = importlib.util.spec_from_file_location("attraction_check", ROOT / "proofs" / "check.py")
 checker = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(checker)
+checker.beside("attraction")  # loaded before, so that mutants can take its place
 
 ONE = {"product": [], "basis": [[1]], "gram": ["1"]}
 
@@ -49,6 +53,13 @@ def everywhere():
 def refuted(point="1", level="2", V="1"):
     claim = {"format": 1, "kind": "attraction", "variables": ["x"], "field": [{"1": "-1", "3": "1"}], "V": {"2": V}}
     return {**claim, "level": [level] if level else [], "negative": {"point": [point]}}
+
+
+def turning(point=("0", "1"), V="1,0", field=None):
+    """x' = -y, y' = -x and V = x: at (0, 1) V is 0 and falls, and x' alone is not 0."""
+    field = [{"0,1": "-1"}, {"1,0": "-1"}] if field is None else field
+    claim = {"format": 1, "kind": "attraction", "variables": ["x", "y"], "field": field, "V": {V: "1"}}
+    return {**claim, "level": ["1"], "negative": {"point": list(point)}}
 
 
 def by_itself(document):
@@ -119,6 +130,8 @@ def test_a_point_refutes_where_v_does_not_fall_or_is_not_positive():
         refuted("3", ""),
         refuted("1/2", "1", "-1"),
         refuted("2", "1", "-1"),
+        turning(),
+        turning(("-1", "2"), "0,2", [{"1,0": "-1"}, {}]) | {"level": ["5"]},
     ):
         assert decided(document) == "refuted"
 
@@ -139,7 +152,14 @@ def test_a_point_refutes_where_v_does_not_fall_or_is_not_positive():
         refuted() | {"V": {"2": "1", "0": "1"}},
         refuted() | {"field": [{"0": "1"}]},
         refuted() | {"field": []},
-        refuted() | {"level": ["1", "2"]},
+        turning(field=[{"0,0": "1", "0,1": "-1"}, {"1,0": "-1"}]),
+        turning(("0", "0")),
+        turning(("1",)),
+        refuted() | {"level": ["2", "3"]},
+        refuted() | {"format": True},
+        {**everywhere(), "variables": [], "field": [], "V": {}, "multiplier": {}}
+        | {"positive": squares(), "decrease": squares()},
+        cubic() | {"positive": squares({**ONE, "basis": [{"1": "2"}], "gram": ["1/4"]})},
         refuted() | {"kind": "attraction "},
         refuted() | {"format": 2},
         refuted() | cubic(),
@@ -170,7 +190,17 @@ def idle():
     return {**claim, "V": {"2,0": "1", "0,2": "1"}, "multiplier": {"0,0": "1"}, "positive": one, "decrease": falling}
 
 
-@pytest.mark.parametrize("make", [semidefinite, idle])
+def mixed():
+    """V = y² + x²y² vanishes where y does, a product of both states among its squares or not."""
+    field = [{"1,0": "-1"}, {"0,1": "-1"}]
+    square = {"product": [], "basis": [[0, 1], [1, 1]]}
+    claim = {"format": 1, "kind": "attraction", "variables": ["x", "y"], "field": field, "level": []}
+    proof = {part: squares({**square, "gram": gram})
+             for part, gram in (("positive", ["1", "0", "1"]), ("decrease", ["2", "0", "4"]))}  # fmt: skip
+    return {**claim, "V": {"0,2": "1", "2,2": "1"}, "multiplier": {"0,0": "1"}, **proof}
+
+
+@pytest.mark.parametrize("make", [semidefinite, idle, mixed])
 def test_squares_that_vanish_elsewhere_prove_nothing(make):
     assert decided(make()) == "refused"
 
@@ -186,4 +216,32 @@ def test_the_statement_is_printed():
     assert lines[-1].startswith("conclusion: every solution that starts where V < level remains there and tends to")
     assert "from everywhere" in checker.check(json.dumps(everywhere())).statement[-1]
     assert "no other V helps" in checker.check(json.dumps(refuted())).statement[-1]
-    assert "no other V helps" not in checker.check(json.dumps(refuted("2", "5"))).statement[-1]
+    for document in (refuted("2", "5"), turning()):
+        assert "no other V helps" not in checker.check(json.dumps(document)).statement[-1]
+    documents = (refuted(), refuted("2", "5"), turning(), cubic())
+    assert [load(json.dumps(document)).equilibrium for document in documents] == [True, False, False, False]
+
+
+def test_a_claim_of_another_size_decides_nothing():
+    claim = load(json.dumps(turning()))
+    with pytest.raises(PolynomialError, match="needs 2 polynomials"):
+        replace(claim, field=claim.field[:1])
+    assert not replace(claim, proof=Point(coordinates=(Fraction(1),))).check()
+
+
+def test_only_a_proof_that_can_be_read_again_is_saved(tmp_path):
+    claim = load(json.dumps(cubic()))
+    with pytest.raises(CertificateError, match="only a proof"):
+        save_attraction(replace(claim, proof=None), tmp_path / "file.json")
+    with pytest.raises(CertificateError, match="variables must be names"):
+        save_attraction(replace(claim, variables=("x y",)), tmp_path / "file.json")
+    assert not (tmp_path / "file.json").exists()
+
+
+def test_a_region_is_what_its_claims_say():
+    proof, point = load(json.dumps(everywhere())), load(json.dumps(refuted("3", "")))
+    found = [Region.of(claim) for claim in (proof, point, replace(proof, proof=None))]
+    assert [one.verdict for one in found] == ["proved", "refuted", "undecided"]
+    assert [bool(one.remark) for one in found] == [False, False, True]
+    above = load(json.dumps(refuted()))
+    assert Region(proved=None, refuted=above).verdict == "undecided"

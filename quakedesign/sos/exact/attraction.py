@@ -190,7 +190,7 @@ def _pure(exponents: Exponents) -> int | None:
 def along(field: Sequence[Polynomial], function: Polynomial) -> dict[Exponents, Fraction]:
     """Derivative of a function along a field."""
     slopes = [_partial(function, i) for i in range(len(field))]
-    parts = (product(len(field), (slope, f)) for slope, f in zip(slopes, field, strict=True) if slope and f)
+    parts = (product(len(field), (slope, f)) for slope, f in zip(slopes, field, strict=True))
     return combination((Fraction(1), part) for part in parts)
 
 
