@@ -93,7 +93,7 @@ def test_all_figures_of_the_laboratory_fault(tmp_path):
     command = [sys.executable, "-m", "quakedesign", "figures", "lab-fault", "--json"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stderr
-    found, folder = json.loads(done.stdout), tmp_path / "quakedesign-lab-fault"
+    found, folder = json.loads(done.stdout), tmp_path / "quakedesign-lab-fault-figures"
     assert all((folder / drawn["file"]).stat().st_size > 20_000 for drawn in found["figures"].values())
     with open(folder / "numbers.csv", newline="") as stream:
         rows = {row["run"]: row for row in csv.DictReader(stream)}
