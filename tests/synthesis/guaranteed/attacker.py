@@ -1,8 +1,8 @@
 """A simulator of a held loop that knows numbers only, and courses made to hurt it. NumPy; nothing of the package.
 
 The plant e1′ = e2, e2′ = s·e1 − w·e2 + β·b·p + φ is integrated by RK4 in small steps, many courses at once. The law is
-p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later; y = (e1, e2), or (e1, e2, w) with w by a rule, of
-the errors as they are measured.
+p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later, spreading through a layer of rock where there is
+one; y = (e1, e2), or (e1, e2, w) with w by a rule, of the errors as they are measured.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,8 @@ import numpy as np
 class Held:
     """Numbers of a loop: matrices of the law, b, ranges of s, w and β, T_s, delay, bounds of φ and noise, all in SI.
 
-    For a friction of the slip alone: how much β changes per slip at most, and the reference's rate.
+    For a friction of the slip alone: how much β changes per slip at most, and the reference's rate. The rock's L²/D is
+    zero where the well is at the fault.
     """
 
     F: np.ndarray
@@ -32,6 +33,18 @@ class Held:
     noise: tuple = (0.0, 0.0)
     slope: float = 0.0
     pace: float = 0.0
+    rock: float = 0.0
+
+
+def spreading(rock, modes=40):
+    """Rates and shares of the modes of ∂p/∂t = D ∂²p/∂x² with p held at x = 0 and a fault at x = L that nothing passes.
+
+    The step response 1 − Σ cₙ exp(−λₙt); what the modes left out would add is there at once.
+    """
+    odd = 2 * np.arange(modes) + 1
+    shares = 4 / np.pi * (-1.0) ** np.arange(modes) / odd
+    shares[-1] += 1 - shares.sum()
+    return (odd * np.pi / 2) ** 2 / rock, shares
 
 
 def middle(ends):
@@ -48,6 +61,8 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None)
     size, h = len(held.C), held.step / pieces
     late = round(held.delay / h)
     e, z, v = np.zeros((2, courses)), np.zeros((size, courses)), np.zeros(courses)
+    rates, shares = spreading(held.rock) if held.rock else (np.array([np.inf]), np.ones(1))
+    fade, spread = np.exp(-rates * h / 2)[:, None], np.zeros((len(shares), courses))
     waiting, largest = [], np.zeros((2, courses))
     for k in range(periods * pieces):
         if k % pieces == 0:
@@ -59,15 +74,19 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None)
             v = waiting.pop(0)[1]
         if kick is not None:
             e[1] += kick(k)
-        s, w, beta, phi = choose(k, e, v)
+        halfway = v + (spread - v) * fade
+        after = v + (halfway - v) * fade
+        first, second, third = (shares @ part for part in (spread if held.rock else halfway, halfway, after))
+        spread = after
+        s, w, beta, phi = choose(k, e, first)
 
-        def rate(x, s=s, w=w, beta=beta, phi=phi, v=v):
-            return np.array([x[1], s * x[0] - w * x[1] + beta * v + phi])
+        def rate(x, p, s=s, w=w, beta=beta, phi=phi):
+            return np.array([x[1], s * x[0] - w * x[1] + beta * p + phi])
 
-        k1 = rate(e)
-        k2 = rate(e + h / 2 * k1)
-        k3 = rate(e + h / 2 * k2)
-        before, e = e, e + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(e + h * k3))
+        k1 = rate(e, first)
+        k2 = rate(e + h / 2 * k1, second)
+        k3 = rate(e + h / 2 * k2, second)
+        before, e = e, e + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(e + h * k3, third))
         if back is not None:  # a step that ends stuck: the slip rate falls evenly, none of it is backward
             e[0] = np.where(e[1] < -back, before[0] + h / 2 * (before[1] - back), e[0])
             e[1] = np.maximum(e[1], -back)
@@ -154,3 +173,16 @@ def switching(held, courses, count, seed):
         )
 
     return choose
+
+
+def drifting(held, change, pieces, choose):
+    """The same with a disturbance that goes to the end that `choose` wants no faster than `change` [m/s³]."""
+    now = [0.0]
+
+    def slow(k, e, v):
+        s, w, beta, phi = choose(k, e, v)
+        most = change * held.step / pieces
+        now[0] = now[0] + np.clip(phi - now[0], -most, most)
+        return s, w, beta, now[0]
+
+    return slow
