@@ -174,12 +174,12 @@ def loop_of(
         law=law,
         gains=dict(gains),
         constants=dict(constants or {}),
-        states=terms.states,
+        states=dict(terms.states),
         domain=terms.domain,
         uncertain=dict(uncertain),
-        field=terms.field,
+        field=dict(terms.field),
         roots={root: (of, root_enclosure(values[of])) for root, of in terms.roots.items()},
-        lifts=terms.lifts,
+        lifts=dict(terms.lifts),
     )
 
 

@@ -3,6 +3,8 @@
 import re
 from decimal import Decimal
 from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import UnitError
@@ -54,6 +56,22 @@ def _number_and_unit(quantity: str, received: str) -> tuple[Decimal | None, str]
 
 
 @cache
+def _words_of_units() -> frozenset[str]:
+    """Every word of the definitions that come with pint, names of units and prefixes among them; none if not found."""
+    spec = find_spec("pint")
+    files = Path(spec.origin).parent.glob("*_en.txt") if spec and spec.origin else ()
+    texts = (re.sub("#.*", "", file.read_text(encoding="utf-8")) for file in files)
+    return frozenset(word for text in texts for word in re.findall(r"[^\W\d]\w*", text))
+
+
+def _is_no_unit(written: str) -> bool:
+    """Whether a word is none that pint can know, a name, one after a prefix, or its plural: told without loading it."""
+    known, singular = _words_of_units(), written.removesuffix("s")
+    ends = {end[i:] for end in (written, singular) for i in range(len(end)) if not i or end[:i] in known}
+    return bool(known) and written.isascii() and written.isalpha() and known.isdisjoint(ends)
+
+
+@cache
 def _registry() -> Any:
     import pint
 
@@ -92,9 +110,11 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
         return _plain_number(quantity, unit, received)
     if len(quantity) > 100:
         raise UnitError(f"{name} must be {wanted}. Received a text of {len(quantity)} characters.")
+    number, written = _number_and_unit(quantity, received)
+    if number is not None and _is_no_unit(written):
+        raise UnitError(f"{received}, whose unit is unknown. Check its spelling.")
     import pint
 
-    number, written = _number_and_unit(quantity, received)
     try:
         parsed = _registry().Quantity(f"1 {written}") * number if number is not None else _registry().Quantity(written)
         converted = parsed.to(unit or "dimensionless") if not (unit and parsed.unitless) else None

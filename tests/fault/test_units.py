@@ -1,6 +1,8 @@
 """Quantities with units, each wrong one with its own message."""
 
 import math
+import subprocess
+import sys
 
 import pytest
 
@@ -125,3 +127,41 @@ def test_pint_says_the_same_of_usual_units(unit, written, monkeypatch):
     usual = [si_value(text, unit, "it") for text in texts]
     monkeypatch.setattr(units, "_PLAIN", {})
     assert list(map(repr, usual)) == [repr(si_value(text, unit, "it")) for text in texts]
+
+
+def test_every_unit_that_pint_knows_may_be_one():
+    known = units._registry()
+    names = [name for name in known._units if name.isascii() and name.isalpha()]
+    prefixes = [name for name in known._prefixes if name.isascii() and name.isalpha()]
+    assert len(names) > 400
+    assert len(prefixes) > 40
+    assert not [name for name in names if units._is_no_unit(name) or units._is_no_unit(f"{name}s")]
+    assert not [name for name in prefixes if units._is_no_unit(f"{name}m") or units._is_no_unit(f"{name}pascals")]
+
+
+@pytest.mark.parametrize("word", ["x", "GPaa", "kpa", "secnds", "metters", "xs"])
+def test_what_is_no_unit_is_told_as_pint_tells_it(word, monkeypatch):
+    assert units._is_no_unit(word)
+    said = []
+    for words in (units._words_of_units, frozenset):
+        monkeypatch.setattr(units, "_words_of_units", words)
+        with pytest.raises(UnitError) as raised:
+            si_value(f"3{word}", "s", "step")
+        said.append(str(raised.value))
+    assert said[0] == said[1]
+    assert "whose unit is unknown" in said[0]
+
+
+FRESH = """
+import sys
+from quakedesign.fault.units import si_value
+try:
+    si_value("3x", "s", "step")
+except ValueError:
+    print("pint" in sys.modules)
+"""
+
+
+def test_a_unit_that_is_none_is_refused_without_waiting_for_pint():
+    said = subprocess.run([sys.executable, "-c", FRESH], capture_output=True, text=True, check=True)
+    assert said.stdout == "False\n"
