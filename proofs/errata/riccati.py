@@ -11,8 +11,8 @@ from scipy.linalg import expm
 from scipy.optimize import minimize_scalar
 
 from quakedesign import load_fault
-from quakedesign.certificates.linear_premises import effective_stress
 from quakedesign.certificates.premises import least_authority
+from quakedesign.certificates.sectors import effective_stress
 from quakedesign.controllers import Signals, control_law
 from quakedesign.studies.errata import Finding, Row
 from quakedesign.symbolic import plant

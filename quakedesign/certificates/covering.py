@@ -4,7 +4,6 @@ from fractions import Fraction
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.certificate import Certificate
-from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.meaning import require_degree_of_slip
 from quakedesign.certificates.premises import (
     Errors,
@@ -13,6 +12,7 @@ from quakedesign.certificates.premises import (
     largest_matched_rate,
     least_authority,
 )
+from quakedesign.certificates.sectors import sectors
 from quakedesign.errors import CertificateError
 from quakedesign.fault import Fault
 

@@ -6,8 +6,8 @@ from typing import Any
 
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee
-from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import Variant
+from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import Controller, published
 from quakedesign.fault import Fault, require_fault
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate, simulation_scheme

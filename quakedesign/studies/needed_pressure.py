@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from quakedesign.bounds import Enclosure
-from quakedesign.certificates.linear_premises import equilibrium_pressure
+from quakedesign.certificates.sectors import equilibrium_pressure
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational

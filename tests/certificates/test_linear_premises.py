@@ -10,13 +10,7 @@ import sympy as sp
 
 import quakedesign as qd
 from quakedesign.certificates import Certificate, Loop
-from quakedesign.certificates.linear_premises import (
-    effective_stress,
-    equilibrium_pressure,
-    linear_premises,
-    rest_pressure,
-    sectors,
-)
+from quakedesign.certificates.linear_premises import linear_premises
 from quakedesign.certificates.matched import (
     Errors,
     initial_perturbation,
@@ -26,6 +20,7 @@ from quakedesign.certificates.matched import (
     least_authority,
     static_friction,
 )
+from quakedesign.certificates.sectors import effective_stress, equilibrium_pressure, rest_pressure, sectors
 from quakedesign.controllers import published
 from quakedesign.controllers.elqr import PressureLimits
 from quakedesign.errors import ParameterError

@@ -9,7 +9,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.certificates.claim import Equilibrium
-from quakedesign.certificates.linear_premises import effective_stress, linear_premises, sectors
+from quakedesign.certificates.linear_premises import linear_premises
 from quakedesign.certificates.premises import (
     Errors,
     LevelSets,
@@ -24,6 +24,7 @@ from quakedesign.certificates.premises import (
     matched_rate_premise,
     sliding_mode_premises,
 )
+from quakedesign.certificates.sectors import effective_stress, sectors
 from quakedesign.controllers import control_law, published
 from quakedesign.controllers.feed_forward import FEED_FORWARDS, feed_forward
 from quakedesign.errors import CertificateError

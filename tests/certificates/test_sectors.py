@@ -8,8 +8,9 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.certificates import Certificate, Loop
-from quakedesign.certificates.linear_premises import effective_stress, linear_premises, sectors
+from quakedesign.certificates.linear_premises import linear_premises
 from quakedesign.certificates.premise import Premise
+from quakedesign.certificates.sectors import effective_stress, sectors
 from quakedesign.controllers import published
 from quakedesign.errors import CertificateError
 from quakedesign.fault import Disturbance

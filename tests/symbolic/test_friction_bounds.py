@@ -282,8 +282,8 @@ def test_strengthening_is_seen():
 
 def test_every_proof_asks_for_confirmed_bounds():
     """Premises, sectors, margins, feed-forward: a declared slope that is too small by a thousand stops each of them."""
-    from quakedesign.certificates.linear_premises import sectors
     from quakedesign.certificates.premises import friction_range
+    from quakedesign.certificates.sectors import sectors
     from quakedesign.controllers.feed_forward import feed_forward
     from quakedesign.synthesis import design
 

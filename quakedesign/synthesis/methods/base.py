@@ -11,8 +11,9 @@ import sympy as sp
 from quakedesign.certificates import Certificate, Verdict
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee, Task
 from quakedesign.certificates.guarantee.statement import Around
-from quakedesign.certificates.linear_premises import linear_premises, sectors
+from quakedesign.certificates.linear_premises import linear_premises
 from quakedesign.certificates.premises import Domain, Premise, Variant
+from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import Controller, Signals, control_laws
 from quakedesign.controllers.feed_forward import NONE, FeedForward
 from quakedesign.discovery import discovered

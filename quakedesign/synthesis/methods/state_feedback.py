@@ -13,7 +13,7 @@ from quakedesign.certificates.guarantee import (
     task_of,
 )
 from quakedesign.certificates.guarantee.statement import Around
-from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.controllers.feed_forward import NONE
 from quakedesign.errors import ParameterError

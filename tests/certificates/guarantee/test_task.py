@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.certificates import matched
 from quakedesign.certificates.guarantee import task_of
-from quakedesign.certificates.linear_premises import rest_pressure, sectors
+from quakedesign.certificates.sectors import rest_pressure, sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
 from quakedesign.fault.friction import friction_law

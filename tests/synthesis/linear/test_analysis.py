@@ -7,7 +7,7 @@ import numpy as np
 
 import quakedesign as qd
 from quakedesign.certificates import Verdict
-from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import published
 from quakedesign.synthesis.linear.analysis.robust_stability import analysis, unstable_vertex, why_undecided
 from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
-from quakedesign.certificates.linear_premises import rest_pressure, sectors
+from quakedesign.certificates.sectors import rest_pressure, sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
 from quakedesign.synthesis.linear.plant.uncertainty_bounds import uncertainty_bounds

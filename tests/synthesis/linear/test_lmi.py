@@ -11,7 +11,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.certificates import Verdict
-from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.analysis.common_quadratic import (

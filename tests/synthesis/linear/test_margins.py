@@ -8,7 +8,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.certificates import Verdict
-from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import published
 from quakedesign.synthesis.linear.analysis.common_quadratic import sector_loop
 from quakedesign.synthesis.linear.analysis.frequency import slip_limit, stable_quartic

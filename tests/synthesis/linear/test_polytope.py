@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import quakedesign as qd
-from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import Signals, published
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic import plant

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.linalg import eigh
 
 from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
-from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.certificates.obligations import Obligation, claimed, different
+from quakedesign.certificates.sectors import Sectors
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import CertificateError, ParameterError, WorkError
 from quakedesign.rationals import rational

@@ -7,8 +7,8 @@ from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Certificate, Loop
-from quakedesign.certificates.linear_premises import sectors
 from quakedesign.certificates.premises import plant_ranges
+from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, nearest, rational

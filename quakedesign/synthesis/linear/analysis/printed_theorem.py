@@ -13,8 +13,8 @@ from typing import Any
 from flint import arb, arb_mat, fmpq
 from scipy.optimize import minimize_scalar
 
-from quakedesign.certificates.linear_premises import Sectors
 from quakedesign.certificates.premises import least_authority, plant_ranges
+from quakedesign.certificates.sectors import Sectors
 from quakedesign.fault import Fault, load_fault
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant

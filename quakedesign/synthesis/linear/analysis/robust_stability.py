@@ -5,7 +5,7 @@ from typing import Any
 
 from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Certificate, Verdict
-from quakedesign.certificates.linear_premises import sectors
+from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, sector_loop

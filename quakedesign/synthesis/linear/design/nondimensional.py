@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from quakedesign.certificates.linear_premises import Sectors
+from quakedesign.certificates.sectors import Sectors
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.design.algebraic_riccati import METHOD
 from quakedesign.synthesis.linear.design.specifications import Specifications, Weights

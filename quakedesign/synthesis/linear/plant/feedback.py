@@ -14,7 +14,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from quakedesign.certificates.linear_premises import rest_pressure
+from quakedesign.certificates.sectors import rest_pressure
 from quakedesign.controllers.elqr import FEEDBACKS
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational

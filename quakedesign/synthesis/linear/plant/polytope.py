@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from quakedesign.certificates import Loop
-from quakedesign.certificates.linear_premises import Sectors
+from quakedesign.certificates.sectors import Sectors
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic.terms import value
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import product
 
-from quakedesign.certificates.linear_premises import Sectors, sectors
+from quakedesign.certificates.sectors import Sectors, sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, rational

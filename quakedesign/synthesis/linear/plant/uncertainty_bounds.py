@@ -5,8 +5,8 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates.linear_premises import Sectors, rest_pressure, sectors
 from quakedesign.certificates.premises import least_authority, plant_ranges
+from quakedesign.certificates.sectors import Sectors, rest_pressure, sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import float_above, float_below, fraction_of, rational

@@ -1,0 +1,208 @@
+"""Sectors and pressures of a fault about any constant reference, over its uncertainty box (ERRATA 6 to 12)."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, lru_cache
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.certificates.matched import (
+    Range,
+    coefficient_range,
+    friction_range,
+    least_authority,
+    plant_ranges,
+    static_friction,
+)
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.rationals import fraction_of, rational, to_sympy
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.balls import enclose, upper_bound
+from quakedesign.symbolic.friction_bounds import friction_bounds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sectors:
+    """Chords of everything that depends on the state, about the equilibrium of any constant reference.
+
+    x2' = s·x1 − w·x2 + β·b·p with all three anywhere in their ranges, at every time.
+
+    Attributes
+    ----------
+    authority : Fraction
+        b = μ_res·N̂_min [m²/kg] (ERRATA 9).
+    beta : (Fraction, Fraction)
+        Range of μN̂/b [-].
+    slip : (Fraction, Fraction)
+        Range of s [1/s²]: friction's weakening (and strengthening, unless the law only weakens), spring, growth of the
+        disturbance.
+    rate : (Fraction, Fraction)
+        Range of w [1/s]: damping, friction's slope in slip rate (ERRATA 10), growth of the disturbance.
+    row_bounds : (Fraction, Fraction)
+        g1 [Pa/m] and g2 [Pa·s/m] with |h| ≤ g1|x1| + g2|x2| about the nominal k̂, η̂ (ERRATA 6, 7).
+    largest_effective_stress : Fraction
+        max |σ' − p*| [Pa] over the constant references up to the target slip (ERRATA 8).
+    """
+
+    authority: Fraction
+    beta: Range
+    slip: Range
+    rate: Range
+    row_bounds: Range
+    largest_effective_stress: Fraction
+
+    def ranges(self) -> dict[str, Range]:
+        """Ranges by the names of the e-LQR's loop field."""
+        return {"beta": self.beta, "s": self.slip, "w": self.rate}
+
+
+def sectors(fault: Fault) -> Sectors:
+    """Sector bounds of a fault over its uncertainty box, exact or rounded outwards."""
+    ranges, b = plant_ranges(fault), least_authority(fault)
+    friction, disturbance = friction_bounds(fault.friction), fault.disturbance
+    stress, positive = effective_stress(fault)
+    load = ranges[plant.N_hat][1] * stress
+    slip_chord = load * friction.slip_slope
+    rate_chord = load * friction.rate_slope
+    slip_growth, rate_growth = (rational(g) for g in (disturbance.slip_growth, disturbance.rate_growth))
+    k, eta = ranges[plant.k_hat], ranges[plant.eta_hat]
+    one_sided = positive and friction.weakens
+    slip = ((Fraction(0) if one_sided else -slip_chord) - k[1] + slip_growth, slip_chord - k[0] + slip_growth)
+    rate = (eta[0] - rate_chord - rate_growth, eta[1] + rate_chord - rate_growth)
+    nominal = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
+    return Sectors(
+        authority=b,
+        beta=coefficient_range(fault, b),
+        slip=slip,
+        rate=rate,
+        row_bounds=(
+            max(abs(s + nominal[plant.k_hat]) for s in slip) / b,
+            max(abs(w - nominal[plant.eta_hat]) for w in rate) / b,
+        ),
+        largest_effective_stress=stress,
+    )
+
+
+def effective_stress(fault: Fault) -> tuple[Fraction, bool]:
+    """Rigorous bound on |σ' − p*(r0)| [Pa] for 0 ≤ r0 ≤ target slip, and whether σ' − p* stays positive.
+
+    p* balances friction, spring and the disturbance's growth at rest at r0 (ERRATA 8); friction there is anything that
+    the box allows.
+    """
+    ranges, start = plant_ranges(fault), to_sympy(static_friction(fault))
+    known = {_growth: to_sympy(rational(fault.disturbance.slip_growth)), _drift: 0, plant.mu_star: start}
+    numerator = sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r)
+    target = rational(fault.reference.target_slip)
+    least = sp.Max(
+        to_sympy(friction_range(fault)[0]), start - to_sympy(friction_bounds(fault.friction).slip_slope) * _r
+    )
+    box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)} | {_r: (Fraction(0), target)}
+    stress = upper_bound(numerator / least, box, pieces=400)
+    lowest = numerator.subs(_r, to_sympy(target)).subs(
+        {
+            plant.k_hat: to_sympy(box[plant.k_hat][1]),
+            plant.N_hat: to_sympy(box[plant.N_hat][0]),
+            plant.sigma: to_sympy(box[plant.sigma][0]),
+        }
+    )
+    return stress, bool(lowest > 0)
+
+
+def rest_pressure(
+    fault: Fault, slip: Range, *, nominal: bool = False, drift: Fraction = Fraction(0), pieces: int = 64
+) -> Range:
+    """Rigorous enclosure of the pressure p* [Pa] that holds the fault at rest at a constant reference (ERRATA 8).
+
+    Ball arithmetic on pieces of the range of references.
+
+    Parameters
+    ----------
+    fault : Fault
+    slip : (Fraction, Fraction)
+        Range of the reference r0 [m], not negative.
+    nominal : bool
+        The fault's own friction law and parameters; without, any friction and any parameters of the box.
+    drift : Fraction
+        Largest k̂v∞t [m/s²].
+    pieces : int
+        Into which the range is cut.
+
+    Raises
+    ------
+    ParameterError
+        When no finite enclosure is found.
+    """
+    expression, box = _rest(fault, nominal)
+    box = box | {_drift: (Fraction(0), drift)}
+    step, ends = (slip[1] - slip[0]) / pieces, list[Fraction]()
+    for n in range(pieces if step else 1):
+        part = (slip[0] + n * step, slip[0] + (n + 1) * step)
+        pressures = enclose(expression, box | {_r: part, _mu: _friction_at(fault, part)})
+        if not pressures.is_finite():
+            raise ParameterError("no finite pressure at rest was found. Positive friction is expected. Narrow the box.")
+        ends += [_end(pressures.lower()), _end(pressures.upper())]
+    return min(ends), max(ends)
+
+
+@lru_cache(maxsize=64)
+def equilibrium_pressure(fault: Fault, slip: Fraction) -> Range:
+    """Rigorous range of the pressure [Pa] that holds the nominal fault at rest at references from 0 to a slip [m].
+
+    Without the part of the disturbance that depends on time alone. Each end is within 1e-4 of the range of what is
+    attained.
+
+    Raises
+    ------
+    ParameterError
+        When no finite enclosure is found.
+    """
+    box = {_r: (Fraction(0), slip)}
+    expression = _rest(fault, nominal=True)[0].subs(_drift, 0)
+    low, high = rest_pressure(fault, box[_r], nominal=True)
+    above = upper_bound(expression - to_sympy(low), box, tolerance=_FINE)
+    below = upper_bound(to_sympy(high) - expression, box, tolerance=_FINE)
+    return high - below, low + above
+
+
+_FINE = Fraction(1, 10**4)
+_r = sp.Symbol("r_0", nonnegative=True)
+_mu = sp.Symbol("mu", positive=True)
+_growth = sp.Symbol("phi_1", real=True)
+_drift = sp.Symbol("drift", nonnegative=True)
+
+
+@cache
+def _net_stress() -> sp.Expr:
+    """σ' − p* at rest at r0 with friction μ, a disturbance that grows with slip, and a drift k̂v∞t."""
+    balance = plant.shifted_acceleration().replace(plant.disturbance, lambda x, *_: _growth * x + _drift)
+    balance = balance.replace(plant.mu, lambda *_: _mu).subs({plant.x1: _r, plant.x2: 0})
+    balance = sp.expand(balance)  # linear in p
+    return sp.expand(plant.sigma + balance.coeff(plant.p, 0) / balance.coeff(plant.p))
+
+
+def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]:
+    """p* in symbols, written so that few of them repeat, and their ranges."""
+    known = {
+        _growth: to_sympy(rational(fault.disturbance.slip_growth)),
+        plant.mu_star: to_sympy(static_friction(fault)),
+    }
+    expression = plant.sigma - sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r) / _mu  # μ once
+    ranges = plant_ranges(fault)
+    if not nominal:
+        return expression, {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)}
+    law = fault.friction.exact()
+    return expression.subs(plant.plant_values(fault)).subs(_mu, law.coefficient(_r, sp.Integer(0))), {}
+
+
+def _friction_at(fault: Fault, slip: Range) -> Range:
+    """Friction at rest at a slip, anywhere between its bounds and its slope bound from the static value."""
+    friction, start = friction_bounds(fault.friction), static_friction(fault)
+    most = friction.slip_slope * slip[1]
+    return max(friction.least, start - most), min(friction.most, start + most)
+
+
+def _end(end: Any) -> Fraction:
+    exact = end.fmpq()
+    return fraction_of(exact)
