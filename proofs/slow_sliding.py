@@ -88,17 +88,17 @@ def read_fault(document: dict[str, Any]) -> Fault:
 
 def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
     """Cut the box: a cut, then all of its lower part, then all of its upper part; an empty list for no cut."""
-    need(type(value) is list and 0 < len(value) < 2 * MAX_CELLS, f"there must be 1 to {MAX_CELLS} cells")
+    need(type(value) is list and len(value) < 2 * MAX_CELLS, f"there must be 1 to {MAX_CELLS} cells")
     open_boxes, cells = [box], []
     for entry in value:
         need(bool(open_boxes), "cells must end where every part has been said")
         part = open_boxes.pop()
-        if entry == [] and type(entry) is list:
+        if entry == []:
             cells.append(part)
             continue
         need(type(entry) is list and len(entry) == 2, "a cut must be a constant and a number")
         name, at = entry[0], number(entry[1], "a cut")
-        need(type(name) is str and name in CONSTANTS, f"a cut must be across one of {', '.join(CONSTANTS)}")
+        need(name in CONSTANTS, f"a cut must be across one of {', '.join(CONSTANTS)}")
         low, high = part[name]
         need(low < at < high, "a cut must lie inside its box")
         open_boxes += [part | {name: (at, high)}, part | {name: (low, at)}]
@@ -110,14 +110,13 @@ def read_path(value: Any) -> tuple[Loop, Path, int]:
     """The loop of a guarantee with the pressure's path alone, and where the valve's pressure is among its states."""
     given = keys(value, "loop", *PATH, *LAW)
     path = Path(*(number(given[name], name) for name in ("lag", "diffusion", "slip_noise")))
-    need(path.noise >= 0, "slip_noise must be >= 0")
     need(path.lag > 0 or path.diffusion > 0, "the pressure must reach the fault through a lag or rock")
     measured = given["measured"]
     need(type(measured) is list, "measured must be a list")
     plain = {name: given[name] for name in ("step", "delay", "lag", "states", "update", "output")}
     plain |= {"measured": [[v, "0"] for v in measured], "feedback": [given["feedback"], "0"]}
     plain |= {"diffusion": given["diffusion"]} if path.diffusion else {}
-    plain |= {"noise": {"slip": given["slip_noise"], "rate": "0"}} if path.noise else {}
+    plain |= {"noise": {"slip": given["slip_noise"], "rate": "0"}}
     still, zero = (Fraction(0), Fraction(0)), Fraction(0)
     one = Fraction(1)
     nothing = Task("", one, still, still, (one, one), still, zero, zero, zero, True, zero, zero, zero, None, zero, True)
