@@ -72,9 +72,14 @@ class Cluster(Given):
     def __init__(self, address: str) -> None:
         try:
             from distributed import Client
-
+        except ImportError:
+            raise SimulationError(
+                f"a scheduler needs dask.distributed. Received {address!r}, and it is not installed. "
+                "Install it with pip install 'dask[distributed]', or leave the scheduler out."
+            ) from None
+        try:
             self._client = Client(address, timeout=_PATIENCE, set_as_default=False)
-        except (ImportError, OSError, ValueError) as error:
+        except (OSError, ValueError) as error:
             said = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise SimulationError(
                 f"a scheduler must answer at {address!r}. {said}. Start one with 'dask scheduler', or leave it out."

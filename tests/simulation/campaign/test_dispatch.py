@@ -1,5 +1,6 @@
 """Deaths and errors of workers: who is charged, and what is kept."""
 
+import sys
 from concurrent.futures import BrokenExecutor, CancelledError, Future
 
 import pytest
@@ -133,4 +134,12 @@ def test_a_scheduler_that_does_not_answer(monkeypatch):
 
     monkeypatch.setattr(crews, "_PATIENCE", "100ms")
     with pytest.raises(SimulationError, match="a scheduler must answer"):
+        crews.Cluster("tcp://127.0.0.1:9")
+
+
+def test_a_scheduler_without_dask_says_how_to_get_it(monkeypatch):
+    from quakedesign.simulation.campaign import crews
+
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(SimulationError, match=r"not installed\. Install it with pip install 'dask\[distributed\]'"):
         crews.Cluster("tcp://127.0.0.1:9")
