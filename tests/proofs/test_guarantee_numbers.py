@@ -657,3 +657,16 @@ def test_a_small_gain_that_is_not_below_one_is_named(gain, said):
             checker.of_class(task, loop, found)
     else:
         assert checker.of_class(task, loop, found)[0] == [999, 0, 0]
+
+
+def test_of_a_disturbance_of_bounded_rate_what_the_gains_range_leaves_counts():
+    """β ∈ [1, 3] may jump: (1 − β/2)φ stays in a, half of 6 m/s², p* is shifted by φ/2, and w has another range."""
+    zero, one = F(0), F(1)
+    task = checker.Task(
+        name="a", b=one, s=(zero, zero), w=(zero, F(8)), beta=(one, F(3)), rest=(zero, zero), reference_rate=zero,
+        reference_acceleration=zero, reference_jerk=zero, smooth=True, reference_force=zero, drift=zero, amplitude=F(6),
+        change=zero, slope_of_beta=zero, steady_beta=False,
+    )  # fmt: skip
+    loop = checker.Loop([], [([], one)], [], [[], []], None, one)
+    found = [[[one], [zero], [zero]], [[zero], [zero], [zero]]]
+    assert checker.of_class(task, loop, found)[0] == [3, 0, 3]

@@ -98,12 +98,24 @@ def test_both_refuse_what_is_no_slow_gain(path, value):
         parse_guarantee(json.dumps(raw))
 
 
-def test_sixteen_parts_are_read_by_both():
+@pytest.mark.parametrize("friction", [{"rate_slope": "1/1000000000"}, {}])
+def test_a_gain_that_may_jump_or_acts_at_once_is_not_slow_whatever_is_claimed(friction):
     raw = document()
-    raw["slow_gain"]["parts"] = 16
-    assert parse_guarantee(json.dumps(raw)).slow_gain.parts == 16
+    raw["fault"]["friction"] |= friction
+    raw["loop"] = raw["loop"] if friction else CONTINUOUS
+    with pytest.raises(checker.Refused, match="slow_gain needs friction of the slip alone and a law of samples"):
+        checker.verify(copy.deepcopy(raw))
+    with pytest.raises(CertificateError, match=r"slow gain needs friction of the slip alone|is for a law of samples"):
+        parse_guarantee(json.dumps(raw))
+
+
+@pytest.mark.parametrize("parts", [1, 16])
+def test_one_to_sixteen_parts_are_read_by_both(parts):
+    raw = document()
+    raw["slow_gain"]["parts"] = parts
+    assert parse_guarantee(json.dumps(raw)).slow_gain.parts == parts
     task = checker.read_task(raw)
-    assert checker.read_slow(raw["slow_gain"], task, checker.read_loop(raw["loop"], task)).parts == 16
+    assert checker.read_slow(raw["slow_gain"], task, checker.read_loop(raw["loop"], task)).parts == parts
 
 
 def test_the_spread_is_half_a_part_and_what_slip_and_reference_add():
