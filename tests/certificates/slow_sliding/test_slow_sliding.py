@@ -194,6 +194,56 @@ def test_both_checkers_state_the_same_loop_exactly(path):
     assert [moved[name] for name in OUTPUTS[:3]] == cell.soon(F(3))
 
 
+@pytest.mark.parametrize("path", [*PATHS, {"diffusion": F(40), "delay": F(20), "slip_noise": F(1, 10**7)}])
+def test_both_checkers_make_the_same_of_gains(path, monkeypatch):
+    """Exactly, of gains that are made up: what adds at once, what a step does, small gain and bounds."""
+    one, held = task(ranges=UNSURE, ramp=F(14)), Held(law=STIFF, step=F(200), **path)
+    ours = theorem.loop_of(held, theorem.model_of(one, claims()), one)
+    phases, names = theorem.after_a_step(ours), (*ours.inputs, *held.noise, *ours.fading)
+
+    def gain(output, name, j):
+        return F(1 + (7 * OUTPUTS.index(output) + 3 * names.index(name) + 5 * j) % 11, 10**9)
+
+    made_up = {(y, n): tuple(gain(y, n, j) for j in range(len(phases))) for y in ours.outputs for n in names}
+    asked = []
+
+    def gains(_loop, _entry, sudden, fade=None):
+        name = names[len(asked)]
+        asked.append((name, sudden, fade is not None))
+        return [list(made_up[output, name]) for output in OUTPUTS[: len(ours.outputs)]]
+
+    monkeypatch.setattr(standalone, "gains", gains)
+    plain, _, valve = standalone.read_path(json.loads(sliding_text(replace(CLAIM, held=held)))["loop"])
+    theirs, small = standalone.bounds(plain, alone(one, held), valve)
+    found = theorem.bounds_from(one, held, claims(), ours, made_up, phases)
+    assert {name: found[name] for name in theirs} == theirs
+    assert small <= found["small_gain"] <= small * (1 + F(1, 10**5))
+    assert asked == [(name, name in held.noise, name in ours.fading) for name in names]
+
+
+def test_what_adds_at_once_and_after_a_step_is_that_of_the_format():
+    """Through rock, with gains of 0: y, g and f have what the stress and a step add, that of the last part at first."""
+    one, held = task(ranges=UNSURE), Held(law=STIFF, step=F(200), diffusion=F(40))
+    model = theorem.model_of(one, claims())
+    loop = theorem.loop_of(held, model, one)
+    phases, late, fading = theorem.after_a_step(loop), theorem.settled(loop), loop.fading["left_out"]
+    weights = [
+        float(fading.height) / sum((float(fading.rate * t)) ** k / math.factorial(k) for k in range(5))
+        + float(fading.floor)
+        for t in phases
+    ]
+    assert late == next(t for t, w in zip(phases, weights, strict=True) if w <= 1 / 16)
+    assert 0 < phases.index(late) < len(phases) - 1
+    still = {(y, n): (F(0),) * len(phases) for y in loop.outputs for n in (*loop.inputs, "left_out")}
+    found = theorem._once_settled(theorem._with_what_adds_at_once(loop, model, still, phases), phases, late)
+    for output, share in (("log_rate", 1), ("ageing", model.slope), ("strength", model.direct)):
+        stress = float(share / model.strength)
+        assert [float(v) for v in found[output, "stress"]] == pytest.approx([stress] * len(phases))
+        fades = [weights[-1] if t < late else w for t, w in zip(phases, weights, strict=True)]
+        assert [float(v) for v in found[output, "left_out"]] == pytest.approx([0.55 * stress * w for w in fades])
+    assert not any(any(found[y, n]) for y, n in found if y not in OUTPUTS[:3] or n not in ("stress", "left_out"))
+
+
 def test_what_the_loop_leaves_out_of_the_equations_stays_below_its_shares():
     """Balance of forces and ageing law typed in again, at all corners of constants, states and pressures.
 
