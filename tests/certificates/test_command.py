@@ -1,6 +1,8 @@
 """What a check says beyond the verdict: whom a certificate covers, and in which lines."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
@@ -105,3 +107,20 @@ def test_a_certificate_is_said_in_lines():
     ]
     refuted = replace(small, refutation=Equilibrium(point={"x": F(1, 4)}, parameters={}, weights={}))
     assert statement(refuted) == [*head, "Filippov equilibrium away from the origin, in cell coordinates x: 1/4"]
+
+
+FRESH = """
+import sys
+from pathlib import Path
+from quakedesign.certificates.command import check_files
+for verdict, _ in check_files(map(Path, sys.argv[1:])).values():
+    print(verdict, *({"sympy", "numpy"} & set(sys.modules)))
+"""
+
+
+def test_checking_does_not_wait_for_sympy():
+    names = ("super-twisting_1.5_1.1", "guarantee_real-fault", "motzkin_not-sos")
+    call = [sys.executable, "-c", FRESH, *(str(CERTIFICATES / f"{name}.json") for name in names)]
+    assert subprocess.run(call, capture_output=True, text=True, check=True).stdout.split() == [
+        "proved", "proved", "refuted",
+    ]  # fmt: skip

@@ -1,9 +1,6 @@
 """The closed loops that are kept are those that the laws derive."""
 
-import subprocess
-import sys
 from fractions import Fraction as F
-from pathlib import Path
 
 import pytest
 import sympy as sp
@@ -35,18 +32,3 @@ def test_what_is_not_kept_is_derived(monkeypatch):
     assert not is_law("nothing")
     with pytest.raises(UnknownNameError):
         field_of("nothing")
-
-
-ROOT = Path(__file__).parents[2]
-FRESH = """
-import sys
-from pathlib import Path
-from quakedesign.certificates.command import check_files
-((verdict, said),) = check_files([Path("proofs/certificates/super-twisting_1.5_1.1.json")]).values()
-print(verdict, *({"sympy", "numpy"} & set(sys.modules)))
-"""
-
-
-def test_checking_the_certificate_of_a_known_law_does_not_wait_for_sympy():
-    said = subprocess.run([sys.executable, "-c", FRESH], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert said.stdout == "proved\n"

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from quakedesign.certificates.guarantee.task import task_of
+from quakedesign.certificates.guarantee import task_of
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault, parse_fault, scaled_fault
 from quakedesign.fault.scaling import similarity

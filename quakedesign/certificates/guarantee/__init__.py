@@ -6,10 +6,11 @@ from quakedesign.faces import face
 
 if TYPE_CHECKING:
     from quakedesign.certificates.guarantee.continuous import ContinuousPeaks, continuous_peaks
+    from quakedesign.certificates.guarantee.fault_data import task_of
     from quakedesign.certificates.guarantee.files import read_guarantee
     from quakedesign.certificates.guarantee.slow_gain import SlowGain
     from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held, guarantee
-    from quakedesign.certificates.guarantee.task import Task, task_of
+    from quakedesign.certificates.guarantee.task import Task
     from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
 
 __all__ = [

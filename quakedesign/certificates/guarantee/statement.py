@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, log10
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
+from quakedesign import loop as loops
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import sector
@@ -12,8 +13,11 @@ from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.certificates.guarantee.theorem import Bounds, Gains, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.loop import NOISES, LinearLaw, Model, PeriodicLoop, SampledController, held_loop
+from quakedesign.loop import NOISES, LinearLaw, Model, PeriodicLoop, held_loop
 from quakedesign.rationals import six_digits
+
+if TYPE_CHECKING:
+    from quakedesign.loop import SampledController
 
 _DIGITS = 4
 _NOISE_WORDS = {
@@ -91,7 +95,7 @@ class Held:
         return {name: bound for name in NOISES if (bound := getattr(self, name))}
 
     @property
-    def controller(self) -> SampledController:
+    def controller(self) -> "SampledController":
         """The law for `simulate`, with the scheme ``explicit`` and the step T_s; delay and lag are the actuator's.
 
         Raises
@@ -101,7 +105,7 @@ class Held:
         """
         if self.law.root is not None:
             raise UnsupportedError("a law with an implicit root has no explicit run. Simulate its own controller.")
-        return SampledController(law=self.law, step=self.step)
+        return loops.SampledController(law=self.law, step=self.step)
 
     def loop(self, task: Task, model: Model | None = None) -> PeriodicLoop:
         """Nominal error loop on a task, of its model or another one."""
