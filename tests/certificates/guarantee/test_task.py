@@ -163,5 +163,5 @@ def test_friction_with_a_state_is_refused():
         reference_coefficient=0.6, direct_effect=0.01, evolution_effect=0.015, critical_slip=1e-3,
         reference_rate=1e-6, slowest_rate=1e-9, fastest_rate=1e-3,
     )  # fmt: skip
-    with pytest.raises(ParameterError, match="guarantee needs"):
+    with pytest.raises(ParameterError, match="guarantee of tracking needs"):
         task_of(replace(load_fault("real-fault"), friction=law))
