@@ -106,6 +106,7 @@ def test_the_guarantee_is_proved_by_both_checkers_and_survives_its_file(tmp_path
     result = checker.check(text)
     assert result.verdict == "proved"
     assert any("never exceeds 1.979e-06 m/s" in line for line in result.statement)
+    assert any("small gain 0." in line for line in result.statement)
 
 
 @pytest.mark.parametrize("half", ["0.02", "1/3", "1e-9", "1e-20"])
@@ -475,6 +476,36 @@ def test_what_breaks_a_rule_is_refused_by_both(path, new):
         return
     with pytest.raises(CertificateError):
         parse_sliding(text)
+
+
+@pytest.mark.parametrize("where", [(), ("fault",), ("reference",), ("loop",), ("claims",)])
+def test_a_key_that_is_not_known_is_refused_by_both(where):
+    raw = json.loads(sliding_text(CLAIM))
+    holder = raw
+    for key in where:
+        holder = holder[key]
+    holder["more"] = "1"
+    with pytest.raises(checker.Refused, match="must have exactly the keys"):
+        checker.check(json.dumps(raw))
+    with pytest.raises(CertificateError):
+        parse_sliding(json.dumps(raw))
+
+
+@pytest.mark.parametrize("name", ["log_rate", "log_state"])
+def test_logarithms_above_3_are_refused_by_both_for_that_reason(name):
+    text = changed(("claims", name), "300001/100000")
+    with pytest.raises(checker.Refused, match="logarithms must be at most 3"):
+        checker.check(text)
+    with pytest.raises(CertificateError, match="logarithms at most 3"):
+        parse_sliding(text)
+
+
+@pytest.mark.parametrize("push", [49_900_000, 60_000_000])
+def test_a_pressure_that_may_open_the_fault_is_the_reason_for_both(push):
+    """50 MPa less K·distance/μ* = 0.1 MPa are left: exactly 0, or less."""
+    with pytest.raises(checker.Refused, match="must not open the fault"):
+        checker.check(changed(("claims", "push"), str(push)))
+    assert cell_bounds(task(), LAGGED, claims(push=push)).reason == "the pressure may open the fault"
 
 
 def test_a_law_of_the_slip_rate_or_a_pressure_that_jumps_is_refused():
