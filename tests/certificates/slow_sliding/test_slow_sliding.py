@@ -508,6 +508,24 @@ def test_a_pressure_that_may_open_the_fault_is_the_reason_for_both(push):
     assert cell_bounds(task(), LAGGED, claims(push=push)).reason == "the pressure may open the fault"
 
 
+@pytest.mark.parametrize("name", [None, "log_rate", "log_state", "slip_error", "push", "asked"])
+def test_a_claim_that_is_only_reached_on_one_cell_does_not_follow(name, monkeypatch):
+    """Bounds that are made up: below all claims on one cell, one of them equal to its claim on the other."""
+    two = replace(CLAIM, cuts=(("direct_effect", F("0.01")), None, None))
+    numbers = {k: F(v) for k, v in json.loads(sliding_text(two))["claims"].items()}
+    below = {k: v * F(999, 1000) for k, v in numbers.items()}
+    given = [(below, F(1, 2)), (below | ({name: numbers[name]} if name else {}), F(1, 4))]
+    assert [theorem.follows(found, claims()) for found, _ in given] == [True, name is None]
+    answers = iter(given)
+    monkeypatch.setattr(standalone, "bounds", lambda *_: next(answers))
+    document = json.loads(sliding_text(two))
+    if name is None:
+        assert any("small gain 0.5" in line for line in standalone.verify(document))
+        return
+    with pytest.raises(checker.Refused, match=f"the claim {name} must follow"):
+        standalone.verify(document)
+
+
 def test_a_law_of_the_slip_rate_or_a_pressure_that_jumps_is_refused():
     fed = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(F(-1), F(-1)))
     for held in (Held(law=fed, step=F(50), lag=F(10)), Held(law=LAW, step=F(50))):
