@@ -86,6 +86,10 @@ class PeriodicLoop:
     sampled: dict[str, Row] = field(default_factory=dict)
     fading: dict[str, Fading] = field(default_factory=dict)
 
+    def __hash__(self) -> int:
+        rows = frozenset(self.inputs.items()), frozenset(self.outputs.items())
+        return hash((self.states, self.flow, self.segments, *rows))
+
     @property
     def period(self) -> Fraction:
         """[s]."""

@@ -23,3 +23,11 @@ def test_a_period_is_as_long_as_its_segments_together():
     loop = PeriodicLoop(states=("x",), flow=ONE, segments=parts, inputs={}, outputs={})
     assert loop.period == F(5, 6)
     assert PeriodicLoop(states=("x",), flow=ONE, segments=(), inputs={}, outputs={}).period == 0
+
+
+def test_loops_that_are_alike_are_one_key():
+    one, other = (
+        PeriodicLoop(states=("x",), flow=ONE, segments=(), inputs=dict(given), outputs={})
+        for given in ({"v": (F(1),), "w": (F(2),)}, {"w": (F(2),), "v": (F(1),)})
+    )
+    assert {one: "first"}[other] == "first"

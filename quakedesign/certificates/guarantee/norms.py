@@ -33,7 +33,7 @@ the trapezoidal sum. Of the flow since the last jump, a piece that has passed ad
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import reduce
+from functools import lru_cache, reduce
 from itertools import accumulate
 from operator import mul
 from typing import Any
@@ -61,11 +61,18 @@ _MOST_DOUBLINGS = 12
 def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     """Gains of every (output, input), rounded up, one for each part of the period; the same parts for all.
 
+    Those of loops that came before are remembered: a proof is found, checked, told and written of one loop.
+
     Raises
     ------
     ParameterError
         When the nominal loop is not found to be stable within 4096 periods.
     """
+    return dict(_norms(loop))
+
+
+@lru_cache(maxsize=128)
+def _norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     with ctx.workprec(_BITS):
         flow = matrix(loop.flow)
         rows = matrix(tuple(loop.outputs.values()))

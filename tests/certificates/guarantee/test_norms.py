@@ -104,3 +104,15 @@ def test_a_sampled_input_that_bends_between_the_ends_of_pieces_is_bounded_there(
     """y″ = −y, reset at every sample: |sin θ| reaches 1 between the ends of pieces of 1 s, and never more."""
     found = sampled_gain([[0, 1], [-1, 0]], [[[0, 0], [0, 0]]], [8], [0, 1], [1, 0])
     assert 1 <= max(found) <= F(13, 10)
+
+
+def test_norms_of_a_loop_are_computed_once(monkeypatch):
+    first = norms(loop([[-3]], [[[1]]], [1], [1], [1]))
+    kept = dict(first)
+    first.clear()
+    monkeypatch.setattr("quakedesign.certificates.guarantee.norms.responses", None)
+    assert norms(loop([[-3]], [[[1]]], [1], [1], [1])) == kept
+    other = loop([[-3]], [[[1]]], [1], [1], [1])
+    for part in ("inputs", "outputs", "sampled"):
+        with pytest.raises(TypeError):
+            norms(replace(other, **{part: getattr(other, part) | {"u": (F(1),)}}))
