@@ -5,10 +5,6 @@ import sys
 
 from quakedesign.interruption import ending, leave
 
-OBJECTS = 100_000
-"""Made between two searches for cycles: nearly all that a command makes is kept, and is not looked through again."""
-
-
 _OBJECTS = 100_000
 """How many are made between two searches for garbage: libraries make as many when they load, and none is garbage."""
 
@@ -16,7 +12,6 @@ _OBJECTS = 100_000
 def main() -> None:
     """Run the command line; an interruption is one line from the first import on."""
     gc.set_threshold(_OBJECTS, *gc.get_threshold()[1:])
-    gc.set_threshold(OBJECTS)
     try:
         with ending(process=True):
             _run()

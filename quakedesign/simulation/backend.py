@@ -1,14 +1,16 @@
 """The step function repeated, in machine code where a C compiler is at hand."""
 
+import ctypes
 import os
 import shlex
 import shutil
 import signal
 import subprocess
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 
@@ -23,23 +25,54 @@ _WORTH = 100_000_000
 """Instructions of a whole run from which on a compiler, which takes some 0.3 s, saves time."""
 
 
+STEP = "quakedesign_step"
+"""Name of a step function: in a library that is loaded, that of a function of the C library would be taken for it."""
+_LOOP = """
+CASADI_SYMBOL_EXPORT int advance(double* vector, long long steps) {{
+  double first[{size}], second[{size}], work[{work}];
+  casadi_int integers[{integers}];
+  const double* arguments[{arguments}];
+  double* results[{results}];
+  double *now = first, *next = second, *other;
+  long long taken;
+  int i;
+  for (i = 0; i < {size}; ++i) now[i] = vector[i];
+  for (taken = 0; taken < steps; ++taken) {{
+    arguments[0] = now;
+    results[0] = next;
+    if ({step}(arguments, results, integers, work, 0)) return 1;
+    other = now;
+    now = next;
+    next = other;
+  }}
+  for (i = 0; i < {size}; ++i) vector[i] = now[i];
+  return 0;
+}}
+"""
+
+MachineCode = Callable[[Any, int], int]
+
+
 @dataclass(frozen=True)
 class Backend:
-    """Functions that advance a vector by 1, 64 and 4096 steps.
+    """What advances a vector.
 
     Attributes
     ----------
     functions : tuple of casadi.Function
-        One a level, one input and one output each.
+        That advance it by 1, 64 and 4096 steps, one input and one output each; none beside machine code.
     name : str
         ``"compiled"`` or ``"virtual-machine"``.
     reason : str
         The compiler, or why there is none.
+    machine_code : callable, optional
+        Advances the floats at a pointer by a number of steps; not 0 if it fails.
     """
 
     functions: tuple[Any, ...]
     name: str
     reason: str
+    machine_code: MachineCode | None = None
 
 
 def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
@@ -48,7 +81,7 @@ def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
     Parameters
     ----------
     step : casadi.Function
-        One vector in, one vector of the same length out.
+        One vector in, one vector of the same length out; called `STEP`.
     compiled : bool or None
         Whether to compile; None: if the run is long enough to be worth it, and a compiler is found and works.
     steps : int
@@ -59,21 +92,20 @@ def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
     SimulationError
         When compilation was asked for and is not possible.
     """
-    functions = ladder(step)
     if compiled is False:
-        return Backend(functions, "virtual-machine", "asked for")
+        return Backend(ladder(step), "virtual-machine", "asked for")
     if compiled is None and steps * step.n_instructions() < _WORTH:
-        return Backend(functions, "virtual-machine", "the run is shorter than a compilation")
+        return Backend(ladder(step), "virtual-machine", "the run is shorter than a compilation")
     try:
         command = compiler()
-        return Backend(_compile(_source(functions), command), "compiled", " ".join((*command, *FLAGS)))
-    except (OSError, subprocess.SubprocessError, RuntimeError) as error:
+        return Backend((), "compiled", " ".join((*command, *FLAGS)), _compile(_source(step), command))
+    except (OSError, subprocess.SubprocessError) as error:
         reason = _reason(error)
         if compiled:
             raise SimulationError(
                 f"a compiled loop needs a C compiler. {reason}. Install one, set CC, or use compiled=None."
             ) from None
-        return Backend(functions, "virtual-machine", reason)
+        return Backend(ladder(step), "virtual-machine", reason)
 
 
 def ladder(step: Any) -> tuple[Any, ...]:
@@ -88,11 +120,18 @@ def ladder(step: Any) -> tuple[Any, ...]:
     return tuple(rungs)
 
 
-def _source(functions: tuple[Any, ...]) -> tuple[str, tuple[str, ...]]:
+def _source(step: Any) -> str:
     generator = ca.CodeGenerator("steps.c")
-    for function in functions:
-        generator.add(function)
-    return generator.dump(), tuple(function.name() for function in functions)
+    generator.add(step)
+    sizes = {
+        "step": step.name(),
+        "size": step.size1_in(0),
+        "work": max(1, step.sz_w()),
+        "integers": max(1, step.sz_iw()),
+        "arguments": step.sz_arg(),
+        "results": step.sz_res(),
+    }
+    return str(generator.dump()) + _LOOP.format(**sizes)
 
 
 def compiler() -> tuple[str, ...]:
@@ -115,12 +154,12 @@ def compiler() -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=32)
-def _compile(source: tuple[str, tuple[str, ...]], command: tuple[str, ...]) -> tuple[Any, ...]:
-    """Load the functions of a C source; the library stays in memory when its file is gone."""
-    text, names = source
+def _compile(text: str, command: tuple[str, ...]) -> MachineCode:
+    """Load the loop of a C source; the library stays in memory when its file is gone."""
     with temporary_folder() as folder:
-        library = shared_library(text, folder, command)
-        return tuple(ca.external(name, str(library)) for name in names)
+        advance: Any = ctypes.CDLL(str(shared_library(text, folder, command))).advance
+    advance.argtypes, advance.restype = [ctypes.c_void_p, ctypes.c_longlong], ctypes.c_int
+    return cast(MachineCode, advance)
 
 
 def shared_library(text: str, folder: Path, command: tuple[str, ...]) -> Path:

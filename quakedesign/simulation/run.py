@@ -14,7 +14,7 @@ from quakedesign.loop.schemes import Scheme, simulation_scheme
 from quakedesign.loop.sensing import Sensor
 from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
 from quakedesign.simulation.assembly import trajectory
-from quakedesign.simulation.backend import prepare
+from quakedesign.simulation.backend import STEP, prepare
 from quakedesign.simulation.checkpoint import Checkpoint
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.coulomb import CoulombLoop
@@ -117,7 +117,7 @@ def run_adaptive(
 def _step(recorder: Recorder, method: type[Integrator]) -> Any:
     """CasADi Function of the vector: one step."""
     before = ca.SX.sym("z", recorder.size)
-    return ca.Function("step", [before], [recorder.advance(before, method)])
+    return ca.Function(STEP, [before], [recorder.advance(before, method)])
 
 
 def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveIntegrator]) -> dict[str, Any]:

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from quakedesign.simulation.backend import RADIX, Backend
+from quakedesign.errors import SimulationError
+from quakedesign.simulation.backend import LEVELS, RADIX, Backend, MachineCode
 from quakedesign.simulation.checkpoint import Checkpoint
 
 GOLDEN = (5**0.5 - 1) / 2
@@ -23,28 +24,41 @@ class Advancer:
     ----------
     vector : ndarray
     calls : tuple of callable
-        Advance the vector by 1, 64 and 4096 steps.
+        Advance the vector by 1, 64 and 4096 steps; none beside machine code.
     owners : tuple
         CasADi's buffers, which must live as long as the calls.
+    machine_code : callable or None
+        See `Backend`.
     """
 
     vector: "np.ndarray"
-    calls: tuple[Callable[[], None], ...]
-    owners: tuple[Any, ...]
+    calls: tuple[Callable[[], None], ...] = ()
+    owners: tuple[Any, ...] = ()
+    machine_code: MachineCode | None = None
 
     @classmethod
     def of(cls, backend: Backend, start: list[float]) -> "Advancer":
         """Advancer at a starting vector."""
         vector = np.array(start)
+        if backend.machine_code:
+            return cls(vector, machine_code=backend.machine_code)
         calls, owners = zip(*(_bound(function, vector) for function in backend.functions), strict=True)
         return cls(vector, calls, owners)
 
     def advance(self, steps: int) -> None:
         """Take a number of steps; no call into compiled code lasts longer than 4096 of them."""
+        if self.machine_code:
+            return self._advance_compiled(self.machine_code, steps)
         for level in reversed(range(len(self.calls))):
             times, steps = divmod(steps, RADIX**level)
             for _ in range(times):
                 self.calls[level]()
+
+    def _advance_compiled(self, machine_code: MachineCode, steps: int) -> None:
+        longest = RADIX ** (LEVELS - 1)
+        for first in range(0, steps, longest):
+            if machine_code(self.vector.ctypes.data, min(longest, steps - first)):
+                raise SimulationError("the compiled step failed. Use compiled=False.")
 
 
 def _bound(function: Any, vector: "np.ndarray") -> tuple[Callable[[], None], Any]:
