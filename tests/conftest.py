@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ["QUAKEDESIGN_CACHE"] = "off"  # tests compute, and leave the cache of the user alone
 
 import pytest
 from hypothesis import settings

@@ -49,13 +49,20 @@ class Output:
         Print nothing for people, not even progress: the exit code is the answer.
     log_level
         What to say on stderr while it works: info for every step, debug for all progress.
+    no_cache
+        Neither take nor keep what searches find, compiled code and long runs; as QUAKEDESIGN_CACHE=off.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
     quiet: Annotated[bool, Parameter(negative="")] = False
     log_level: Literal["warning", "info", "debug"] = "warning"
+    no_cache: Annotated[bool, Parameter(negative="")] = False
 
     def __post_init__(self) -> None:
+        if self.no_cache:
+            from quakedesign.cache import switch_off
+
+            switch_off()
         if (self.quiet, self.log_level) != (False, "warning"):
             hush(quiet=self.quiet, level=self.log_level)
 

@@ -14,6 +14,7 @@ from typing import Any, cast
 
 import casadi as ca
 
+from quakedesign import cache
 from quakedesign.errors import SimulationError
 from quakedesign.temporary import temporary_folder
 
@@ -156,10 +157,33 @@ def compiler() -> tuple[str, ...]:
 @lru_cache(maxsize=32)
 def _compile(text: str, command: tuple[str, ...]) -> MachineCode:
     """Load the loop of a C source; the library stays in memory when its file is gone."""
+    asked = text.encode(), repr((*command, *FLAGS, *_identity(command[0]))).encode()
     with temporary_folder() as folder:
-        advance: Any = ctypes.CDLL(str(shared_library(text, folder, command))).advance
+        library = folder / "kept.so"
+        if (content := cache.recall("code", *asked)) is not None:
+            library.write_bytes(content)
+        else:
+            library = shared_library(text, folder, command)
+            cache.keep("code", library.read_bytes(), *asked)
+        advance: Any = ctypes.CDLL(str(library)).advance
     advance.argtypes, advance.restype = [ctypes.c_void_p, ctypes.c_longlong], ctypes.c_int
     return cast(MachineCode, advance)
+
+
+def compilation() -> str:
+    """How a compiled run is compiled: command and flags, and which compiler that is; empty without one."""
+    try:
+        command = compiler()
+        return repr((*command, *FLAGS, *_identity(command[0])))
+    except OSError:
+        return ""
+
+
+def _identity(program: str) -> tuple[str, int, int]:
+    """Where a program lies, its size and when it changed last: another compiler has another one."""
+    path = Path(program).resolve()
+    told = path.stat()
+    return str(path), told.st_size, told.st_mtime_ns
 
 
 def shared_library(text: str, folder: Path, command: tuple[str, ...]) -> Path:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
+from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Task
 from quakedesign.loop import NOISES, PeriodicLoop, Segment
 from quakedesign.loop.implicit_root import root_of
@@ -48,13 +49,18 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     and at a twentieth of that, and courses that switch after random times are tried as well. Noise is at its ends too.
     An implicit step ends where its equation says, inside its lines or not.
     """
+    slip, rate = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
+    return WorstFound(slip_error=slip, slip_rate_error=rate)
+
+
+def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
+    """Largest slip error [m] and slip-rate error [m/s]."""
     searches = [_Search(claim, sticks, 2 * _COURSES)]
     searches[0].follow(searches[0].random(), _SWEEPS)
     if sticks:
         searches.append(_Search(claim, sticks, _MANY))
         searches[1].follow(searches[1].switching(), _FEW)
-    slip, rate = (max(search.largest[k] for search in searches) for k in (0, 1))
-    return WorstFound(slip_error=slip, slip_rate_error=rate)
+    return [max(search.largest[k] for search in searches) for k in (0, 1)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,12 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from math import hypot, inf, log10, sqrt
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from scipy.linalg import LinAlgError
 from scipy.optimize import OptimizeResult, minimize
 
+from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.errors import ParameterError
@@ -53,9 +54,11 @@ def first_held(
     def cost(x: np.ndarray) -> float:
         return _peak_cost(_seen(task, family, template, x), family.period)
 
+    question = "peak", task, step, measured, tuple(sorted(around.items()))
     for start in family.starts if near is None else (near,):
         evaluations = _EVALUATIONS if near is None else _FEW
-        reached, x = _search(cost, start, enough=_FAILED / 2, evaluations=evaluations, far=_far(template))
+        settings = {"enough": _FAILED / 2, "evaluations": evaluations, "far": _far(template)}
+        reached, x = _search_once(question, cost, start, **settings)
         if reached < _FAILED / 2 or _hopeless(reached):
             break
     last = _seen(task, family, template, x)
@@ -121,9 +124,12 @@ def design_held(
     def seen(x: np.ndarray) -> Estimate | None:
         return _seen(task, family, template, x)
 
+    question = task, step, measured, tuple(sorted(around.items()))
     best = 10 * _FAILED, np.array(family.starts[0])
     for start in family.starts:
-        reached = _search(lambda x: _peak_cost(seen(x), family.period), start, far=_far(template))
+        reached = _search_once(
+            ("peak", *question), lambda x: _peak_cost(seen(x), family.period), start, far=_far(template)
+        )
         best = min(best, reached, key=lambda f: f[0])
         if template.diffusion and _hopeless(best[0]):
             break
@@ -133,7 +139,9 @@ def design_held(
     if objective == "tracking" and found is not None and isinstance(found.bounds, Bounds):
         limit = (room or family.room) * float(found.bounds.slip_rate_error)
         starts = (best[1], family.starts[1])
-        best = min((_search(lambda x: _drift_cost(seen(x), limit), start) for start in starts), key=lambda f: f[0])
+        drift = ("drift", limit, *question)
+        found_near = (_search_once(drift, lambda x: _drift_cost(seen(x), limit), start) for start in starts)
+        best = min(found_near, key=lambda f: f[0])
     return best_guarantee(task, replace(template, law=family.law(best[1])))
 
 
@@ -171,6 +179,19 @@ def _seen(task: Task, family: Family, template: Held, x: np.ndarray) -> Estimate
         return judged(task, replace(template, law=family.law(x))) if family.admits(x) else None
     except LinAlgError:  # of a Riccati equation
         return None
+
+
+def _search_once(
+    question: tuple[Any, ...], cost: Callable[[np.ndarray], float], start: Sequence[float] | np.ndarray, **settings: Any
+) -> tuple[float, np.ndarray]:
+    """What `_search` finds, or has found for a question that says all about the cost, see `quakedesign.cache`."""
+
+    def search() -> list[Any]:
+        least, x = _search(cost, start, **settings)
+        return [least, x.tolist()]
+
+    least, x = search_once(search, *question, np.array(start).tolist(), sorted(settings.items()))
+    return least, np.array(x)
 
 
 def _search(

@@ -1,0 +1,196 @@
+"""Kept on the disk of one user from one command to the next: compiled code, runs, and what searches found. No verdict.
+
+What is kept is found by its content alone: the question, the sources of this package, the versions of Python and of the
+libraries, and the machine. So nothing is ever out of date. A search only proposes, here as elsewhere: what it proposed
+is decided in exact arithmetic each time.
+
+The folder is that of ``QUAKEDESIGN_CACHE`` (``off`` for none), else ``quakedesign`` in the user's folder for caches
+(``XDG_CACHE_HOME``, ``~/.cache``; ``~/Library/Caches``). It counts if it is a folder of this user that nobody else may
+write, and so does each file; a file that is not what was written counts as none. Files appear whole, and the oldest go
+when they are too much together. Whatever fails, as where nothing can be written: the work is done anew.
+"""
+
+import json
+import os
+import pickle
+import platform
+import secrets
+import stat
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+PLACE = "QUAKEDESIGN_CACHE"
+MOST_BYTES = 200_000_000
+_LIBRARIES = ("casadi", "clarabel", "control", "cvxpy", "numpy", "python-flint", "scipy", "sympy")
+_DIGEST = sha256().digest_size
+_PROCESSOR = Path("/proc/cpuinfo")
+_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+
+def switch_off() -> None:
+    """Keep and take nothing from here on, in processes that this one starts as well."""
+    os.environ[PLACE] = "off"
+
+
+def in_use() -> bool:
+    """Whether anything is kept."""
+    return _folder() is not None
+
+
+def recall(kind: str, *question: bytes) -> bytes | None:
+    """What was kept for a question, or None."""
+    name = _name(kind, question)
+    try:
+        with _opened() as folder, open(os.open(name, os.O_RDONLY | os.O_NOFOLLOW, dir_fd=folder), "rb") as file:
+            told = os.fstat(file.fileno())
+            if not stat.S_ISREG(told.st_mode) or not _own(told):
+                return None
+            content = file.read()
+            with suppress(OSError):  # what is asked for again is not the oldest
+                os.utime(file.fileno())
+    except OSError:
+        return None
+    digest, rest = content[:_DIGEST], content[_DIGEST:]
+    return rest if digest == _digest(name, rest) else None
+
+
+def keep(kind: str, content: bytes, *question: bytes) -> None:
+    """Keep the answer to a question for `recall`, if there is a place for it."""
+    name, new = _name(kind, question), f".{secrets.token_hex(8)}"
+    try:
+        with _opened(make=True) as folder:
+            try:
+                how = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
+                with open(os.open(new, how, mode=0o600, dir_fd=folder), "wb") as file:
+                    file.write(_digest(name, content) + content)
+                os.replace(new, name, src_dir_fd=folder, dst_dir_fd=folder)
+            except BaseException:
+                with suppress(OSError):
+                    os.unlink(new, dir_fd=folder)
+                raise
+            _make_room(folder)
+    except OSError:
+        return
+
+
+def search_once(search: Callable[[], Any], *question: Any) -> Any:
+    """What a search found for a question before, or finds now: numbers, texts, lists, as JSON has them.
+
+    Parameters
+    ----------
+    search : callable
+        It depends on the question alone, and what it finds is not trusted.
+    *question
+        Values that say everything; what cannot be pickled is searched each time.
+    """
+    if not in_use():
+        return search()
+    try:
+        asked = pickle.dumps(question)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return search()
+    if (kept := recall("search", asked)) is not None:
+        return json.loads(kept)
+    found = search()
+    keep("search", json.dumps(found).encode(), asked)
+    return found
+
+
+def _folder() -> Path | None:
+    told = os.environ.get(PLACE)
+    if told == "off" or sys.platform == "win32":  # folders have no owners there that could be asked for
+        return None
+    if told:
+        return Path(told).absolute()
+    shared = os.environ.get("XDG_CACHE_HOME", "")
+    if os.path.isabs(shared):
+        return Path(shared) / "quakedesign"
+    with suppress(RuntimeError):  # a user without a home
+        return Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "quakedesign"
+    return None
+
+
+@contextmanager
+def _opened(*, make: bool = False) -> Iterator[int]:
+    """Descriptor of the folder: what is done with it is done in that which was looked at.
+
+    Raises
+    ------
+    OSError
+        When there is none, or it is somebody else's, or others may write it.
+    """
+    place = _folder()
+    if place is None:
+        raise FileNotFoundError(PLACE)
+    if make:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with suppress(FileExistsError):
+            place.mkdir(mode=0o700)
+    folder = os.open(place, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        if not _own(os.fstat(folder)):
+            raise PermissionError(place)
+        yield folder
+    finally:
+        os.close(folder)
+
+
+def _own(told: os.stat_result) -> bool:
+    """Whether something is of this user, and nobody else may write it."""
+    return told.st_uid == os.getuid() and not told.st_mode & _OTHERS
+
+
+def _make_room(folder: int) -> None:
+    """Remove the oldest files until three quarters of the room are left, if there is too much."""
+    with os.scandir(folder) as entries:
+        files = [(entry.stat(follow_symlinks=False), entry.name) for entry in entries]
+    size = sum(told.st_size for told, _ in files)
+    if size <= MOST_BYTES:
+        return
+    for told, name in sorted(files, key=lambda file: file[0].st_mtime):
+        if size <= MOST_BYTES * 3 // 4:
+            break
+        with suppress(OSError):  # another process was here first
+            os.unlink(name, dir_fd=folder)
+        size -= told.st_size
+
+
+def _name(kind: str, question: tuple[bytes, ...]) -> str:
+    parts = b"".join(sha256(part).digest() for part in question)
+    return f"{kind}-{sha256(_here() + parts).hexdigest()}"
+
+
+def _digest(name: str, content: bytes) -> bytes:
+    return sha256(name.encode() + content).digest()
+
+
+@cache
+def _here() -> bytes:
+    """Digest of everything that an answer depends on beside its question."""
+    told = [sys.version, platform.platform(), platform.node(), _features()]
+    told += [f"{name} {_version(name)}" for name in _LIBRARIES]
+    here, package = sha256(repr(told).encode()), Path(__file__).parent
+    for file in sorted(path for path in package.rglob("*") if path.is_file() and path.suffix not in (".pyc", ".pyo")):
+        here.update(sha256(str(file.relative_to(package)).encode()).digest() + sha256(file.read_bytes()).digest())
+    return here.digest()
+
+
+def _features() -> str:
+    """What the processor can do: the C library computes with it, and its last digits depend on that."""
+    with suppress(OSError):
+        lines = _PROCESSOR.read_text(errors="replace").splitlines()
+        return next((line for line in lines if line.startswith(("flags", "Features"))), "")
+    return platform.processor()
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "none"
