@@ -28,6 +28,7 @@ from typing import Any
 PLACE = "QUAKEDESIGN_CACHE"
 MOST_BYTES = 200_000_000
 _LIBRARIES = ("casadi", "clarabel", "control", "cvxpy", "numpy", "python-flint", "scipy", "sympy")
+_KERNEL = "OPENBLAS_CORETYPE"  # of linear algebra; its last digits depend on that
 _DIGEST = sha256().digest_size
 _PROCESSOR = Path("/proc/cpuinfo")
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
@@ -173,7 +174,7 @@ def _digest(name: str, content: bytes) -> bytes:
 @cache
 def _here() -> bytes:
     """Digest of everything that an answer depends on beside its question."""
-    told = [sys.version, platform.platform(), platform.node(), _features()]
+    told = [sys.version, platform.platform(), platform.node(), _features(), os.environ.get(_KERNEL, "")]
     told += [f"{name} {_version(name)}" for name in _LIBRARIES]
     here, package = sha256(repr(told).encode()), Path(__file__).parent
     for file in sorted(path for path in package.rglob("*") if path.is_file() and path.suffix not in (".pyc", ".pyo")):

@@ -100,6 +100,13 @@ def test_another_library_or_processor_has_answers_of_its_own(folder, monkeypatch
     assert cache.recall("run", b"how long?") is None
 
 
+def test_another_kernel_of_linear_algebra_has_answers_of_its_own(folder, monkeypatch):
+    cache.keep("run", b"so long", b"how long?")
+    monkeypatch.setattr(cache, "_here", cache._here.__wrapped__)
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "another")
+    assert cache.recall("run", b"how long?") is None
+
+
 def test_other_sources_have_answers_of_their_own(folder, tmp_path, monkeypatch):
     (tmp_path / "package").mkdir()
     source = tmp_path / "package" / "part.toml"
