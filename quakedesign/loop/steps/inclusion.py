@@ -29,6 +29,7 @@ from quakedesign.symbolic import AbsolutePower, SignedPower
 from quakedesign.symbolic.casadi_printer import to_casadi
 
 ROUNDS = 27
+AT_ONCE = 3  # rounds in the body of a loop in C: all of them would take half a second to compile
 end_slip, end_rate = sp.symbols("end_slip end_rate", real=True)
 
 Values = dict[sp.Symbol, Any]
@@ -179,13 +180,17 @@ class Inclusion:
 
     def _quarter(self, falling: sp.Expr, known: Values, width: Any) -> Any:
         """Zero of a falling function of the end of the step, between 0 and `width`."""
-        test = _sign_only(falling)
-        low, length = ca.fmin(width, 0), ca.fabs(width)
-        for _ in range(ROUNDS):
+        test, names = _sign_only(falling), list(known)
+        before = ca.SX.sym("before", 2 + len(names))
+        low, length, *values = ca.vertsplit(before)
+        told = dict(zip(names, values, strict=True))
+        for _ in range(AT_ONCE):
             length = length / 4
-            passed = sum(self._value(test, known, low + share * length) >= 0 for share in (1, 2, 3))
+            passed = sum(self._value(test, told, low + share * length) >= 0 for share in (1, 2, 3))
             low = low + passed * length
-        return low
+        rounds = ca.Function("rounds", [before], [ca.vertcat(low, length, *values)])
+        start = ca.vertcat(ca.fmin(width, 0), ca.fabs(width), *known.values())
+        return rounds.fold(ROUNDS // AT_ONCE, {"never_inline": True})(start)[0]
 
     def _value(self, expression: sp.Expr, known: Values, end: Any) -> Any:
         return to_casadi([expression], known | self._ends(known, end))[0]

@@ -131,12 +131,18 @@ def test_the_states_reach_every_branch():
     assert found == {"free", "slip", "rate"}
 
 
+def calls(function):
+    """Names of the functions that are called in a function itself."""
+    return [f.name() for f in function.find_functions(0)]
+
+
 @pytest.mark.parametrize("name", GAINS)
 def test_the_smooth_solution_is_computed_only_where_it_is_needed(name):
     step = step_function(name, F(1))
-    alone, inside = step.n_instructions(), step.find_function("solved").n_instructions()
-    assert inside > 27 * 3 * 5  # rounds, points, and a few operations for each
-    assert alone < inside / 2
+    assert "where_needed" in calls(step)
+    assert "solved" not in calls(step)
+    assert calls(step.find_function("solved")) == ["fold_rounds"]  # a loop in C
+    assert step.find_function("rounds").n_instructions() < 27 * 3 * 5  # rounds, points, and a few operations for each
     called = step.find_function("where_needed")
     known = np.linspace(0.1, 0.9, called.size1_in(1))
     assert float(called(0, known)) == 0
