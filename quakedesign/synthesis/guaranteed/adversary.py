@@ -136,7 +136,7 @@ class _Search:
             if number % _PIECES == 0:
                 state = self._sampled(part, state, costate, number)
             ahead = np.einsum("vij,cj->cvi", part.steps, state)
-            push = np.einsum("vij,ci->cvj", part.added, costate)
+            push = _pushes(part.added, costate)
             gain = np.einsum("cvi,ci->cv", ahead, costate) + np.abs(push).sum(axis=2)
             best = np.where(self.allowed, gain, -np.inf).argmax(axis=1)
             row = np.arange(len(best))
@@ -186,6 +186,16 @@ class _Search:
             costate = np.einsum("cij,ci->cj", part.steps[chosen[number]], costate)
             costate = costate @ part.jump if number % _PIECES == 0 else costate
         return np.array(found[::-1])
+
+
+def _pushes(added: np.ndarray, costates: np.ndarray) -> np.ndarray:
+    """What every constant input at a vertex does to every costate, one sum for all; several times as fast as einsum."""
+    vertices, size, inputs = added.shape
+    rows = added.transpose(1, 0, 2).reshape(size, vertices * inputs)
+    found = np.multiply.outer(costates[:, 0], rows[0])
+    for i in range(1, size):
+        found += np.multiply.outer(costates[:, i], rows[i])
+    return np.reshape(found, (len(costates), vertices, inputs))
 
 
 def _with_disturbance(task: Task, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
