@@ -8,6 +8,7 @@ from itertools import product
 from typing import Any, Unpack
 
 from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.sector import holds
 from quakedesign.certificates.guarantee.statement import Around
@@ -175,6 +176,16 @@ def _deadbeat(
     """Weight and authority for a deadbeat step, of any law, and the errors that it leaves, if it has a guarantee."""
     if objective not in OBJECTIVES:
         raise ParameterError(f"objective must be one of {', '.join(OBJECTIVES)}. Received {objective!r}.")
+    question = "deadbeat", task, step, objective, weights, sorted(around.items())
+    search = partial(_deadbeat_search, task, step, objective, weights, around)
+    weight, authority, *errors = map(Fraction, search_once(search, *question))
+    return weight, authority, (errors[0], errors[1]) if errors else None
+
+
+def _deadbeat_search(
+    task: Task, step: Fraction, objective: str, weights: tuple[Fraction, ...], around: Around
+) -> list[str]:
+    """The same, as texts."""
     seen = dict[tuple[Fraction, Fraction], Estimate]()
     for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
@@ -182,7 +193,7 @@ def _deadbeat(
         if found is not None and isinstance(found.bounds, Bounds):
             seen[choice] = found
     if not seen:
-        return weights[0], _short(task.model.gain), None
+        return [str(weights[0]), str(_short(task.model.gain))]
     peaks = {choice: float(_bounds(found).slip_rate_error) for choice, found in seen.items()}
     least = min(peaks, key=lambda choice: peaks[choice])
     if objective == "tracking":
@@ -190,7 +201,7 @@ def _deadbeat(
         least = min(allowed, key=lambda choice: seen[choice].drift_gain)
     bounds = _bounds(seen[least])
     slip_noise, rate_noise = around.get("slip_noise", 0), around.get("rate_noise", 0)
-    return *least, (bounds.slip_error + slip_noise, bounds.slip_rate_error + rate_noise)
+    return [str(v) for v in (*least, bounds.slip_error + slip_noise, bounds.slip_rate_error + rate_noise)]
 
 
 def _scale(controller: SlidingMode, authority: Fraction, step: Fraction, errors: tuple[Fraction, Fraction]) -> Fraction:
