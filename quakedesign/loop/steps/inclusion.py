@@ -169,7 +169,7 @@ class Inclusion:
         target = self.free + self.selected(self.pull)
         straight = sp.Poly(_straight(target, self.slip_error, self.step), end_rate) if _is_straight(target) else None
         if straight is None:
-            end = _where(needed, known, partial(self._free_end, target))
+            end = _where(needed, self._used(target, known), partial(self._free_end, target))
         else:
             end = to_casadi([straight.coeff_monomial(1) / (1 - straight.coeff_monomial(end_rate))], known)[0]
         return {sign: known[sign] for sign in self.signs} | self._ends(known, end)
@@ -180,10 +180,10 @@ class Inclusion:
 
     def _quarter(self, falling: sp.Expr, known: Values, width: Any) -> Any:
         """Zero of a falling function of the end of the step, between 0 and `width`."""
-        test, names = _sign_only(falling), list(known)
-        before = ca.SX.sym("before", 2 + len(names))
+        test, known = _sign_only(falling), self._used(falling, known)
+        before = ca.SX.sym("before", 2 + len(known))
         low, length, *values = ca.vertsplit(before)
-        told = dict(zip(names, values, strict=True))
+        told = dict(zip(known, values, strict=True))
         for _ in range(AT_ONCE):
             length = length / 4
             passed = sum(self._value(test, told, low + share * length) >= 0 for share in (1, 2, 3))
@@ -191,6 +191,11 @@ class Inclusion:
         rounds = ca.Function("rounds", [before], [ca.vertcat(low, length, *values)])
         start = ca.vertcat(ca.fmin(width, 0), ca.fabs(width), *known.values())
         return rounds.fold(ROUNDS // AT_ONCE, {"never_inline": True})(start)[0]
+
+    def _used(self, expression: sp.Expr, known: Values) -> Values:
+        """What the value of an expression depends on: what is told to a call counts as if it did."""
+        names = expression.free_symbols | {self.slip_error, self.step}
+        return {symbol: value for symbol, value in known.items() if symbol in names}
 
     def _value(self, expression: sp.Expr, known: Values, end: Any) -> Any:
         return to_casadi([expression], known | self._ends(known, end))[0]

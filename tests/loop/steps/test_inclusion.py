@@ -149,6 +149,18 @@ def test_the_smooth_solution_is_computed_only_where_it_is_needed(name):
     assert float(called(1, known)) == float(step.find_function("solved")(known)) != 0
 
 
+@pytest.mark.parametrize("name", GAINS)
+def test_a_step_depends_on_nothing_that_its_law_does_not_name(name):
+    """The call in which the root is looked for is told what it needs, and nothing else."""
+    law = Law.of(control_law(name.split()[0]).from_values(GAINS[name]), 0.0)
+    problem, unknown = inclusion(backward_euler(law)[0]), ca.SX.sym("unknown")
+    symbols = (discrete_law.slip_error, discrete_law.rate_error, discrete_law.step, discrete_law.authority)
+    known = {symbol: ca.SX.sym(symbol.name) for symbol in (*symbols, *law.integrals)}
+    solved = problem.solve(known | {discrete_law.acceleration: unknown, discrete_law.next_reference: unknown})
+    assert not ca.depends_on(solved[end_rate], unknown)
+    assert ca.depends_on(solved[end_rate], known[discrete_law.authority])
+
+
 def test_direction_knows_odd_powers_and_gives_up_on_the_rest():
     k = sp.Symbol("k", positive=True)
     assert direction(k * end_rate + SignedPower(end_slip, sp.Rational(1, 3))) == 1
