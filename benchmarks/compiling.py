@@ -26,15 +26,17 @@ LONGEST_WRITTEN_OUT = 20
 class WrittenOut(ClosedLoop):
     """Loop whose substeps are expressions one after the other."""
 
-    def advance_often(self, method: Any, motion: Any, given: Any, state: Any, step: float, times: int) -> Any:
-        """See `ClosedLoop.advance_often`."""
+    def metered_often(
+        self, method: Any, motion: Any, given: Any, start: tuple[Any, Any], step: float, times: int
+    ) -> tuple[Any, Any]:
+        """See `ClosedLoop.metered_often`."""
         for number in range(times):
 
-            def one(plant: Any, passed: Any, now: Any, before: int = number) -> Any:
-                return motion(plant, before + passed, now, given)
+            def one(plant: Any, passed: Any, now: Any, told: Any, before: int = number) -> Any:
+                return motion(plant, before + passed, now, told)
 
-            state = self.advance(method, one, state, step)
-        return state
+            start = super().metered_often(method, one, given, start, step, 1)
+        return start
 
 
 def compiled(kind: type[ClosedLoop], substeps: int, cells: int) -> tuple[float, int]:

@@ -16,6 +16,8 @@ import casadi as ca
 
 from quakedesign import cache
 from quakedesign.errors import SimulationError
+from quakedesign.simulation.instructions import expanded, expanded_size
+from quakedesign.simulation.portable_c import in_place_of_the_library
 from quakedesign.temporary import temporary_folder
 
 FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
@@ -94,9 +96,9 @@ def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
         When compilation was asked for and is not possible.
     """
     if compiled is False:
-        return Backend(ladder(step), "virtual-machine", "asked for")
-    if compiled is None and steps * step.n_instructions() < _WORTH:
-        return Backend(ladder(step), "virtual-machine", "the run is shorter than a compilation")
+        return _virtual_machine(step, "asked for")
+    if compiled is None and steps * expanded_size(step) < _WORTH:
+        return _virtual_machine(step, "the run is shorter than a compilation")
     try:
         command = compiler()
         return Backend((), "compiled", " ".join((*command, *FLAGS)), _compile(_source(step), command))
@@ -106,7 +108,11 @@ def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
             raise SimulationError(
                 f"a compiled loop needs a C compiler. {reason}. Install one, set CC, or use compiled=None."
             ) from None
-        return Backend(ladder(step), "virtual-machine", reason)
+        return _virtual_machine(step, reason)
+
+
+def _virtual_machine(step: Any, reason: str) -> Backend:
+    return Backend(ladder(expanded(step)), "virtual-machine", reason)
 
 
 def ladder(step: Any) -> tuple[Any, ...]:
@@ -132,7 +138,7 @@ def _source(step: Any) -> str:
         "arguments": step.sz_arg(),
         "results": step.sz_res(),
     }
-    return str(generator.dump()) + _LOOP.format(**sizes)
+    return in_place_of_the_library() + str(generator.dump()) + _LOOP.format(**sizes)
 
 
 def compiler() -> tuple[str, ...]:
@@ -186,8 +192,8 @@ def _identity(program: str) -> tuple[str, int, int]:
     return str(path), told.st_size, told.st_mtime_ns
 
 
-def shared_library(text: str, folder: Path, command: tuple[str, ...]) -> Path:
-    """Compile a C source into a shared library in a folder.
+def shared_library(text: str, folder: Path, command: tuple[str, ...], flags: tuple[str, ...] = ()) -> Path:
+    """Compile a C source into a shared library in a folder, with more flags where there are some.
 
     Raises
     ------
@@ -196,7 +202,7 @@ def shared_library(text: str, folder: Path, command: tuple[str, ...]) -> Path:
     """
     written, library = folder / "steps.c", folder / "steps.so"
     written.write_text(text, encoding="utf-8")
-    _run([*command, *FLAGS, str(written), "-o", str(library), "-lm"], folder)
+    _run([*command, *FLAGS, *flags, str(written), "-o", str(library), "-lm"], folder)
     return library
 
 

@@ -17,6 +17,7 @@ from quakedesign.output import require_room, whole_folder, write_whole
 from quakedesign.simulation.c_source import HEADER, SOURCE, ControllerStep, header_text, source_text
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.fmu import UNIT, model_unit
+from quakedesign.simulation.instructions import expanded
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.run import library_versions
 
@@ -60,7 +61,9 @@ def controller_step(
         measurement.pop("slip_rate")
     function, start = _function(loop, chosen, float(period), len(measurement))
     facts = _facts(fault, controller, chosen)
-    return ControllerStep(function=function, measurement=measurement, start=start, step=float(period), facts=facts)
+    return ControllerStep(
+        function=expanded(function), measurement=measurement, start=start, step=float(period), facts=facts
+    )
 
 
 def export_controller(

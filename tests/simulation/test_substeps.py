@@ -57,7 +57,7 @@ def test_the_digits_are_those_of_steps_written_out(plant, factors):
 
 
 def test_the_code_does_not_grow_with_the_substeps():
-    few, many = (len(_source((step_of(substeps),))[0]) for substeps in (11, 99))
+    few, many = (len(_source(step_of(substeps))) for substeps in (11, 99))
     assert many - few < 5000  # characters; one substep written out takes 10 000
 
 

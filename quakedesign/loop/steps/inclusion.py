@@ -209,13 +209,25 @@ def _choose(at: Any, case: Values, other: Values) -> Values:
 
 
 def _where(needed: Any, known: Values, solution: Callable[[Values], Any]) -> Any:
-    """Solution (SX) where it is needed, 0 elsewhere: a call that runs one of two branches."""
+    """Solution (SX) where it is needed, 0 elsewhere."""
     given = ca.SX.sym("given", len(known))
     found = solution(dict(zip(known, ca.vertsplit(given), strict=True)))
-    told = [ca.MX.sym("needed"), ca.MX.sym("given", len(known))]
-    solved, left_out = (ca.Function(name, [given], [v]) for name, v in (("solved", found), ("left_out", ca.SX(0))))
-    either = ca.Function.if_else("either", solved, left_out)(*told)
-    return ca.Function("where_needed", told, [either], {"never_inline": True})(needed, ca.vertcat(*known.values()))
+    return where_needed(ca.Function("solved", [given], [found]))(needed, ca.vertcat(*known.values()))
+
+
+def where_needed(function: Any) -> Any:
+    """CasADi Function (needed, vector) → value of another where it is needed, else 0: a call runs one of two branches.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        Of scalar operations, one vector in and one out; its name is ``solved``.
+    """
+    vector, told = ca.SX.sym("given", function.size1_in(0)), ca.MX.sym("needed")
+    left_out = ca.Function("left_out", [vector], [ca.SX.zeros(function.size1_out(0))])
+    given = ca.MX.sym("given", function.size1_in(0))
+    either = ca.Function.if_else("either", function, left_out)(told, given)
+    return ca.Function("where_needed", [told, given], [either], {"never_inline": True})
 
 
 def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:

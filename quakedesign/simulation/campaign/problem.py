@@ -13,8 +13,9 @@ from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.loop.schemes import Scheme
+from quakedesign.simulation.backend import STEP
 from quakedesign.simulation.campaign.ledger import plain
-from quakedesign.simulation.campaign.program import STEP, Program
+from quakedesign.simulation.campaign.program import Program
 from quakedesign.simulation.campaign.reseeding import reseeded
 from quakedesign.simulation.campaign.space import MOST_SAMPLES, Sample, Space, noise_seed, point
 from quakedesign.simulation.earthquake import natural_peak

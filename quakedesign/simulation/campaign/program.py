@@ -14,38 +14,12 @@ import casadi as ca
 import numpy as np
 
 from quakedesign.simulation.backend import Backend, compiler, ladder, shared_library
+from quakedesign.simulation.instructions import expanded
+from quakedesign.simulation.lanes import LANE_FLAGS, lanes_c, processor_flags
 from quakedesign.simulation.stepping import Advancer
 from quakedesign.temporary import temporary_folder
 
 Mover = Callable[["np.ndarray", int], None]
-
-STEP = "quakedesign_sample_step"  # no function of the C library may have this name
-# Every sample moves on until its steps are taken or it diverges; the vectors of one sample lie side by side.
-_LOOP = """
-CASADI_SYMBOL_EXPORT int advance_samples(double* vectors, long long samples, long long steps) {{
-  double first[{size}], second[{size}], work[{work}];
-  casadi_int integers[{integers}];
-  const double* arguments[{arguments}];
-  double* results[{results}];
-  long long sample, taken;
-  int i;
-  for (sample = 0; sample < samples; ++sample) {{
-    double* vector = vectors + sample * {size};
-    double *now = first, *next = second, *other;
-    for (i = 0; i < {size}; ++i) now[i] = vector[i];
-    for (taken = 0; taken < steps && !(now[{diverged}] >= 0); ++taken) {{
-      arguments[0] = now;
-      results[0] = next;
-      if ({step}(arguments, results, integers, work, 0)) return 1;
-      other = now;
-      now = next;
-      next = other;
-    }}
-    for (i = 0; i < {size}; ++i) vector[i] = now[i];
-  }}
-  return 0;
-}}
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,9 +65,9 @@ class Program:
     Attributes
     ----------
     source : str
-        C text with ``advance_samples``.
+        C text with ``advance_samples``, which steps several of them at once.
     function : str
-        The step as CasADi writes it, for workers without a C compiler.
+        The step with all elementary functions written out, as CasADi writes it, for workers without a C compiler.
     size : int
         Length of the vector of one sample.
     diverged : int
@@ -111,19 +85,8 @@ class Program:
     @classmethod
     def of(cls, step: Any, diverged: int) -> "Program":
         """Program of a CasADi Function that maps the vector one step on."""
-        generator = ca.CodeGenerator("steps.c")
-        generator.add(step)
-        sizes = {
-            "step": step.name(),
-            "size": step.size1_in(0),
-            "diverged": diverged,
-            "work": max(1, step.sz_w()),
-            "integers": max(1, step.sz_iw()),
-            "arguments": max(1, step.sz_arg()),
-            "results": max(1, step.sz_res()),
-        }
-        source = generator.dump() + _LOOP.format(**sizes)
-        return cls(source=source, function=step.serialize(), size=step.size1_in(0), diverged=diverged)
+        source, function = lanes_c(step, diverged), expanded(step).serialize()
+        return cls(source=source, function=function, size=step.size1_in(0), diverged=diverged)
 
     @property
     def fingerprint(self) -> str:
@@ -133,7 +96,9 @@ class Program:
     def compiled(self, folder: Path) -> "Program":
         """Program whose library lies in a folder, which must be private; the same program where no compiler works."""
         try:
-            return replace(self, library=Library.of(shared_library(self.source, folder, compiler())))
+            command = compiler()
+            built = shared_library(self.source, folder, command, (*LANE_FLAGS, *processor_flags(command)))
+            return replace(self, library=Library.of(built))
         except (OSError, subprocess.SubprocessError):
             return self
 
@@ -155,9 +120,12 @@ def mover(program: Program) -> Mover:
 
 
 def _machine_code(content: bytes, folder: Path, size: int) -> Mover:
-    library = folder / "loaded.so"
+    library = folder / f"{_digest(content)}.so"  # of another name than one that is loaded already, and refused
     library.write_bytes(content)
-    advance = ctypes.CDLL(str(library)).advance_samples
+    loaded = ctypes.CDLL(str(library))
+    if not loaded.made_for_this_processor():
+        raise OSError("the library was built for another processor")
+    advance = loaded.advance_samples
     rows = np.ctypeslib.ndpointer(dtype=np.float64, ndim=2, flags="C_CONTIGUOUS")
     advance.argtypes, advance.restype = [rows, ctypes.c_longlong, ctypes.c_longlong], ctypes.c_int
 

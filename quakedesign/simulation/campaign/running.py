@@ -23,6 +23,7 @@ from quakedesign.simulation.campaign.search import Worst, search
 from quakedesign.simulation.campaign.space import Sample, Space, require_count, require_seed
 from quakedesign.simulation.campaign.worker import advance
 from quakedesign.simulation.integrators import integrator
+from quakedesign.simulation.lanes import LANES
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.setting import Setting
 from quakedesign.temporary import temporary_folder
@@ -31,7 +32,7 @@ from quakedesign.workers import Crew, Processes
 if TYPE_CHECKING:
     import numpy as np
 
-BATCH_STEPS = 20_000_000  # of all samples of a batch together: what is lost when a worker dies, some half a minute
+BATCH_STEPS = 80_000_000  # of all samples of a batch together: what is lost when a worker dies, some half a minute
 LARGEST_BATCH = 64
 BATCHES_PER_WORKER = 8
 ROUNDS = 12
@@ -108,7 +109,8 @@ def run_campaign(
 
     Interrupted or killed at any moment, the same call goes on from the files, and its answer has the digits of an
     uninterrupted one, whatever the workers and their number. More samples than before go on from those that are there.
-    On a machine with another C library, the last digits may differ.
+    The digits depend neither on the processor nor on the C compiler and its library, but for loads with tan, inverse
+    functions or hyperbolic ones other than tanh.
 
     Parameters
     ----------
@@ -222,8 +224,9 @@ class _Runner:
         if self._batch is not None:
             require_count(self._batch)
             return self._batch
-        shared = -(-count // (BATCHES_PER_WORKER * self._crew.width))
-        return max(1, min(LARGEST_BATCH, shared, BATCH_STEPS // self._problem.setting.steps))
+        width, steps = self._crew.width, self._problem.setting.steps
+        wished = min(LARGEST_BATCH, -(-count // (BATCHES_PER_WORKER * width)), BATCH_STEPS // steps)
+        return max(1, min(-(-count // width), max(LANES, wished // LANES * LANES)))
 
     def search(self, results: Sequence[SampleResult | None], metric: str, rounds: int) -> Worst | None:
         """Worst sample by a metric, from the worst one known and the corners on; None where all failed."""
