@@ -65,6 +65,8 @@ def identify(
     if out is not None and identification.identified:
         save_fault(identification, around, out)
     told = [f"written: {', '.join(map(str, written))}"] if written else []
+    if out in written:
+        told.append(f"all but the friction is that of {around.name}: normal stress, size, task, T_s, disturbance")
     if out is not None and not identification.identified:
         told.append(f"not written: {out}, which needs every parameter")
     places = {"figure": figure, "file": out if identification.identified else None}

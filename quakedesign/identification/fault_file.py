@@ -110,7 +110,7 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     )
     return replace(
         fault,
-        name=f"{fault.name[:40].rstrip()} identified",
+        name=f"{fault.name[:40].rstrip()}-identified",
         source=f"friction identified from {identification.record.name}; everything else: {fault.source}",
         friction=held.law,
         box=held.box,

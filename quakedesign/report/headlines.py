@@ -190,7 +190,9 @@ _SAID = {
     "on_trajectory": "this run leaves the premise on |h'| {:.3g}-fold",
     "control_coefficient": "β leaves its certified range {:.3g}-fold",
     "friction_slope": "the friction slope exceeds the certified sector {:.3g}-fold",
-    "sampling_time": "T_s of the fault is {:.3g} times the longest with a guarantee, and this design samples faster",
+    "sampling_time": (
+        "T_s of the fault is {:.3g} times the longest for which a guarantee was found, and this design samples faster"
+    ),
     "constant_reference": "the reference moves, the certificate is about constant ones",
     "vanishing_disturbance": "the disturbance does not vanish at the equilibrium, so a bounded error remains",
 }

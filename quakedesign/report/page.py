@@ -78,6 +78,8 @@ def answer(comparison: "Compared") -> list[str]:
     for entry in designed:
         if isinstance(entry.guarantee, Guarantee):
             proved[entry.design.title] = f"{entry.guarantee.claims.peak_slip_rate:.3g} m/s ({entry.design.title})"
+    faster = {e.design.title: e.design.other_step for e in designed if e.design.title in proved and e.design.other_step}
+    lines += [f"{title}: {said}" for title, said in faster.items()]
     if proved:
         lines.append(
             f"With a designed controller the slip rate never exceeds {', '.join(proved.values())}: proved, for the "

@@ -102,7 +102,12 @@ def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", 
     console.print(run.name, style="bold")
     for sentence in run_sentences(run, fault):
         console.print(f"  {sentence}")
-    for name, number in run.metrics.to_dict().items():
+    if run.provenance["controller"] != "none" and run.provenance["step"] != fault.sampling_time:
+        console.print(f"  steps of {run.provenance['step']:.4g} s, not the fault's T_s = {fault.sampling_time:g} s")
+    numbers = run.metrics.to_dict()
+    if numbers["settled_from"] is not None:
+        console.print(f"  errors count from {numbers['settled_from']:.6g} s on")
+    for name, number in numbers.items():
         if number is not None:
             console.print(f"  {name} = {number + 0.0:.6g} {run.metrics.unit(name)}".rstrip())
     for name, time in run.events.items():

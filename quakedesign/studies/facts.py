@@ -78,10 +78,11 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
         return f"T_s = {adequacy.step:.4g} s: nothing grows between two samples"
     where = "over the uncertainty box" if adequacy.over_box else "of the nominal fault"
     longest = LowerBound(Fraction(adequacy.adequate_step)).quantity("s")
-    judged = "is adequate" if adequacy.adequate else "is TOO LONG for the instability"
+    judged = "is adequate" if adequacy.adequate else "is LONGER than a rule of thumb for the instability allows"
     return (
         f"T_s = {adequacy.step:.4g} s {judged}: times the unstable pole, {adequacy.pole:.4g} 1/s {where}, it is "
         f"{adequacy.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
+        f"{'' if adequacy.adequate else ' (what is proved at this T_s is what guarantee says)'}"
     )
 
 

@@ -84,6 +84,14 @@ class Design:
         sampled = self.controller is not None and self.controller.sampling is not None
         return tuple(p for p in self.premises if p.name in REACH) if sampled else self.premises
 
+    @property
+    def other_step(self) -> str:
+        """That a law of samples does not run at the fault's T_s, for which it is not proved; empty if it does."""
+        step = self.controller.sampling_time if self.controller else None
+        if step is None or step == self.fault.sampling_time:
+            return ""
+        return f"NOT for the fault's T_s = {self.fault.sampling_time:g} s: it runs once every {step:.4g} s"
+
     def with_premise(self, premise: Premise) -> "Design":
         """Return the design with one more premise, such as one read off a run."""
         return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
@@ -144,7 +152,8 @@ class Design:
 
     def __repr__(self) -> str:
         gains = ", ".join(f"{name} = {value}" for name, value in self.gains.items()) or "none"
-        return f"Design of {self.title} for {self.fault.name}: {self.verdict}; gains {gains}"
+        verdict = ", ".join(filter(None, (str(self.verdict), self.other_step)))
+        return f"Design of {self.title} for {self.fault.name}: {verdict}; gains {gains}"
 
     def _repr_html_(self) -> str:
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in self.gains.items())
@@ -154,4 +163,5 @@ class Design:
             for p in self.premises
         )
         head = "<tr><th>premise</th><th>required</th><th>certified</th><th>holds</th></tr>"
-        return f"<b>{self.title}: {self.verdict}</b><br>{escape(gains)}<table>{head}{rows}</table>"
+        verdict = ", ".join(filter(None, (str(self.verdict), self.other_step)))
+        return f"<b>{self.title}: {escape(verdict)}</b><br>{escape(gains)}<table>{head}{rows}</table>"

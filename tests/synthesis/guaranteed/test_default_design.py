@@ -5,6 +5,7 @@ from dataclasses import replace
 from fractions import Fraction as F
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.report import page
 from quakedesign.synthesis import answer, assess
 from quakedesign.synthesis.guaranteed import design_held, reached
 
@@ -70,7 +72,7 @@ def test_both_objectives_are_what_they_are_called(unreached):
         qd.design(REAL, "elqr", objective="speed")
 
 
-def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works():
+def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works(monkeypatch):
     design = designed("slow")
     assert not isinstance(design_held(task_of(SLOW), F(1, 10)), Guarantee)
     step = design.controller.step
@@ -79,6 +81,14 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert "even the nominal loop is not stable" in design.details["reason"]
     found = premises(design)["sampling_time"]
     assert (found.holds, found.certified) == (False, step)
+    said = f"NOT for the fault's T_s = 0.1 s: it runs once every {float(step):.4g} s"
+    assert said in repr(design)
+    assert said.replace("'", "&#x27;") in design._repr_html_()
+    entry = SimpleNamespace(design=design, guarantee=design.guarantee)
+    monkeypatch.setattr(page, "_natural", lambda _: "an earthquake")
+    told = page.answer(SimpleNamespace(of=lambda _: (entry,)))
+    assert told[:2] == ["an earthquake", f"e-LQR: {said}"]
+    assert designed("real").other_step == ""
     # the same law held over the fault's own T_s has none
     assert guarantee(task_of(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
 
