@@ -52,7 +52,7 @@ def test_designs_are_compared_in_the_scheme_asked_for(short, capsys):
     found = json.loads(out)["controllers"]["elqr"]
     assert code == 0
     assert found["run"]["scheme"] == "compensated"
-    assert "scheme compensated" in found["headline"]
+    assert any("scheme compensated" in remark for remark in found["remarks"])
     assert found["growth_per_step"] is None
 
 
