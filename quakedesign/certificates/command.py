@@ -77,8 +77,15 @@ def _guarantee(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     if fault is not None:
         if claim.task != guarantee.task_of(fault, rate_limited=claim.task.change is not None):
             raise CertificateError(f"the data are not those of {fault.name}")
-        lines.append(f"the data are those of {fault.name}, box {fault.box.name}")
+        lines.append(f"the data are those of {fault.name}, box {fault.box.name}{_other_step(claim, fault)}")
     return str(Verdict.PROVED), lines
+
+
+def _other_step(claim: "guarantee.Guarantee | guarantee.ContinuousPeaks", fault: "Fault") -> str:
+    """That a loop is not sampled as the fault is, where it is so."""
+    if isinstance(claim, guarantee.ContinuousPeaks) or float(claim.held.step) == fault.sampling_time:
+        return ""
+    return f"; NOT at its T_s = {fault.sampling_time:g} s, but at {float(claim.held.step):.4g} s"
 
 
 def _sliding(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from quakedesign.bounds import Bound, LowerBound, UpperBound
 from quakedesign.output import whole_folder, write_whole
+from quakedesign.rationals import rational
 from quakedesign.report.drawing import NATURAL, figure, finish
 from quakedesign.report.figure_files import write_figures
 from quakedesign.studies import Limits
@@ -32,7 +33,8 @@ def limits_lines(limits: Limits) -> list[str]:
         f"{_shown(limit.proved_up_to, limit.unit):>16}"
         for limit in limits.named().values()
     ]
-    return [*head, *rows, "", *(line for said in _meaning(limits) for line in wrap(said, 80, subsequent_indent="  "))]
+    told = [*_meaning(limits), *_undecided(limits)]
+    return [*head, *rows, "", *(line for said in told for line in wrap(said, 80, subsequent_indent="  "))]
 
 
 def _meaning(limits: Limits) -> list[str]:
@@ -52,6 +54,15 @@ def _meaning(limits: Limits) -> list[str]:
         f"D = {float(limits.diffusivity):g} m^2/s; a constant push that begins after a sample makes the fault slip "
         "until its friction is lost, even if the controller knows everything from the next sample on",
     ]
+
+
+def _undecided(limits: Limits) -> list[str]:
+    """That neither side reaches the fault's own T_s, where it is so."""
+    step, own = limits.largest_step, rational(limits.fault.sampling_time)
+    proved = step.proved_up_to is not None and own <= step.proved_up_to
+    if proved or step.impossible_beyond is None or own > step.impossible_beyond:
+        return []
+    return [f"T_s = {limits.fault.sampling_time:g} s of this fault: neither proved of a design nor impossible"]
 
 
 def _beyond(bound: Bound | None, unit: str) -> str:

@@ -15,6 +15,7 @@ from quakedesign.certificates.claim import Equilibrium
 from quakedesign.certificates.command import check_files, statement
 from quakedesign.certificates.guarantee import Guarantee
 from quakedesign.errors import CertificateError
+from quakedesign.fault import load_fault
 from quakedesign.symbolic.terms import Term
 
 CERTIFICATES = Path(__file__).parents[2] / "proofs" / "certificates"
@@ -73,6 +74,12 @@ def test_a_guarantee_covers_the_fault_whose_data_it_has(monkeypatch, tmp_path):
     assert (verdict, len(said), said[0]) == ("proved", 2, "fault real-fault, by the data in the file")
     assert said[1].startswith("from rest, held over 0.184 s")
     assert checked(path, "real-fault") == ("proved", [*said, "the data are those of real-fault, box paper"])
+    slower = replace(load_fault("real-fault"), sampling_time=0.5)
+    monkeypatch.setattr(
+        "quakedesign.fault.load_fault", lambda name, **_: slower if name == "slower" else load_fault(name)
+    )
+    told = "the data are those of real-fault, box paper; NOT at its T_s = 0.5 s, but at 0.184 s"
+    assert checked(path, "slower") == ("proved", [*said, told])
     assert checked(path, "lab-fault") == ("invalid: the data are not those of lab-fault", [])
     raw = json.loads(path.read_text())
     raw["disturbance"]["change"] = "69/312500"

@@ -71,6 +71,12 @@ def test_both_sides_of_the_real_fault(designs):
             assert type(limit.proved_up_to) is not type(limit.impossible_beyond)
 
 
+@pytest.mark.parametrize(("step", "said"), [(0.184, False), (5.0, True), (40.0, False)])
+def test_between_both_sides_it_says_that_neither_is_known(designs, step, said):
+    lines = limits_lines(study(dataclasses.replace(REAL, sampling_time=step)))
+    assert (f"T_s = {step:g} s of this fault: neither proved of a design nor impossible" in lines) is said
+
+
 def test_the_search_doubles_and_then_bisects(designs):
     asked, _ = designs
     found = study(REAL)
