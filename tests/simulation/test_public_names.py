@@ -11,7 +11,8 @@ from quakedesign.loop.schemes import Scheme, schemes
 
 
 def test_every_stage_of_an_actuator_has_its_name_in_the_room():
-    offered = {item for item in vars(room).values() if isinstance(item, type) and issubclass(item, Stage)}
+    named = (getattr(room, name) for name in room.__all__)
+    offered = {item for item in named if isinstance(item, type) and issubclass(item, Stage)}
     assert offered == set(stages().values())
 
 
