@@ -31,7 +31,7 @@ import quakedesign as qd
 from quakedesign.certificates import certificate_text
 from quakedesign.certificates.command import check_files
 
-PROOFS = Path("..") / "proofs"
+PROOFS = next(base / "proofs" for base in Path(qd.__file__).parents if (base / "proofs").is_dir())
 path = PROOFS / "certificates" / "cta_7_5_2.3_1.1.json"
 certificate = qd.load_certificate(path)
 
