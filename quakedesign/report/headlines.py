@@ -37,7 +37,9 @@ def _reach(entry: "Entry") -> list[str]:
     if not certified:
         return []
     step, delay = (f"{LowerBound(Fraction(certified[name])):.3g} s" for name in ("sampling_time", "delay"))
-    return [f"designs with a guarantee were found for T_s up to {step}, and at the T_s above for delays up to {delay}"]
+    law = entry.design.controller
+    own = f"at T_s = {law.sampling_time:.6g} s" if law and law.sampling_time else "at the fault's own T_s"
+    return [f"designs with a guarantee were found for T_s up to {step}, and {own} for delays up to {delay}"]
 
 
 def said(entry: "Entry") -> str:

@@ -82,7 +82,7 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
     return (
         f"T_s = {adequacy.step:.4g} s {judged}: times the unstable pole, {adequacy.pole:.4g} 1/s {where}, it is "
         f"{adequacy.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
-        f"{'' if adequacy.adequate else ' (what is proved at this T_s is what guarantee says)'}"
+        f"{'' if adequacy.adequate else '; guarantee says whether something is proved at this T_s all the same'}"
     )
 
 

@@ -42,10 +42,14 @@ def test_json_holds_what_is_promised(record, tmp_path, capsys):
     assert "<svg" in figure.read_text()[:2000]
 
 
-def test_text_keeps_within_80_columns(record, capsys):
-    code, out, _ = run(capsys, record, "--law", "linear-slip-weakening", "--normal-stress", "5 MPa")
+def test_text_keeps_within_80_columns_and_says_what_is_not_from_the_record(record, capsys, tmp_path):
+    told = (record, "--law", "linear-slip-weakening", "--normal-stress", "5 MPa")
+    code, out, _ = run(capsys, *told)
     assert code == 0
     assert "every parameter identified" in out
+    assert "all but the friction" not in out
+    written = run(capsys, *told, "--out", str(tmp_path / "own.toml"))[1]
+    assert "all but the friction is that of lab-fault: normal stress, size, task, T_s, disturbance" in written
     assert max(map(len, out.splitlines())) <= 80
 
 

@@ -47,6 +47,14 @@ def test_a_start_and_a_target_are_told(run):
     assert run(*SHORT, "--controller", "elqr", "--target-slip", "0 m")[0] == 2
 
 
+def test_a_run_says_from_when_errors_count_and_that_its_step_is_not_the_fault_s(run):
+    plain = ("simulate", "lab-fault", "--duration", "0.1", "--controller", "elqr")
+    own, other = run(*plain)[1], run(*plain, "--step", "0.5 ms")[1]
+    assert "errors count from 0.025 s on" in own
+    assert "not the fault's T_s" not in own
+    assert "steps of 0.0005 s, not the fault's T_s = 0.001 s" in other
+
+
 def test_the_adaptive_method_and_a_perturbation_are_chosen(run):
     pushed = ("--drift", "1e-6", "--perturbation", "1e-3*sin(9*time)")
     code, out, _ = run(*SHORT, "--controller", "elqr", "--method", "cvodes", *pushed)

@@ -62,12 +62,12 @@ class Answer:
     def limit_lines(self) -> list[str]:
         """What no controller can do at the same T_s, for people; empty where that is not known."""
         limit = self.limit
-        if limit is None:
+        if limit is None or not isinstance(self.found, Guarantee):
             return []
+        step = f"{float(self.found.held.step):.6g} s"
         both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
-        return [
-            f"no controller held over this T_s keeps the slip-rate error below {limit.slip_rate_error:.3g} m/s{both}"
-        ]
+        rate = f"{limit.slip_rate_error:.3g} m/s"
+        return [f"no controller held over T_s = {step} keeps the slip-rate error below {rate}{both}"]
 
     @property
     def limit(self) -> SmallestPeak | None:

@@ -16,7 +16,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.report import page
+from quakedesign.report import headlines, page
 from quakedesign.synthesis import answer, assess
 from quakedesign.synthesis.guaranteed import design_held, reached
 
@@ -89,6 +89,8 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     told = page.answer(SimpleNamespace(of=lambda _: (entry,)))
     assert told[:2] == ["an earthquake", f"e-LQR: {said}"]
     assert designed("real").other_step == ""
+    said = headlines.limit_lines(SimpleNamespace(design=design, answer=SimpleNamespace(limit_lines=list)))[0]
+    assert f"T_s up to {float(step):.3g} s, and at T_s = {float(step):.6g} s for delays up to " in said
     # the same law held over the fault's own T_s has none
     assert guarantee(task_of(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
 
