@@ -18,7 +18,8 @@ from quakedesign.simulation.slip_events import SlipEvent, cycle_outcome, dynamic
 from quakedesign.simulation.slow_sliding import SlidingRun, Tide, simulate_sliding
 from quakedesign.simulation.starting_state import StartingState, late_in_cycle, locked, sliding
 from quakedesign.symbolic import derive
-from quakedesign.synthesis.linear.sampled.slow_sliding import growth_rate, sliding_law, sliding_model
+from quakedesign.synthesis.linear.plant.sliding_model import growth_rate, sliding_model
+from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
 
 PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 _RTOL = 1e-8

@@ -5,10 +5,19 @@ from fractions import Fraction
 
 import pytest
 
+from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
-from quakedesign.certificates.slow_sliding import parse_sliding
+from quakedesign.certificates.guarantee import Held, NoGuarantee
+from quakedesign.certificates.slow_sliding import WHOLE, SlidingClaims, SlidingGuarantee, parse_sliding
 from quakedesign.cli import main
+from quakedesign.fault import load_fault
+from quakedesign.loop import LinearLaw
+from quakedesign.synthesis.guaranteed import sliding_answer
 
+LAW = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(Fraction(1), Fraction(0)))
+HELD = Held(law=LAW, step=Fraction(300))
+CLAIMS = SlidingClaims(**{name: UpperBound(Fraction(1)) for name in SlidingClaims.__dataclass_fields__})
+NONE = NoGuarantee(reason="too much", small_gain=None)
 LAGGED = ("guarantee", "creeping-patch", "--lag", "200 s", "--step", "4000 s")
 
 
@@ -36,6 +45,21 @@ def test_a_step_that_is_too_short_is_said_to_be(capsys):
     assert code == 1
     assert out.startswith("none: no law held over 10 s")
     assert "4e+03 s, suits" in out
+
+
+def test_an_estimate_of_the_largest_stress_that_is_too_large_is_lowered_until_it_is_proved(monkeypatch):
+    tried = []
+
+    def proved(task, design):
+        tried.append(task.stress)
+        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
+
+    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
+    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design: Fraction(41_000))
+    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
+    found = sliding_answer.answer_sliding(load_fault("crustal-patch"), diffusion=Fraction(800))
+    assert found.proved
+    assert tried == [41_000, 36_000, 30_000]
 
 
 @pytest.mark.parametrize(

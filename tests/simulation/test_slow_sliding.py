@@ -16,7 +16,8 @@ from quakedesign.fault.friction import friction_law
 from quakedesign.loop import LinearLaw, sliding_loop
 from quakedesign.simulation.slow_sliding import Tide, _Loop, simulate_sliding
 from quakedesign.symbolic import derive
-from quakedesign.synthesis.linear.sampled.slow_sliding import growth_rate, sliding_law, sliding_model
+from quakedesign.synthesis.linear.plant.sliding_model import growth_rate, sliding_model
+from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
 
 A, B, D, V, MU, NORMAL = 0.010, 0.015, 1e-3, 1.2e-6, 0.6, 50e6
 STIFFNESS, DAMPING = 30e9 / 5e3, 5e14 / 25e6

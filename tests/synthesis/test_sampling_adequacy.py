@@ -62,19 +62,17 @@ def test_a_pair_that_swings_counts_by_its_modulus():
     assert found.pole >= REAL.natural_frequency
 
 
-def test_friction_with_a_state_is_judged_at_its_operating_point():
-    from quakedesign.symbolic import derive
-
-    law = friction_law("rate-and-state-aging")(
-        reference_coefficient=0.6,
-        direct_effect=0.005,
-        evolution_effect=0.015,
-        critical_slip=0.01,
-        reference_rate=1e-6,
-        slowest_rate=1e-12,
-        fastest_rate=1.0,
-    )
-    fault = replace(REAL, friction=law, disturbance=Disturbance())
+@pytest.mark.parametrize("width", [None, 5e3])
+def test_friction_with_a_state_is_judged_in_slow_sliding_along_its_task(width):
+    """λ² + (κ − β + 1)ρλ + κρ² with κ = KD/S, β = Nb/S, S = Na + HV and ρ = V/D, at the rate V of the task."""
+    fault = replace(load_fault("crustal-patch"), width=width)
+    law, v = fault.friction, 1e-6
+    normal, ageing = 50e6, v / law.critical_slip
+    strength = normal * law.direct_effect + fault.damping / fault.area * v
+    kappa = fault.stiffness / fault.area * law.critical_slip / strength
+    beta = normal * law.evolution_effect / strength
+    roots = np.roots([1.0, (kappa - beta + 1) * ageing, kappa * ageing**2])
     found = sampling_adequacy(fault)
     assert not found.over_box
-    assert found.pole == max((abs(z) for z in derive(fault).eigenvalues if complex(z).real > 0), default=0.0)
+    assert found.pole == pytest.approx(max(abs(roots)), rel=1e-9)
+    assert min(roots.real) > 0

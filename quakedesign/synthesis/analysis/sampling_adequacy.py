@@ -9,6 +9,7 @@ from quakedesign.certificates.sectors import sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.symbolic import derive
+from quakedesign.synthesis.linear.plant.sliding_model import sliding_model, sliding_poles
 
 LARGEST_PRODUCT = 0.2
 """Of T_s and the unstable pole: five samples while an error grows e-fold, so that what one sample has not seen grows by
@@ -27,7 +28,8 @@ class SamplingAdequacy:
         Modulus of the fastest pole that grows [1/s]; 0 where none does.
     over_box : bool
         Whether `pole` is the fastest over the uncertainty box, at any pressure that equilibrium along the reference may
-        need there; if not, that of the nominal fault at its operating point.
+        need there; if not, that of the nominal fault at its operating point: at rest, or with one state in slow sliding
+        along its task, whose mean rate sets it.
     """
 
     step: float
@@ -76,9 +78,15 @@ def sampling_adequacy(fault: Fault) -> SamplingAdequacy:
     try:
         poles, over_box = _box_poles(fault), True
     except ParameterError:
-        poles, over_box = [complex(z) for z in derive(fault).eigenvalues], False
+        poles, over_box = _nominal_poles(fault), False
     pole = max((abs(z) for z in poles if z.real > 0), default=0.0)
     return SamplingAdequacy(step=fault.sampling_time, pole=pole, over_box=over_box)
+
+
+def _nominal_poles(fault: Fault) -> list[complex]:
+    if len(fault.friction.state_names) == 1:
+        return list(sliding_poles(sliding_model(fault)))
+    return [complex(z) for z in derive(fault).eigenvalues]
 
 
 def _box_poles(fault: Fault) -> list[complex]:

@@ -1,16 +1,23 @@
 """What is guaranteed of a law that holds a rate-and-state fault in slow sliding, as `guarantee` says it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Unpack
 
-from quakedesign.certificates.guarantee import NoGuarantee
+from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.statement import Around
-from quakedesign.certificates.slow_sliding import SlidingGuarantee, sliding_task
+from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask, sliding_task
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.synthesis.guaranteed.slow_sliding import designed_sliding, largest_stress, proved_sliding
+from quakedesign.synthesis.guaranteed.slow_sliding import (
+    designed_sliding,
+    largest_stress,
+    proved_sliding,
+    two_digits,
+)
+
+_SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of an estimate that may be too large
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,5 +110,16 @@ def answer_sliding(
     if isinstance(design, NoGuarantee):
         return SlidingAnswer(proof=design)
     if stress is None:
-        task = sliding_task(fault, largest_stress(task, design) or Fraction(1), spread)
+        return SlidingAnswer(proof=_with_the_largest_stress(task, design))
     return SlidingAnswer(proof=proved_sliding(task, design))
+
+
+def _with_the_largest_stress(task: SlidingTask, design: Held) -> SlidingGuarantee | NoGuarantee:
+    """A guarantee under about the largest stress that has one: what is estimated of it, or somewhat less."""
+    most = largest_stress(task, design) or Fraction(1)
+    found: SlidingGuarantee | NoGuarantee
+    for share in _SHARES:
+        found = proved_sliding(replace(task, stress=two_digits(share * most)), design)
+        if isinstance(found, SlidingGuarantee):
+            break
+    return found

@@ -91,9 +91,13 @@ def largest_stress(task: SlidingTask, held: Held, log_rate: Fraction = LOG_RATE)
     room = (1 if corner == task else _NEAR) * _NEAR * float(log_rate) - rest
     if None in found or room <= 0:
         return Fraction(0)
-    most = float(some) * room / (more - rest)
-    scale = Fraction(10) ** (floor(log10(most)) - 1)
-    return floor(Fraction(most) / scale) * scale
+    return two_digits(Fraction(float(some) * room / (more - rest)))
+
+
+def two_digits(value: Fraction) -> Fraction:
+    """At most a positive rational, with two digits."""
+    scale = Fraction(10) ** (floor(log10(value)) - 1)
+    return floor(value / scale) * scale
 
 
 def designed_sliding(

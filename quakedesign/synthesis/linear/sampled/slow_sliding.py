@@ -12,14 +12,10 @@ from math import exp
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from scipy.linalg import LinAlgError, expm, solve_discrete_are
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault import Fault
 from quakedesign.loop import Layer, LinearLaw, SlidingModel
-from quakedesign.rationals import fraction_of, rational
-from quakedesign.symbolic.slow_sliding import sliding_errors, sliding_rate
 from quakedesign.synthesis.guaranteed.rounding import short
 
 MODES = 4
@@ -50,47 +46,6 @@ class Weights:
 
 FAVOURED = Weights(slip=4.4e-3, state=5.5e-3, pressure=344.0, slip_noise=5.9e3, state_noise=1.4e-4, level_noise=162.0)
 """Of a search for the smallest worst peak of y under bounded stresses: a = 0.01, b = 0.015, ρL²/D = 1, ρT_s = 0.05."""
-
-
-def sliding_model(fault: Fault) -> SlidingModel:
-    """A fault about sliding along its task at the mean rate V, linearised; η and k with it, at the pressure 0.
-
-    Raises
-    ------
-    UnsupportedError
-        For friction without a state.
-    """
-    law = fault.friction.exact()
-    errors = sliding_errors(law)
-    rate = mean_rate(fault)
-    at = {sliding_rate: _sympy(rate)}
-    direct, evolution = (_number(slope.subs(at)) for slope in errors.slopes)
-    normal = rational(fault.effective_normal_stress)
-    return SlidingModel(
-        rate=rate,
-        state_rate=_number(errors.decays[1].subs(at)),
-        slope=_ONE,
-        state_slope=_ONE,
-        strength=normal * direct + rational(fault.damping) / rational(fault.length) ** 2 * rate,
-        weakening=normal * evolution,
-        direct=direct,
-        evolution=evolution,
-        stiffness=rational(fault.shear_modulus) / rational(fault.length),
-        coefficient=_number(law.steady_coefficient(_sympy(rate))),
-    )
-
-
-def mean_rate(fault: Fault) -> Fraction:
-    """V [m/s]: the target slip over the operation time."""
-    return rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
-
-
-def growth_rate(model: SlidingModel) -> float:
-    """Real part of the fastest eigenvalue [1/s] about steady sliding, without control."""
-    kappa, b = (float(v / model.strength) for v in (model.stiffness, model.weakening))
-    matrix = np.array([[-kappa * float(model.rate), -b * float(model.rate)], [0.0, 0.0]])
-    matrix[1] = float(model.state_rate) * np.array([kappa, b - 1])
-    return float(np.max(np.linalg.eigvals(matrix).real))
 
 
 def sliding_law(
@@ -198,13 +153,3 @@ def _law(
         output=tuple(-stress * v for v in of_predicted(gains)),
         feedback=(-stress * of_measured(gains) / length, _ZERO),
     )
-
-
-def _sympy(value: Fraction) -> Any:
-    return sp.Rational(value.numerator, value.denominator)
-
-
-def _number(expression: Any) -> Fraction:
-    """Rational near a SymPy number; itself if it is rational."""
-    value = expression if expression.is_Rational else sp.N(expression, 30)
-    return fraction_of(value) if value.is_Rational else rational(str(value))
