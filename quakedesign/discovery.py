@@ -7,7 +7,7 @@ from inspect import isabstract, isclass
 from pkgutil import iter_modules
 from typing import Any, TypeVar, cast
 
-from quakedesign.errors import UnknownNameError
+from quakedesign.errors import UnknownNameError, require_known
 from quakedesign.text import shown
 
 Kind = TypeVar("Kind")
@@ -60,7 +60,7 @@ def named(name: str, known: Mapping[str, type[Kind]], kind: type, what: str) -> 
         return known[name]
     module, own, attribute = name.partition(":")
     if not own:
-        raise UnknownNameError(f"{what} must be one of {', '.join(known)}. Received {shown(name)}.")
+        require_known(name, known, what, UnknownNameError)
     if "" not in sys.path:  # a script that is installed does not look where it is started
         sys.path.append("")
     try:

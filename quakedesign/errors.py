@@ -1,6 +1,8 @@
 """The exceptions of quakedesign: one small tree, each message says what, expected, received, remedy."""
 
-from quakedesign.text import one_line
+from collections.abc import Iterable
+
+from quakedesign.text import nearest_name, one_line, shown
 
 
 class QuakedesignError(Exception):
@@ -67,3 +69,28 @@ class SimulationError(QuakedesignError, RuntimeError):
 
 class OutputError(QuakedesignError, OSError):
     """A result that cannot be written."""
+
+
+def require_known(
+    name: object, known: Iterable[str], what: str, refusal: type[QuakedesignError] = ParameterError
+) -> None:
+    """Refuse a name that is none of those known: the message lists them, and asks whether the nearest is meant.
+
+    Parameters
+    ----------
+    name : object
+        As it was received.
+    known : iterable of str
+    what : str
+        What the name is of, such as ``"controller"``.
+    refusal : type of QuakedesignError
+
+    Raises
+    ------
+    QuakedesignError
+        Of the type `refusal`.
+    """
+    names = list(known)
+    if name not in names:
+        listed = f"{what} must be one of {', '.join(names) or 'none'}. Received {shown(name)}."
+        raise refusal(listed + nearest_name(str(name), names))

@@ -2,7 +2,8 @@
 
 import re
 from collections.abc import Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
+from itertools import takewhile
 from unicodedata import category
 
 _OBEYED = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, invisible formats, half characters, line separators
@@ -24,9 +25,19 @@ def one_line(message: str) -> str:
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:
-    """Question whether the nearest known name is meant, to be put at the end of a message; nothing if none is near."""
-    close = get_close_matches(name[:_LONGEST_WORD], list(known), 1)
-    return f" Did you mean {close[0]}?" if close else ""
+    """Question whether the nearest known name is meant, to be put at the end of a message; nothing if none is near.
+
+    Capitals do not matter; of names that are equally near, the one that begins alike is asked for.
+    """
+    written = name[:_LONGEST_WORD].lower()
+    spelt = {each.lower(): each for each in known}
+
+    def likeness(each: str) -> tuple[float, int]:
+        alike = takewhile(lambda pair: pair[0] == pair[1], zip(each, written, strict=False))
+        return SequenceMatcher(None, each, written).ratio(), len(list(alike))
+
+    close = get_close_matches(written, spelt, n=5)
+    return f" Did you mean {spelt[max(close, key=likeness)]}?" if close else ""
 
 
 def shown(value: object) -> str:

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign import errors
-from quakedesign.text import one_line, visible
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.text import nearest_name, one_line, visible
 
 EXCEPTIONS = [e for e in vars(errors).values() if isinstance(e, type) and issubclass(e, errors.QuakedesignError)]
 
@@ -53,3 +54,36 @@ def test_every_refusal_is_one_visible_line_and_survives_a_worker(kind):
     assert said.startswith(r"first second \x1b[31m xxx")
     assert len(said) < 250
     assert str(pickle.loads(pickle.dumps(error))) == said
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "asked"),
+    [
+        ("elqrr", ("cta", "dia", "elqr"), "elqr"),
+        ("ELQR", ("cta", "dia", "elqr"), "elqr"),
+        ("ten_percent", ("paper", "ten-percent"), "ten-percent"),
+        ("mpa", ("Pa", "MPa"), "MPa"),
+        ("kmm", ("m", "mm", "km"), "km"),  # as near to mm: the first letter decides
+        ("kmm", ("km", "mm", "m"), "km"),
+        ("smooth", ("cta", "dia"), None),
+        ("x" * 10_000, ("x",), None),
+        ("", ("cta",), None),
+        ("cta", (), None),
+    ],
+)
+def test_the_nearest_name_is_asked_for_if_one_is_near(name, known, asked):
+    assert nearest_name(name, known) == (f" Did you mean {asked}?" if asked else "")
+
+
+def test_a_name_that_is_none_of_those_known_is_refused_with_all_of_them_and_the_nearest():
+    known = {"cta": 1, "elqr": 2}
+    require_known("elqr", known, "controller")
+    with pytest.raises(UnknownNameError) as refused:
+        require_known("elqrr", known, "controller", UnknownNameError)
+    assert str(refused.value) == "controller must be one of cta, elqr. Received 'elqrr'. Did you mean elqr?"
+    for wrong in ("wide", 3, None):
+        with pytest.raises(ParameterError) as refused:
+            require_known(wrong, iter(known), "box")
+        assert str(refused.value) == f"box must be one of cta, elqr. Received {wrong!r}."
+    with pytest.raises(ParameterError, match=r"^box must be one of none\. Received 'wide'\.$"):
+        require_known("wide", (), "box")

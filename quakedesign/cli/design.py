@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output
 from quakedesign.cli.shared import ExactMetres, ExactMetresPerSecond, app, command_line, console, print_lines, progress
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 
 @Parameter(name="*")
@@ -131,10 +131,10 @@ def controllers(name: str) -> list[str]:
     from quakedesign.synthesis import designable
 
     names = designable()
-    if name not in (*names, "all") and ":" not in name:
-        raise UnknownNameError(f"controller must be one of {', '.join(names)}, all. Received {name!r}.")
-    if name != "all":
+    if ":" in name:
         control_law(name)
+    else:
+        require_known(name, (*names, "all"), "controller", UnknownNameError)
     return list(names) if name == "all" else [name]
 
 

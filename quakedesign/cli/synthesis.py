@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Force, Output
 from quakedesign.cli.shared import Seconds, Whole, app, console, new_file
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 if TYPE_CHECKING:
     from quakedesign.synthesis.gains.synthesise import Synthesis
@@ -76,8 +76,7 @@ def synthesise(
     """
     from quakedesign.synthesis.gains.objectives import OBJECTIVES
 
-    if objective not in (*OBJECTIVES, "sampled"):
-        raise UnknownNameError(f"objective must be one of {', '.join(OBJECTIVES)}, sampled. Received {objective!r}.")
+    require_known(objective, (*OBJECTIVES, "sampled"), "objective", UnknownNameError)
     new_file(out, "certificate file", force=force)
     began = perf_counter()
     of_search = {"starts": starts, "seed": seed, "workers": workers}

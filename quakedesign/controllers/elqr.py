@@ -9,7 +9,7 @@ import sympy as sp
 
 from quakedesign.controllers.base import Controller, Signals
 from quakedesign.controllers.loop_field import LoopField
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 
 FEEDBACKS = ("error", "state")
 
@@ -72,8 +72,7 @@ class ExtendedLQR(Controller):
             raise ParameterError(
                 "limits need k4 other than 0, through which the integrals are driven back. Received 0."
             )
-        if self.feedback not in FEEDBACKS:
-            raise ParameterError(f"feedback must be one of {', '.join(FEEDBACKS)}. Received {self.feedback!r}.")
+        require_known(self.feedback, FEEDBACKS, "feedback")
 
     def pressure(self, signals: Signals) -> sp.Expr:
         """Return p [Pa] = offset − Kx_a, eq. u, inside the limits if there are any."""

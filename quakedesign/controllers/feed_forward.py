@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from quakedesign.errors import UnknownNameError
+from quakedesign.errors import UnknownNameError, require_known
 from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
@@ -106,8 +106,7 @@ def feed_forward(name: str, fault: Fault, divisor: Fraction) -> FeedForward:
     ------
     UnknownNameError
     """
-    if name not in _NAMED:
-        raise UnknownNameError(f"feed-forward must be one of {', '.join(_NAMED)}. Received {name!r}.")
+    require_known(name, _NAMED, "feed-forward", UnknownNameError)
     return _NAMED[name](fault, divisor)
 
 

@@ -11,7 +11,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.fault.dimensions import BASES, PLANT_UNITS, Quantity, dimension, dimensional_matrix, quantities
 from quakedesign.fault.parameters import Fault
 from quakedesign.fault.radical import Radical, radical
@@ -154,8 +154,7 @@ def ordered(fault: Fault, clock: str = CLOCKS[0]) -> tuple[Quantity, ...]:
     UnknownNameError
         For another clock.
     """
-    if clock not in CLOCKS:
-        raise UnknownNameError(f"clock must be one of {', '.join(CLOCKS)}. Received {clock!r}.")
+    require_known(clock, CLOCKS, "clock", UnknownNameError)
     first = ("unit friction", "density", "length", clock, *_slip_parameters(fault), "effective_normal_stress")
     found = quantities(fault)
     return tuple(sorted(found.values(), key=lambda q: (q.value == 0, first.index(q.name) if q.name in first else 99)))

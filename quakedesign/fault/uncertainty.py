@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +51,5 @@ def uncertainty_box(name: str) -> UncertaintyBox:
     ------
     UnknownNameError
     """
-    if name not in BOXES:
-        raise UnknownNameError(f"uncertainty box must be one of {', '.join(BOXES)}. Received {name!r}.")
+    require_known(name, BOXES, "uncertainty box", UnknownNameError)
     return BOXES[name]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import UnitError
-from quakedesign.text import shown
+from quakedesign.text import nearest_name, shown
 
 _TIMES = {"s": "1", "ms": "0.001", "us": "0.000001", "min": "60", "h": "3600", "hour": "3600", "day": "86400"}
 _LENGTHS = {"m": "1", "cm": "0.01", "mm": "0.001", "um": "0.000001", "nm": "1E-9", "km": "1000"}
@@ -111,15 +111,17 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
     if len(quantity) > 100:
         raise UnitError(f"{name} must be {wanted}. Received a text of {len(quantity)} characters.")
     number, written = _number_and_unit(quantity, received)
+    remedy = nearest_name(written, _PLAIN.get(unit, ())) or " Check its spelling."
+    unknown = f"{received}, whose unit is unknown.{remedy}"
     if number is not None and _is_no_unit(written):
-        raise UnitError(f"{received}, whose unit is unknown. Check its spelling.")
+        raise UnitError(unknown)
     import pint
 
     try:
         parsed = _registry().Quantity(f"1 {written}") * number if number is not None else _registry().Quantity(written)
         converted = parsed.to(unit or "dimensionless") if not (unit and parsed.unitless) else None
     except pint.UndefinedUnitError:
-        raise UnitError(f"{received}, whose unit is unknown. Check its spelling.") from None
+        raise UnitError(unknown) from None
     except pint.DimensionalityError:
         raise UnitError(f"{received}, which has another dimension.") from None
     except Exception:

@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, simulation_scheme
 from quakedesign.loop.sensing import Sensor
@@ -67,8 +67,7 @@ def loop_class(plant: str) -> type[ClosedLoop]:
         When there is none of that name.
     """
     classes = {kind.plant_name: kind for kind in (ClosedLoop, CoulombLoop)}
-    if plant not in classes:
-        raise ParameterError(f"plant must be one of {', '.join(classes)}. Received {plant!r}.")
+    require_known(plant, classes, "plant")
     return classes[plant]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quakedesign.controllers import Controller
-from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.errors import ParameterError, SimulationError, require_known
 from quakedesign.fault import Fault
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.simulate import simulate
@@ -182,8 +182,7 @@ def noise_sensitivity(
     """
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     exact = Measurement(seed=seed)
-    if of not in units:
-        raise ParameterError(f"noise must be one of {', '.join(units)}. Received {of!r}.")
+    require_known(of, units, "noise")
 
     def run(scheme: str, level: float) -> "Trajectory":
         slip, rate = (level, 0.0) if of == "slip_noise" else (0.0, level)

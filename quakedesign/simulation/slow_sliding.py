@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_nonnegative, require_positive
 from quakedesign.loop import Layer, LinearLaw
@@ -138,8 +138,7 @@ def simulate_sliding(
             "slow sliding needs friction with one state and a linear law of the slip alone. Received "
             f"{fault.friction.name}. Use simulate for other loops."
         )
-    if method not in adaptive_integrators():
-        raise ParameterError(f"method must be one of {', '.join(adaptive_integrators())}. Received {method!r}.")
+    require_known(method, adaptive_integrators(), "method")
     length = fault.reference.operation_time if duration is None else duration
     require_positive(duration=length, step=float(step))
     loop = _Loop.of(fault, diffusion, tide or Tide(), inertia)

@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.errors import SimulationError, require_known
 from quakedesign.simulation.integrators import adaptive_integrators
 from quakedesign.simulation.integrators.adaptive import require_tolerance
 from quakedesign.simulation.resolution import Resolution
@@ -198,6 +198,5 @@ def _solve(*arguments: Any, **options: Any) -> Any:
 
 def _check(method: str, rtol: float) -> None:
     known = (*METHODS, *adaptive_integrators())
-    if method not in known:
-        raise ParameterError(f"method must be one of {', '.join(known)}. Received {method!r}.")
+    require_known(method, known, "method")
     require_tolerance(rtol)

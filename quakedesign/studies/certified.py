@@ -9,7 +9,7 @@ from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Certificate, Loop, Verdict
-from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.errors import CertificateError, ParameterError, require_known
 from quakedesign.rationals import rational
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.synthesis.analysis.certify import Number, certify, closed_loop
@@ -83,8 +83,8 @@ def certified(
     """
     began = perf_counter()
     low, high = (rational(v, "gain_range") for v in gain_range)
-    if maximize not in (None, *MAXIMIZE):
-        raise ParameterError(f"maximize must be one of {', '.join(MAXIMIZE)}. Received {maximize!r}.")
+    if maximize is not None:
+        require_known(maximize, MAXIMIZE, "maximize")
     if lipschitz is None and maximize != "lipschitz":
         raise ParameterError(
             f"certify {name} needs a bound on |h'|. Received none. Give --lipschitz, or --maximize lipschitz."

@@ -10,7 +10,7 @@ from time import perf_counter
 from types import ModuleType
 from typing import Any
 
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 KINDS = ("symbolic identity", "counterexample", "numeric reproduction")
 
@@ -58,8 +58,7 @@ class Row:
     check: Callable[..., Finding]
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise ParameterError(f"kind of an erratum must be one of {', '.join(KINDS)}. Received {self.kind!r}.")
+        require_known(self.kind, KINDS, "kind of an erratum")
 
 
 def errata_folder() -> Path:

@@ -8,7 +8,7 @@ from typing import Any
 from quakedesign.certificates.premises import Premise, least_authority
 from quakedesign.controllers import Controller, control_law, published
 from quakedesign.controllers.feed_forward import feed_forward
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.fault import Fault
 from quakedesign.loop.actuators import DIRECT
 from quakedesign.loop.schemes import simulation_scheme
@@ -106,6 +106,8 @@ def choice(
 def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> tuple[Controller, Fraction | None]:
     """Law, and the bound on |h'| that is certified for λ = 1."""
     law = control_law(name)
+    if len(gains) == 1 and gains[0].isalpha():
+        require_known(gains[0], (*PUBLISHED, *DESIGNED, *CONTINUOUS), "gains in a word", UnknownNameError)
     if gains == PUBLISHED:
         known = published(fault.name)
         if name not in known:

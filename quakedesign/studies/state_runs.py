@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.fault import Disturbance, Fault
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop import SlidingModel
@@ -235,8 +235,7 @@ def run_held(
 
 
 def _require_runnable(fault: Fault, plant: str) -> None:
-    if plant not in PLANTS:
-        raise UnknownNameError(f"plant of a fault with a state must be {' or '.join(PLANTS)}. Received {plant!r}.")
+    require_known(plant, PLANTS, "plant of a fault with a state", UnknownNameError)
     if fault.disturbance != Disturbance():
         raise ParameterError(
             "a run of friction with a state has no disturbance but a pressure or a stress. Received a fault with a "
@@ -249,8 +248,7 @@ def _start(
 ) -> StartingState:
     given = {"hold": hold, "share": share}
     wanted: dict[str, tuple[str, ...]] = {"steady": (), "locked": ("hold",), "late": ("share",)}
-    if kind not in wanted:
-        raise UnknownNameError(f"start must be steady, locked or late. Received {kind!r}.")
+    require_known(kind, wanted, "start", UnknownNameError)
     if others := [name for name, value in given.items() if value is not None and name not in wanted[kind]]:
         raise ParameterError(f"{others[0]} belongs to another start than {kind}. Received both. Leave one out.")
     if kind == "steady":

@@ -7,7 +7,7 @@ from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.premises import least_authority
 from quakedesign.controllers import Controller, control_law
 from quakedesign.controllers.feed_forward import feed_forward
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault import Fault, require_fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.designed import Design
@@ -76,10 +76,11 @@ def design(
     fault.require_memoryless("design")
     added = feed_forward(feedforward, fault, least_authority(fault))
     noise = Around(slip_noise=rational(slip_noise, "slip_noise"), rate_noise=rational(rate_noise, "rate_noise"))
-    if objective not in OBJECTIVES or (continuous and objective != OBJECTIVES[0]):
+    require_known(objective, OBJECTIVES, "objective")
+    if continuous and objective != OBJECTIVES[0]:
         raise ParameterError(
-            f"objective must be one of {', '.join(OBJECTIVES)}, of designs that are not continuous. Received "
-            f"{objective!r}{' with continuous' if continuous else ''}. Change it."
+            f"the objective of a design in continuous time must be {OBJECTIVES[0]}. Received {objective!r}. "
+            "Leave it out, or continuous."
         )
     told: Any = {"objective": objective, "continuous": continuous, "measured": measured, "noise": noise}
     return law.design(Problem(fault=fault, answer=Design, feedforward=added, **told))

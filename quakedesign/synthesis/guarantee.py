@@ -6,7 +6,7 @@ from typing import Unpack
 from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.controllers import Controller, control_law
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, Answer
@@ -52,8 +52,7 @@ def answer(
     ------
     ParameterError
     """
-    if disturbance_class not in CLASSES:
-        raise ParameterError(f"class must be one of {', '.join(CLASSES)}. Received {disturbance_class!r}.")
+    require_known(disturbance_class, CLASSES, "class")
     period = rational(fault.sampling_time) if step is None else step
     if not Fraction(1, 10**9) <= period <= 10**9:
         raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")

@@ -82,7 +82,7 @@ def test_an_objective_is_refused_in_continuous_time(capsys, tmp_path):
     options = ("--continuous", "--objective", "peak", "--out", str(tmp_path / "o"))
     code, _, err = run(capsys, "design", short(tmp_path), "--controller", "cta", *options)
     assert (code, len(err.strip().splitlines())) == (2, 1)
-    assert "of designs that are not continuous. Received 'peak' with continuous" in err
+    assert "the objective of a design in continuous time must be tracking. Received 'peak'" in err
 
 
 def short(folder):

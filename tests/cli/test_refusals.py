@@ -4,6 +4,7 @@ import errno
 import io
 import json
 import os
+import shlex
 import sys
 import time
 from fractions import Fraction
@@ -43,6 +44,41 @@ def test_one_line_says_what_is_wrong(capsys, tmp_path, monkeypatch, arguments, s
     assert (code, out) == (2, "")
     assert said in err
     assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        ("design real-fault --controller elqrr", "elqr"),
+        ("design real-fault --controller ELQR", "elqr"),
+        ("design real-fault --box ten_percent", "ten-percent"),
+        ("design real-fault --published-scheme explict", "explicit"),
+        ("design real-fault --objective pek", "peak"),
+        ("compare real-fault --objective pek", "peak"),
+        ("guarantee real-fault --controller elqrr", "elqr"),
+        ("guarantee real-fault --controller cta --scheme compensatd", "compensated"),
+        ("guarantee real-fault --class ratee", "rate"),
+        ("guarantee real-fault --step '3 mss'", "ms"),
+        ("simulate real-fault --controller cta --gains publishd", "published"),
+        ("simulate real-fault --controller cta --feedforward nominl", "nominal"),
+        ("simulate real-fault --controller cta --plant colomb", "coulomb"),
+        ("simulate real-fault --controller cta --method dormand-prnce", "dormand-prince"),
+        ("simulate crustal-patch --start lokced", "locked"),
+        ("synthesise cta real-fault --objective decy", "decay"),
+        ("certify ctaa real-fault --gains 1 2 3 4", "cta"),
+        ("certify cta --gains 7 5 2 1 --maximize lipschiz", "lipschitz"),
+        ("figures real-fault --format svgg", "svg"),
+        ("fault real-fault --log-level inf", "info"),
+        ("fault real-falt", "real-fault"),
+        ("completion bsh", "bash"),
+    ],
+)
+def test_what_is_misspelt_is_asked_for_by_its_nearest_name(capsys, tmp_path, monkeypatch, arguments, meant):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, *shlex.split(arguments))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.replace('"', "").endswith(f"Did you mean {meant}?\n")
     assert list(tmp_path.iterdir()) == []
 
 

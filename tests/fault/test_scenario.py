@@ -83,7 +83,8 @@ def test_an_own_uncertainty_box():
 
 WRONG = {
     "negative density": ("2500 kg/m^3", "-2500 kg/m^3", ParameterError, "density must be positive and finite"),
-    "unknown unit": ("30 GPa", "30 GPaa", UnitError, "shear_modulus .* Received '30 GPaa', whose unit is unknown"),
+    "unknown unit": ("30 GPa", "30 GPaa", UnitError, "'30 GPaa', whose unit is unknown. Did you mean GPa"),
+    "unit far from any": ("30 GPa", "30 wheel", UnitError, "'30 wheel', whose unit is unknown. Check its spelling"),
     "wrong dimension": ("30 GPa", "30 m", UnitError, "shear_modulus .* another dimension"),
     "no unit in the text": ("30 GPa", "30", UnitError, "shear_modulus .* without a unit"),
     "number without unit": ('"30 GPa"', "30", UnitError, "shear_modulus .* Received 30 without a unit"),

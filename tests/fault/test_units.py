@@ -52,7 +52,7 @@ def test_decimals_are_not_rounded_twice():
 @pytest.mark.parametrize(
     ("quantity", "unit", "reason"),
     [
-        ("30 GPaa", "Pa", "whose unit is unknown. Check its spelling"),
+        ("30 GPaa", "Pa", "whose unit is unknown. Did you mean GPa"),
         ("20 MPas", "Pa", "symbols have no plural. Write MPa."),
         ("3 Pas", "Pa", "symbols have no plural. Write Pa."),
         ("30 m", "Pa", "which has another dimension"),

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import require_known
 from quakedesign.fault.friction.rate_and_state import RateAndState, aging_rate, aging_slope, slip_law_slope, slip_rate
 
 if TYPE_CHECKING:
@@ -42,8 +42,7 @@ class RegularisedRateAndState(RateAndState):
 
     def __post_init__(self) -> None:
         RateAndState.__post_init__(self)
-        if self.evolution not in EVOLUTIONS:
-            raise ParameterError(f"evolution must be one of {', '.join(EVOLUTIONS)}. Received {self.evolution!r}.")
+        require_known(self.evolution, EVOLUTIONS, "evolution")
 
     def friction(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
         """Friction coefficient [-] (Rice and Ben-Zion 1996)."""

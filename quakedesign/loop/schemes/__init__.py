@@ -7,7 +7,7 @@ from typing import Any
 from quakedesign.arguments import check_arguments
 from quakedesign.controllers import Controller
 from quakedesign.discovery import discovered, named
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.loop.schemes.base import Scheme, Stepped
 
 __all__ = ["Scheme", "Stepped", "own_way", "schemes", "simulation_scheme"]
@@ -27,8 +27,8 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
     ParameterError
         When there is none, or it does not have one of the settings.
     """
-    if name not in schemes() and ":" not in name:
-        raise ParameterError(f"scheme must be one of {', '.join(sorted(schemes()))}. Received {name!r}.")
+    if ":" not in name:
+        require_known(name, sorted(schemes()), "scheme")
     kind = named(name, schemes(), Scheme, "scheme")
     known: set[str] = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
     for setting in sorted(settings.keys() - known):

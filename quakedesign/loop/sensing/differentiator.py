@@ -5,7 +5,7 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop.sensing.coefficients import LONGEST, TABLES
 from quakedesign.loop.sensing.discretisation import explicit_step, implicit_step, lag_free
@@ -57,10 +57,7 @@ class Differentiator:
                 f"order + filter_order must be at most {LONGEST}, the end of the published table. "
                 f"Received {self.order} + {self.filter_order}."
             )
-        if self.discretisation not in DISCRETISATIONS:
-            raise ParameterError(
-                f"discretisation must be one of {', '.join(DISCRETISATIONS)}. Received {self.discretisation!r}."
-            )
+        require_known(self.discretisation, DISCRETISATIONS, "discretisation")
         size = math.log(self.bound) + (self.size + 1) * math.log(self.step)
         if not math.log(sys.float_info.min) < size < math.log(sys.float_info.max):
             raise ParameterError(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.output import write_whole
 from quakedesign.simulation.campaign.plotting import figure
 from quakedesign.simulation.campaign.problem import Problem, SampleResult
@@ -243,10 +243,9 @@ def require_metric(metric: str, known: Sequence[str]) -> None:
     ------
     ParameterError
     """
-    if metric not in known:
-        raise ParameterError(
-            f"metric must be one of {', '.join(known) or 'none, as all diverge'}. Received {metric!r}."
-        )
+    if not known:
+        raise ParameterError(f"metric must be one of none, as all diverge. Received {metric!r}.")
+    require_known(metric, known, "metric")
 
 
 def badness(result: SampleResult, metric: str) -> float:

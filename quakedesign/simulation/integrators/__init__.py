@@ -4,9 +4,10 @@ from functools import cache
 
 from quakedesign.arguments import check_arguments
 from quakedesign.discovery import discovered
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.simulation.integrators.adaptive import AdaptiveIntegrator
 from quakedesign.simulation.integrators.base import Integrator
+from quakedesign.text import nearest_name
 
 __all__ = ["AdaptiveIntegrator", "Integrator", "adaptive_integrators", "any_integrator", "integrator", "integrators"]
 
@@ -31,8 +32,7 @@ def integrator(name: str) -> type[Integrator]:
     ParameterError
         When there is none.
     """
-    if name not in integrators():
-        raise ParameterError(f"method must be one of {', '.join(sorted(integrators()))}. Received {name!r}.")
+    require_known(name, sorted(integrators()), "method")
     return integrators()[name]
 
 
@@ -49,6 +49,7 @@ def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
         raise ParameterError(
             f"method must be one of {', '.join(sorted(integrators()))} (fixed step) or "
             f"{', '.join(sorted(adaptive_integrators()))} (to a tolerance, smooth loops). Received {name!r}."
+            f"{nearest_name(name, known)}"
         )
     return known[name]
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.certificates.obligations import Obligations
 from quakedesign.controllers import Subject
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.synthesis.analysis.margins import largest_gain_range
 from quakedesign.synthesis.analysis.settling_time import fastest_settling
 from quakedesign.synthesis.gains.dilation import scaled_norm
@@ -162,8 +162,7 @@ def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
     ParameterError
         For a bound that is missing or not positive, or a loop that is not uncertain in what the objective is about.
     """
-    if name not in _KNOWN:
-        raise UnknownNameError(f"objective must be one of {', '.join(_KNOWN)}. Received {name!r}.")
+    require_known(name, _KNOWN, "objective", UnknownNameError)
     chosen = _KNOWN[name]
     if chosen.bounded and not (bound is not None and bound > 0):
         raise ParameterError(f"the objective {name} needs a positive bound on the norm. Received {bound}. Give one.")

@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from quakedesign.certificates import Loop
 from quakedesign.certificates.premises import coefficient_range, least_authority
 from quakedesign.controllers import Controller, control_law
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.simulation import Metrics, simulate, simulation_scheme
@@ -118,8 +118,7 @@ def sampling(
     law_of_ones = chosen.for_authority((1,) * len(chosen.gain_units), divisor)
     if law_of_ones.scale is None:
         raise ParameterError(f"sampled errors are searched for sliding modes. Received {law!r}.")
-    if metric not in (small := [name for name in Metrics.__dataclass_fields__ if name not in _NO_AIM]):
-        raise ParameterError(f"metric must be one of {', '.join(small)}. Received {metric!r}.")
+    require_known(metric, [name for name in Metrics.__dataclass_fields__ if name not in _NO_AIM], "metric")
     simulation_scheme(scheme)
     for name, given in (("step", step), ("duration", duration)):
         if given is not None and not 0 < given < math.inf:

@@ -13,7 +13,7 @@ from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuaran
 from quakedesign.certificates.guarantee.sector import holds
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.controllers import Sampling, SlidingMode
-from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.fault.checks import require_ordinary
 from quakedesign.loop import ImplicitRoot, Power
 from quakedesign.loop import compensated as compensated_law
@@ -174,8 +174,7 @@ def _deadbeat(
     task: Task, step: Fraction, objective: str, weights: tuple[Fraction, ...], **around: Unpack[Around]
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
     """Weight and authority for a deadbeat step, of any law, and the errors that it leaves, if it has a guarantee."""
-    if objective not in OBJECTIVES:
-        raise ParameterError(f"objective must be one of {', '.join(OBJECTIVES)}. Received {objective!r}.")
+    require_known(objective, OBJECTIVES, "objective")
     question = "deadbeat", task, step, objective, weights, sorted(around.items())
     search = partial(_deadbeat_search, task, step, objective, weights, around)
     weight, authority, *errors = map(Fraction, search_once(search, *question))

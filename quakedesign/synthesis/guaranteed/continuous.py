@@ -2,7 +2,7 @@
 
 from quakedesign.certificates.guarantee import ContinuousPeaks, NoGuarantee, continuous_peaks, task_of
 from quakedesign.controllers.elqr import ExtendedLQR
-from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.fault import Fault
 from quakedesign.loop import exact_integrals
 
@@ -30,10 +30,7 @@ def certified_peaks(
         For a law that starts with a pressure other than zero, friction with a state, or the class ``rate`` and a
         disturbance that does not start at 0.
     """
-    if disturbance_class not in CLASSES:
-        raise UnknownNameError(
-            f"disturbance class must be one of {', '.join(CLASSES)}. Received {disturbance_class!r}."
-        )
+    require_known(disturbance_class, CLASSES, "disturbance class", UnknownNameError)
     if controller.offset:
         raise ParameterError("a certified peak needs a law that starts with p = 0. Received one with an offset.")
     law = exact_integrals(tuple(controller.gains.values()), of_state=controller.feedback == "state")

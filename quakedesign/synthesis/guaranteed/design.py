@@ -13,7 +13,7 @@ from scipy.optimize import OptimizeResult, minimize
 from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.statement import Around
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.checks import require_ordinary
 from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated, slowly_estimated
 from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of, why_no_law
@@ -107,8 +107,7 @@ def design_held(
         For another objective or other measurements, or times and noise that are negative or too long.
     """
     delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
-    if objective not in OBJECTIVES:
-        raise ParameterError(f"objective must be one of {', '.join(OBJECTIVES)}. Received {objective!r}.")
+    require_known(objective, OBJECTIVES, "objective")
     if step <= 0 or not 0 <= delay <= MOST_DELAY * step or lag < 0:
         raise ParameterError(
             f"a design needs a positive step, a delay of 0 to {MOST_DELAY} steps and a lag of 0 or more. Received "
@@ -167,8 +166,7 @@ def _unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
 
 def _family(task: Task, step: Fraction, measured: str, around: Around) -> tuple[Family, Held]:
     """Laws to choose among, and the loop of the first."""
-    if measured not in MEASURED:
-        raise ParameterError(f"measured must be one of {', '.join(MEASURED)}. Received {measured!r}.")
+    require_known(measured, MEASURED, "measured")
     family = family_of(task, step, measured, around)
     return family, Held(law=family.law(np.array(family.starts[0])), step=step, **around)
 

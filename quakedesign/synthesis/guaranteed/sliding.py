@@ -8,7 +8,7 @@ from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.controllers import SlidingMode
-from quakedesign.errors import ParameterError
+from quakedesign.errors import require_known
 from quakedesign.loop.schemes import schemes
 from quakedesign.synthesis.guaranteed.compensated import GUARANTEED, Compensation, compensated, design_compensated
 from quakedesign.synthesis.guaranteed.slowly import tightened
@@ -58,8 +58,7 @@ def sliding_mode(
     ParameterError
         For an unknown scheme or objective, or a wrong number of gains.
     """
-    if scheme not in schemes():
-        raise ParameterError(f"scheme must be one of {', '.join(sorted(schemes()))}. Received {scheme!r}.")
+    require_known(scheme, sorted(schemes()), "scheme")
     base = law.from_values(gains) if gains else law.base_gains()[0].law
     if scheme != GUARANTEED:
         return NoGuarantee(reason=_why_none(task, law, scheme, step), small_gain=None)

@@ -18,7 +18,7 @@ import numpy as np
 from flint import arb, arb_mat, fmpq
 from scipy.linalg import expm
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import require_known
 
 INTEGRATIONS = ("exact", "euler")
 
@@ -48,8 +48,7 @@ def require_integration(integration: str) -> None:
     ------
     ParameterError
     """
-    if integration not in INTEGRATIONS:
-        raise ParameterError(f"integration must be one of {', '.join(INTEGRATIONS)}. Received {integration!r}.")
+    require_known(integration, INTEGRATIONS, "integration")
 
 
 def coefficients(T: Any, beta: Any, s: Any, w: Any, push: Sequence[Any], integration: str = "exact") -> tuple[Any, ...]:
