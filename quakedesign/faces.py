@@ -1,6 +1,7 @@
 """The face of a room: its public names, each loaded when it is asked for, and checking its arguments from then on.
 
-A room imports its public names under ``TYPE_CHECKING``, where tools and people find them, and ends in ``face``.
+A room imports its public names under ``TYPE_CHECKING``, each as itself, where tools and people find them, and ends in
+``face``, which makes them its ``__all__``.
 """
 
 import ast
@@ -56,10 +57,9 @@ def face(room: str, **elsewhere: str) -> None:
     homes = _homes(room) | elsewhere
     for name, home in homes.items():
         _CLASSES.setdefault(home, []).append(name)
-    module.__dict__["_homes"] = homes
+    module.__dict__.update(_homes=homes, __all__=sorted(homes, key=lambda name: (name.islower(), name)))
     module.__class__ = _Face
-    if hasattr(module, "__all__"):
-        check_arguments(room)
+    check_arguments(room)
 
 
 def _homes(room: str) -> dict[str, str]:

@@ -8,103 +8,58 @@ from typing import TYPE_CHECKING
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.loop.actuators import (
-        Actuator,
-        Delay,
-        Diffusion,
-        Lag,
-        Quantisation,
-        RateLimit,
-        Saturation,
-        stages,
-    )
-    from quakedesign.loop.schemes import Scheme, schemes, simulation_scheme
-    from quakedesign.loop.sensing import (
-        Averaging,
-        Differentiator,
-        JointCondition,
-        OutputFeedback,
-        Sensor,
-        Transducer,
-        joint_condition,
-        smallest_bound,
-    )
-    from quakedesign.loop.sensing.measurement import Measurement
-    from quakedesign.simulation.actuated_trajectory import SampledTrajectory
-    from quakedesign.simulation.c_source import ControllerStep
-    from quakedesign.simulation.earthquake import natural_earthquake
-    from quakedesign.simulation.energy import EnergyBudget
-    from quakedesign.simulation.export import controller_step, export_controller
-    from quakedesign.simulation.integrators import Integrator, integrator, integrators
-    from quakedesign.simulation.interop import to_casadi, to_iosystem
-    from quakedesign.simulation.linear_models import loop_transfer, to_statespace
-    from quakedesign.simulation.loading import Load
-    from quakedesign.simulation.metrics import ActuatorMetrics, Metrics, StickMetrics
-    from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
-    from quakedesign.simulation.perturbation import perturbation
-    from quakedesign.simulation.pressure_course import PressureCourse, pressure_course
-    from quakedesign.simulation.sensitivity import Study, accuracy, gain_sensitivity, noise_sensitivity
-    from quakedesign.simulation.simulate import simulate
-    from quakedesign.simulation.state_plants import SpringSlider
-    from quakedesign.simulation.state_run import simulate_state, velocity_step
-    from quakedesign.simulation.state_trajectory import StateTrajectory
-    from quakedesign.simulation.trajectory import Trajectory
-    from quakedesign.simulation.variation import Variation
-
-__all__ = [
-    "Actuator",
-    "ActuatorMetrics",
-    "Averaging",
-    "ControllerStep",
-    "Delay",
-    "Differentiator",
-    "Diffusion",
-    "EnergyBudget",
-    "Integrator",
-    "JointCondition",
-    "Lag",
-    "Load",
-    "Measurement",
-    "Metrics",
-    "Outcome",
-    "OutcomeCriterion",
-    "OutputFeedback",
-    "PressureCourse",
-    "Quantisation",
-    "RateLimit",
-    "SampledTrajectory",
-    "Saturation",
-    "Scheme",
-    "Sensor",
-    "SpringSlider",
-    "StateTrajectory",
-    "StickMetrics",
-    "Study",
-    "Trajectory",
-    "Transducer",
-    "Variation",
-    "accuracy",
-    "controller_step",
-    "export_controller",
-    "gain_sensitivity",
-    "integrator",
-    "integrators",
-    "joint_condition",
-    "loop_transfer",
-    "natural_earthquake",
-    "noise_sensitivity",
-    "perturbation",
-    "pressure_course",
-    "schemes",
-    "simulate",
-    "simulate_state",
-    "simulation_scheme",
-    "smallest_bound",
-    "stages",
-    "to_casadi",
-    "to_iosystem",
-    "to_statespace",
-    "velocity_step",
-]
+    from quakedesign.loop.actuators import Actuator as Actuator
+    from quakedesign.loop.actuators import Delay as Delay
+    from quakedesign.loop.actuators import Diffusion as Diffusion
+    from quakedesign.loop.actuators import Lag as Lag
+    from quakedesign.loop.actuators import Quantisation as Quantisation
+    from quakedesign.loop.actuators import RateLimit as RateLimit
+    from quakedesign.loop.actuators import Saturation as Saturation
+    from quakedesign.loop.actuators import stages as stages
+    from quakedesign.loop.schemes import Scheme as Scheme
+    from quakedesign.loop.schemes import schemes as schemes
+    from quakedesign.loop.schemes import simulation_scheme as simulation_scheme
+    from quakedesign.loop.sensing import Averaging as Averaging
+    from quakedesign.loop.sensing import Differentiator as Differentiator
+    from quakedesign.loop.sensing import JointCondition as JointCondition
+    from quakedesign.loop.sensing import OutputFeedback as OutputFeedback
+    from quakedesign.loop.sensing import Sensor as Sensor
+    from quakedesign.loop.sensing import Transducer as Transducer
+    from quakedesign.loop.sensing import joint_condition as joint_condition
+    from quakedesign.loop.sensing import smallest_bound as smallest_bound
+    from quakedesign.loop.sensing.measurement import Measurement as Measurement
+    from quakedesign.simulation.actuated_trajectory import SampledTrajectory as SampledTrajectory
+    from quakedesign.simulation.c_source import ControllerStep as ControllerStep
+    from quakedesign.simulation.earthquake import natural_earthquake as natural_earthquake
+    from quakedesign.simulation.energy import EnergyBudget as EnergyBudget
+    from quakedesign.simulation.export import controller_step as controller_step
+    from quakedesign.simulation.export import export_controller as export_controller
+    from quakedesign.simulation.integrators import Integrator as Integrator
+    from quakedesign.simulation.integrators import integrator as integrator
+    from quakedesign.simulation.integrators import integrators as integrators
+    from quakedesign.simulation.interop import to_casadi as to_casadi
+    from quakedesign.simulation.interop import to_iosystem as to_iosystem
+    from quakedesign.simulation.linear_models import loop_transfer as loop_transfer
+    from quakedesign.simulation.linear_models import to_statespace as to_statespace
+    from quakedesign.simulation.loading import Load as Load
+    from quakedesign.simulation.metrics import ActuatorMetrics as ActuatorMetrics
+    from quakedesign.simulation.metrics import Metrics as Metrics
+    from quakedesign.simulation.metrics import StickMetrics as StickMetrics
+    from quakedesign.simulation.outcome import Outcome as Outcome
+    from quakedesign.simulation.outcome import OutcomeCriterion as OutcomeCriterion
+    from quakedesign.simulation.perturbation import perturbation as perturbation
+    from quakedesign.simulation.pressure_course import PressureCourse as PressureCourse
+    from quakedesign.simulation.pressure_course import pressure_course as pressure_course
+    from quakedesign.simulation.sensitivity import Study as Study
+    from quakedesign.simulation.sensitivity import accuracy as accuracy
+    from quakedesign.simulation.sensitivity import gain_sensitivity as gain_sensitivity
+    from quakedesign.simulation.sensitivity import noise_sensitivity as noise_sensitivity
+    from quakedesign.simulation.simulate import simulate as simulate
+    from quakedesign.simulation.state_plants import SpringSlider as SpringSlider
+    from quakedesign.simulation.state_run import simulate_state as simulate_state
+    from quakedesign.simulation.state_run import velocity_step as velocity_step
+    from quakedesign.simulation.state_trajectory import StateTrajectory as StateTrajectory
+    from quakedesign.simulation.trajectory import Trajectory as Trajectory
+    from quakedesign.simulation.variation import Variation as Variation
 
 face(__name__)

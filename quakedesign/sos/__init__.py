@@ -5,40 +5,22 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.sos.exact.answer import Answer, Positivity
-    from quakedesign.sos.exact.attraction import Attraction, Region
-    from quakedesign.sos.exact.attraction_files import save_attraction
-    from quakedesign.sos.exact.polynomial import Polynomial
-    from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares, holds
-    from quakedesign.sos.exact.statement import Statement, statement
+    from quakedesign.sos.exact.answer import Answer as Answer
+    from quakedesign.sos.exact.answer import Positivity as Positivity
+    from quakedesign.sos.exact.attraction import Attraction as Attraction
+    from quakedesign.sos.exact.attraction import Region as Region
+    from quakedesign.sos.exact.attraction_files import save_attraction as save_attraction
+    from quakedesign.sos.exact.polynomial import Polynomial as Polynomial
+    from quakedesign.sos.exact.proofs import Functional as Functional
+    from quakedesign.sos.exact.proofs import Point as Point
+    from quakedesign.sos.exact.proofs import Square as Square
+    from quakedesign.sos.exact.proofs import SumOfSquares as SumOfSquares
+    from quakedesign.sos.exact.proofs import holds as holds
+    from quakedesign.sos.exact.statement import Statement as Statement
+    from quakedesign.sos.exact.statement import statement as statement
 
     def __getattr__(name: str) -> Any: ...
 
-
-__all__ = [
-    "Answer",
-    "Attraction",
-    "Functional",
-    "Membership",
-    "Point",
-    "Polynomial",
-    "Positivity",
-    "Program",
-    "Region",
-    "Square",
-    "Statement",
-    "SumOfSquares",
-    "decide",
-    "holds",
-    "largest",
-    "prove",
-    "read_gram",
-    "region_of_attraction",
-    "save_attraction",
-    "stability",
-    "statement",
-    "verify",
-]
 
 _SEARCH = "quakedesign.sos.solve"  # no import, not even for type checkers: what decides knows no solver
 face(

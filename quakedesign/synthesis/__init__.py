@@ -5,25 +5,14 @@ from typing import TYPE_CHECKING
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.sos.solve.conic import stated_problems
-    from quakedesign.synthesis.analysis.certify import certify
-    from quakedesign.synthesis.design import assess, design
-    from quakedesign.synthesis.designed import Design
-    from quakedesign.synthesis.gains.synthesise import synthesise
-    from quakedesign.synthesis.guarantee import answer
-    from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
-    from quakedesign.synthesis.methods.base import designable
-
-__all__ = [
-    "Design",
-    "answer",
-    "answer_sliding",
-    "assess",
-    "certify",
-    "design",
-    "designable",
-    "stated_problems",
-    "synthesise",
-]
+    from quakedesign.sos.solve.conic import stated_problems as stated_problems
+    from quakedesign.synthesis.analysis.certify import certify as certify
+    from quakedesign.synthesis.design import assess as assess
+    from quakedesign.synthesis.design import design as design
+    from quakedesign.synthesis.designed import Design as Design
+    from quakedesign.synthesis.gains.synthesise import synthesise as synthesise
+    from quakedesign.synthesis.guarantee import answer as answer
+    from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding as answer_sliding
+    from quakedesign.synthesis.methods.base import designable as designable
 
 face(__name__)

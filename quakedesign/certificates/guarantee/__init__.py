@@ -5,28 +5,18 @@ from typing import TYPE_CHECKING
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.certificates.guarantee.continuous import ContinuousPeaks, continuous_peaks
-    from quakedesign.certificates.guarantee.fault_data import task_of
-    from quakedesign.certificates.guarantee.files import read_guarantee
-    from quakedesign.certificates.guarantee.slow_gain import SlowGain
-    from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held, guarantee
-    from quakedesign.certificates.guarantee.task import Task
-    from quakedesign.certificates.guarantee.theorem import Bounds, NoGuarantee, certified_bounds
-
-__all__ = [
-    "Bounds",
-    "Claims",
-    "ContinuousPeaks",
-    "Guarantee",
-    "Held",
-    "NoGuarantee",
-    "SlowGain",
-    "Task",
-    "certified_bounds",
-    "continuous_peaks",
-    "guarantee",
-    "read_guarantee",
-    "task_of",
-]
+    from quakedesign.certificates.guarantee.continuous import ContinuousPeaks as ContinuousPeaks
+    from quakedesign.certificates.guarantee.continuous import continuous_peaks as continuous_peaks
+    from quakedesign.certificates.guarantee.fault_data import task_of as task_of
+    from quakedesign.certificates.guarantee.files import read_guarantee as read_guarantee
+    from quakedesign.certificates.guarantee.slow_gain import SlowGain as SlowGain
+    from quakedesign.certificates.guarantee.statement import Claims as Claims
+    from quakedesign.certificates.guarantee.statement import Guarantee as Guarantee
+    from quakedesign.certificates.guarantee.statement import Held as Held
+    from quakedesign.certificates.guarantee.statement import guarantee as guarantee
+    from quakedesign.certificates.guarantee.task import Task as Task
+    from quakedesign.certificates.guarantee.theorem import Bounds as Bounds
+    from quakedesign.certificates.guarantee.theorem import NoGuarantee as NoGuarantee
+    from quakedesign.certificates.guarantee.theorem import certified_bounds as certified_bounds
 
 face(__name__)

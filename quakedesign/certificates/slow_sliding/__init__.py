@@ -5,31 +5,18 @@ from typing import TYPE_CHECKING
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.certificates.slow_sliding.cells import WHOLE, Cuts, cells, parts
-    from quakedesign.certificates.slow_sliding.files import (
-        parse_sliding,
-        read_sliding,
-        save_sliding,
-        sliding_text,
-    )
-    from quakedesign.certificates.slow_sliding.statement import SlidingGuarantee
-    from quakedesign.certificates.slow_sliding.task import SlidingTask, sliding_task
-    from quakedesign.certificates.slow_sliding.theorem import SlidingClaims, cell_bounds
-
-__all__ = [
-    "WHOLE",
-    "Cuts",
-    "SlidingClaims",
-    "SlidingGuarantee",
-    "SlidingTask",
-    "cell_bounds",
-    "cells",
-    "parse_sliding",
-    "parts",
-    "read_sliding",
-    "save_sliding",
-    "sliding_task",
-    "sliding_text",
-]
+    from quakedesign.certificates.slow_sliding.cells import WHOLE as WHOLE
+    from quakedesign.certificates.slow_sliding.cells import Cuts as Cuts
+    from quakedesign.certificates.slow_sliding.cells import cells as cells
+    from quakedesign.certificates.slow_sliding.cells import parts as parts
+    from quakedesign.certificates.slow_sliding.files import parse_sliding as parse_sliding
+    from quakedesign.certificates.slow_sliding.files import read_sliding as read_sliding
+    from quakedesign.certificates.slow_sliding.files import save_sliding as save_sliding
+    from quakedesign.certificates.slow_sliding.files import sliding_text as sliding_text
+    from quakedesign.certificates.slow_sliding.statement import SlidingGuarantee as SlidingGuarantee
+    from quakedesign.certificates.slow_sliding.task import SlidingTask as SlidingTask
+    from quakedesign.certificates.slow_sliding.task import sliding_task as sliding_task
+    from quakedesign.certificates.slow_sliding.theorem import SlidingClaims as SlidingClaims
+    from quakedesign.certificates.slow_sliding.theorem import cell_bounds as cell_bounds
 
 face(__name__)

@@ -5,23 +5,14 @@ from typing import TYPE_CHECKING
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.loop.sensing.averaging import Averaging
-    from quakedesign.loop.sensing.base import Sensor, SlipStage
-    from quakedesign.loop.sensing.differentiator import Differentiator
-    from quakedesign.loop.sensing.joint_choice import JointCondition, joint_condition, smallest_bound
-    from quakedesign.loop.sensing.noise import Transducer
-    from quakedesign.loop.sensing.output_feedback import OutputFeedback
-
-__all__ = [
-    "Averaging",
-    "Differentiator",
-    "JointCondition",
-    "OutputFeedback",
-    "Sensor",
-    "SlipStage",
-    "Transducer",
-    "joint_condition",
-    "smallest_bound",
-]
+    from quakedesign.loop.sensing.averaging import Averaging as Averaging
+    from quakedesign.loop.sensing.base import Sensor as Sensor
+    from quakedesign.loop.sensing.base import SlipStage as SlipStage
+    from quakedesign.loop.sensing.differentiator import Differentiator as Differentiator
+    from quakedesign.loop.sensing.joint_choice import JointCondition as JointCondition
+    from quakedesign.loop.sensing.joint_choice import joint_condition as joint_condition
+    from quakedesign.loop.sensing.joint_choice import smallest_bound as smallest_bound
+    from quakedesign.loop.sensing.noise import Transducer as Transducer
+    from quakedesign.loop.sensing.output_feedback import OutputFeedback as OutputFeedback
 
 face(__name__)

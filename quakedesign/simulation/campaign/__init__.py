@@ -5,24 +5,15 @@ from typing import TYPE_CHECKING
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.simulation.campaign.crews import SerialExecutor
-    from quakedesign.simulation.campaign.problem import Problem, SampleResult
-    from quakedesign.simulation.campaign.result import Campaign, Failure
-    from quakedesign.simulation.campaign.running import campaign_problem, run_campaign
-    from quakedesign.simulation.campaign.search import Worst
-    from quakedesign.simulation.campaign.space import Sample, Space
-
-__all__ = [
-    "Campaign",
-    "Failure",
-    "Problem",
-    "Sample",
-    "SampleResult",
-    "SerialExecutor",
-    "Space",
-    "Worst",
-    "campaign_problem",
-    "run_campaign",
-]
+    from quakedesign.simulation.campaign.crews import SerialExecutor as SerialExecutor
+    from quakedesign.simulation.campaign.problem import Problem as Problem
+    from quakedesign.simulation.campaign.problem import SampleResult as SampleResult
+    from quakedesign.simulation.campaign.result import Campaign as Campaign
+    from quakedesign.simulation.campaign.result import Failure as Failure
+    from quakedesign.simulation.campaign.running import campaign_problem as campaign_problem
+    from quakedesign.simulation.campaign.running import run_campaign as run_campaign
+    from quakedesign.simulation.campaign.search import Worst as Worst
+    from quakedesign.simulation.campaign.space import Sample as Sample
+    from quakedesign.simulation.campaign.space import Space as Space
 
 face(__name__)

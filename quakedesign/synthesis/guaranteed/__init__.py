@@ -5,42 +5,25 @@ from typing import TYPE_CHECKING
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
-    from quakedesign.synthesis.guaranteed.answer import Answer, attacked
-    from quakedesign.synthesis.guaranteed.compensated import Compensation, compensated, design_compensated
-    from quakedesign.synthesis.guaranteed.continuous import CLASSES, certified_peaks
-    from quakedesign.synthesis.guaranteed.default_design import (
-        SampledDesign,
-        sampled_design,
-        sampled_sliding_mode,
-    )
-    from quakedesign.synthesis.guaranteed.design import OBJECTIVES, design_held
-    from quakedesign.synthesis.guaranteed.families import MEASURED
-    from quakedesign.synthesis.guaranteed.reach import longest_delay, reached
-    from quakedesign.synthesis.guaranteed.sliding import guarantee_of
-    from quakedesign.synthesis.guaranteed.slowly import best_guarantee, tightened
-
-__all__ = [
-    "CLASSES",
-    "MEASURED",
-    "OBJECTIVES",
-    "Answer",
-    "Compensation",
-    "SampledDesign",
-    "WorstFound",
-    "attacked",
-    "best_guarantee",
-    "certified_peaks",
-    "compensated",
-    "design_compensated",
-    "design_held",
-    "guarantee_of",
-    "longest_delay",
-    "reached",
-    "sampled_design",
-    "sampled_sliding_mode",
-    "tightened",
-    "worst_found",
-]
+    from quakedesign.synthesis.guaranteed.adversary import WorstFound as WorstFound
+    from quakedesign.synthesis.guaranteed.adversary import worst_found as worst_found
+    from quakedesign.synthesis.guaranteed.answer import Answer as Answer
+    from quakedesign.synthesis.guaranteed.answer import attacked as attacked
+    from quakedesign.synthesis.guaranteed.compensated import Compensation as Compensation
+    from quakedesign.synthesis.guaranteed.compensated import compensated as compensated
+    from quakedesign.synthesis.guaranteed.compensated import design_compensated as design_compensated
+    from quakedesign.synthesis.guaranteed.continuous import CLASSES as CLASSES
+    from quakedesign.synthesis.guaranteed.continuous import certified_peaks as certified_peaks
+    from quakedesign.synthesis.guaranteed.default_design import SampledDesign as SampledDesign
+    from quakedesign.synthesis.guaranteed.default_design import sampled_design as sampled_design
+    from quakedesign.synthesis.guaranteed.default_design import sampled_sliding_mode as sampled_sliding_mode
+    from quakedesign.synthesis.guaranteed.design import OBJECTIVES as OBJECTIVES
+    from quakedesign.synthesis.guaranteed.design import design_held as design_held
+    from quakedesign.synthesis.guaranteed.families import MEASURED as MEASURED
+    from quakedesign.synthesis.guaranteed.reach import longest_delay as longest_delay
+    from quakedesign.synthesis.guaranteed.reach import reached as reached
+    from quakedesign.synthesis.guaranteed.sliding import guarantee_of as guarantee_of
+    from quakedesign.synthesis.guaranteed.slowly import best_guarantee as best_guarantee
+    from quakedesign.synthesis.guaranteed.slowly import tightened as tightened
 
 face(__name__)
