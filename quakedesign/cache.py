@@ -10,6 +10,7 @@ write, and so does each file; a file that is not what was written counts as none
 when they are too much together. Whatever fails, as where nothing can be written: the work is done anew.
 """
 
+import io
 import json
 import os
 import pickle
@@ -19,6 +20,7 @@ import stat
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import fields, is_dataclass
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
@@ -93,7 +95,7 @@ def search_once(search: Callable[[], Any], *question: Any) -> Any:
     if not in_use():
         return search()
     try:
-        asked = pickle.dumps(question)
+        asked = _stated(question)
     except (pickle.PicklingError, AttributeError, TypeError):
         return search()
     if (kept := recall("search", asked)) is not None:
@@ -101,6 +103,21 @@ def search_once(search: Callable[[], Any], *question: Any) -> Any:
     found = search()
     keep("search", json.dumps(found).encode(), asked)
     return found
+
+
+class _Statement(pickle.Pickler):
+    """A value by its fields alone: what was computed of it on the way and is kept beside them says nothing more."""
+
+    def reducer_override(self, value: Any) -> Any:
+        if not is_dataclass(value) or isinstance(value, type):
+            return NotImplemented
+        return type(value), tuple(getattr(value, field.name) for field in fields(value))
+
+
+def _stated(question: tuple[Any, ...]) -> bytes:
+    content = io.BytesIO()
+    _Statement(content).dump(question)
+    return content.getvalue()
 
 
 def _folder() -> Path | None:

@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+from dataclasses import dataclass
+from functools import cached_property
 
 import pytest
 
@@ -18,6 +20,15 @@ for number in range(100):
         found = cache.recall("run", b"%d" % size)
         assert found == bytes([size % 251]) * size, number
 """
+
+
+@dataclass(frozen=True)
+class Asked:
+    side: int
+
+    @cached_property
+    def area(self):
+        return self.side**2
 
 
 @pytest.fixture
@@ -154,8 +165,13 @@ def test_a_search_is_made_once(folder):
     for _ in range(2):
         assert cache.search_once(search, "asked", 1) == [0.1 + 0.2, float("inf"), [0]]
     assert cache.search_once(search, "asked", 2)[2] == [1]
-    assert cache.search_once(search, lambda: "no text says what this is")[2] == [2]
-    assert len(made) == 3
+    value = Asked(3)
+    assert cache.search_once(search, value)[2] == [2]
+    assert value.area == 9
+    assert cache.search_once(search, value)[2] == [2]  # it was known before its area was
+    assert cache.search_once(search, Asked(4))[2] == [3]
+    assert cache.search_once(search, lambda: "no text says what this is")[2] == [4]
+    assert len(made) == 5
 
 
 @pytest.mark.parametrize("told", ["XDG_CACHE_HOME", "HOME"])

@@ -116,6 +116,15 @@ def test_a_pointer_reads_the_values_that_were_drawn(drawing):
     assert logarithmic["box"][3] < top < bottom < height
 
 
+def test_a_figure_is_laid_out_once_for_all_its_files(monkeypatch):
+    made, _ = figure(1, 2.0)
+    times, draw = [], type(made).draw
+    monkeypatch.setattr(type(made), "draw", lambda *given: times.append(1) or draw(*given))
+    for kind in FORMATS:
+        figure_bytes(made, kind, "one")
+    assert len(times) == len(FORMATS)
+
+
 @pytest.mark.parametrize("kind", FORMATS)
 def test_figures_are_the_same_twice_and_carry_their_fonts(drawing, kind):
     data = figure_bytes(drawing, kind, "one")

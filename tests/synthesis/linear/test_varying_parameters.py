@@ -9,11 +9,13 @@ import pytest
 from scipy.linalg import expm, solve_discrete_lyapunov
 
 import quakedesign as qd
+from quakedesign import cache
 from quakedesign.certificates import Verdict
 from quakedesign.controllers import published
 from quakedesign.synthesis.linear.design.riccati import riccati_design
 from quakedesign.synthesis.linear.plant import rational_matrices as m
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.sampled import clock_dependent, input_delay
 from quakedesign.synthesis.linear.sampled.clock_dependent import clock_proof
 from quakedesign.synthesis.linear.sampled.held import held_loop
 from quakedesign.synthesis.linear.sampled.input_delay import delay_proof
@@ -57,6 +59,24 @@ def greedy_growth(choices, count=600):
 
 def longest_of(problem, gains):
     return largest_varying_step(problem, gains, largest_step(problem, gains, integration="euler"))
+
+
+def test_a_programme_is_solved_once_and_what_it_proposed_is_decided_each_time(tmp_path, monkeypatch):
+    monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
+    first = delay_proof(PROBLEM, NEAR_LIMIT, "0.1"), clock_proof(PROBLEM, NEAR_LIMIT, (F(1, 10), F(11, 100)), degree=4)
+    assert None not in first
+    with qd.stated_problems() as problems:
+        assert delay_proof(PROBLEM, NEAR_LIMIT, "0.1") == first[0]
+    assert len(problems) == 1
+    for module in (input_delay, clock_dependent):
+        monkeypatch.setattr(module, "solved", None)
+    assert delay_proof(PROBLEM, NEAR_LIMIT, "0.1") == first[0]
+    assert clock_proof(PROBLEM, NEAR_LIMIT, (F(1, 10), F(11, 100)), degree=4) == first[1]
+    with pytest.raises(TypeError):
+        delay_proof(PROBLEM, NEAR_LIMIT, "0.11")
+    indefinite = [np.diag([1.0, 1, 1, -1]).tolist(), np.eye(3).tolist()]
+    monkeypatch.setattr(input_delay, "search_once", lambda *_: indefinite)
+    assert delay_proof(PROBLEM, NEAR_LIMIT, "0.1") is None
 
 
 @pytest.fixture(scope="module")

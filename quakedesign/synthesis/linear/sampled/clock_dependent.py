@@ -31,7 +31,7 @@ from quakedesign.synthesis.linear.plant.rational_matrices import (
     total,
     transpose,
 )
-from quakedesign.synthesis.linear.sampled.input_delay import BITS, balanced_units, law_unit, scaled, solved
+from quakedesign.synthesis.linear.sampled.input_delay import BITS, balanced_units, law_unit, proposed, scaled, solved
 
 DEGREE = 8
 """Of P(θ): 4 reaches a longest period 2 % shorter, 12 one that is 0.5 % longer."""
@@ -134,7 +134,8 @@ def clock_proof(
     scales = problem.scales()
     inside, K = problem.nondimensional(scales), scales.gains_inside(gains)
     lengths = tuple(dict.fromkeys(step / scales.time for step in steps))
-    proposal = _propose(inside, K, lengths, degree) if any(K) else []
+    question = inside, K, lengths, degree
+    proposal = proposed(_propose, *question) if any(K) else []
     outside = [1 / u for u in (*scales.states, scales.pressure)]
     for bits in BITS if proposal else ():
         P = tuple(congruent(rounded(matrix, bits), outside) for matrix in proposal)
@@ -163,4 +164,4 @@ def _propose(problem: LinearProblem, K: Sequence[Fraction], lengths: Sequence[Fr
     if not solved(cp.Problem(cp.Maximize(margin), constraints), margin):
         return []
     inverse = 1 / np.array(units, dtype=float)
-    return [np.asarray(matrix.value) * np.outer(inverse, inverse) for matrix in P]
+    return [(np.asarray(matrix.value) * np.outer(inverse, inverse)).tolist() for matrix in P]
