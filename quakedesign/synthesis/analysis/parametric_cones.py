@@ -11,12 +11,11 @@ from scipy import sparse
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligation
 from quakedesign.certificates.witnesses import statement_of
-from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.conic import Compiled, in_cones
 from quakedesign.sos.solve.joint import shape_of
 from quakedesign.symbolic.terms import Term
-from quakedesign.synthesis.lyapunov.balancing import exponents_of, lifted_scale, scaled
+from quakedesign.synthesis.lyapunov.balancing import exponents_of, lifted_scale, normal
 from quakedesign.synthesis.lyapunov.parametric_forms import Row
 
 
@@ -75,20 +74,9 @@ def means(monomials: Sequence[Term], weights: Mapping[str, int]) -> list[float]:
     return found
 
 
-def scales_of(row: Row, scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    """Scale of all variables of a row, given that of the states."""
-    return lifted_scale(row.equalities, scale)
-
-
 def _template(row: Row, loop: Loop, scale: Sequence[Fraction]) -> Statement:
     """Set and monomials of a row, in scaled variables."""
-    whole = scales_of(row, scale)
-
-    def normal(p: Polynomial) -> Polynomial:
-        found = scaled(p, whole)
-        size = max(abs(c) for c in found.values())
-        return {e: c / size for e, c in found.items()}
-
+    whole = lifted_scale(row.equalities, scale)
     support = dict.fromkeys([*(e for _, e, _, _ in row.parts), *row.margin], Fraction(1))
-    conditions = tuple(map(normal, row.equalities)), tuple(map(normal, row.inequalities))
+    conditions = (tuple(normal(p, whole) for p in group) for group in (row.equalities, row.inequalities))
     return statement_of(Obligation("", support, *conditions), loop.domain)

@@ -19,8 +19,8 @@ from quakedesign.certificates import Loop
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.polynomial import monomial
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.synthesis.analysis.parametric_cones import Cones, scales_of
-from quakedesign.synthesis.lyapunov.balancing import balance, exponents_of
+from quakedesign.synthesis.analysis.parametric_cones import Cones
+from quakedesign.synthesis.lyapunov.balancing import balance, exponents_of, lifted_scale
 from quakedesign.synthesis.lyapunov.parametric_forms import ends_of, rows_of, values_of
 from quakedesign.synthesis.lyapunov.search import Family
 
@@ -186,7 +186,7 @@ class _Numbers:
         self.sizes = tuple(monomial(scale, exponents_of(t, sweep.loop.states)) for t in sweep.monomials)
         order = {names: i for i, names in enumerate(sweep.products)}
         parts = [(row, *part) for row in sweep.rows for part in row.parts]
-        wholes = {id(row): scales_of(row, scale) for row in sweep.rows}
+        wholes = {id(row): lifted_scale(row.equalities, scale) for row in sweep.rows}
         self.coefficients = np.array(
             [float(c * monomial(wholes[id(row)], e) / self.sizes[j]) for row, j, e, _, c in parts]
         )

@@ -14,13 +14,12 @@ from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligation, power_sum
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.rationals import nearest
-from quakedesign.sos import Polynomial
 from quakedesign.sos.solve.joint import Demand, JointProgram
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
-from quakedesign.synthesis.lyapunov.balancing import exponents_of, lifted_scale, scaled
-from quakedesign.synthesis.lyapunov.gain_forms import Kin, Row, rows_of
-from quakedesign.synthesis.lyapunov.parametric_forms import values_of
+from quakedesign.synthesis.lyapunov.balancing import exponents_of, lifted_scale, normal
+from quakedesign.synthesis.lyapunov.gain_forms import Kin, float_rows
+from quakedesign.synthesis.lyapunov.parametric_forms import Row, values_of
 
 Form = dict[tuple[int, ...], Any]
 """Polynomial with floats."""
@@ -201,7 +200,7 @@ def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> Any:
     """Every row with its set and monomials in scaled variables, and the scale of all of these."""
     templates = []
     loop = kin.loop
-    for row in rows_of(kin):
+    for row in float_rows(kin):
         whole = lifted_scale(row.equalities, scale)
         parts = row.fall or row.function
         degree = sum(parts[0][1])
@@ -217,7 +216,7 @@ def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> Any:
                 power,
             )
         margin = power_sum(len(loop.states), degree, len(whole))
-        conditions = (tuple(_normal(scaled(p, whole)) for p in group) for group in (row.equalities, row.inequalities))
+        conditions = (tuple(normal(p, whole) for p in group) for group in (row.equalities, row.inequalities))
         one = Obligation("", dict.fromkeys((*support, *margin), Fraction(1)), *conditions)
         templates.append((row, statement_of(one, loop.domain), whole))
     return tuple(templates)
@@ -238,8 +237,3 @@ def _program(kin: Kin, scale: tuple[Fraction, ...], paced: bool, changes: int) -
     return JointProgram(
         [Demand(template=t, parts=[{}] * count, margin={}) for _, t, _ in _templates(kin, scale, paced)]
     )
-
-
-def _normal(polynomial: Polynomial) -> Polynomial:
-    size = max(abs(c) for c in polynomial.values())
-    return {e: c / size for e, c in polynomial.items()}

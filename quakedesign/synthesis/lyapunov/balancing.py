@@ -91,6 +91,13 @@ def scaled(polynomial: Polynomial, scale: Sequence[Fraction], factor: Fraction =
     return {e: c * factor * monomial(scale, e) for e, c in polynomial.items()}
 
 
+def normal(polynomial: Polynomial, scale: Sequence[Fraction]) -> Polynomial:
+    """P(scale ∘ ũ) over its largest coefficient."""
+    moved = scaled(polynomial, scale)
+    size = max(abs(c) for c in moved.values())
+    return {e: c / size for e, c in moved.items()}
+
+
 def exponents_of(term: Term, weights: Mapping[str, int]) -> tuple[int, ...]:
     """Exponents of a monomial of V in the cell variables of the states."""
     powers = {state: exponent * weights[state] for state, exponent, _ in term.factors}

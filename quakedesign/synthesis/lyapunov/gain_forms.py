@@ -1,42 +1,14 @@
-"""V and −V̇ on every different cell and vertex, with gains and ranges left as names."""
+"""V and −V̇ on every different cell and vertex in floats, kept for all loops of one structure."""
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from itertools import product
 from typing import Any
 
 from quakedesign.certificates import Loop
-from quakedesign.certificates.obligations import Obligations
-from quakedesign.sos import Polynomial
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.symbolic.terms import Term, cell_polynomial
-from quakedesign.synthesis.lyapunov.parametric_forms import ends_of
-
-Part = tuple[int, tuple[int, ...], tuple[str, ...], float]
-"""j, exponents, names multiplied, coefficient."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """V, or −V̇ beside V, on one cell (and vertex), with gains and ends of ranges left as names.
-
-    Attributes
-    ----------
-    cell : str
-        Signs of the states.
-    function, fall : tuple of Part
-        V, and −V̇; the latter is empty for the row of V itself.
-    equalities, inequalities : tuple of Polynomial
-    """
-
-    cell: str
-    function: tuple[Part, ...]
-    fall: tuple[Part, ...] = ()
-    equalities: tuple[Polynomial, ...] = ()
-    inequalities: tuple[Polynomial, ...] = ()
+from quakedesign.synthesis.lyapunov.parametric_forms import Part, Row, rows_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,50 +44,12 @@ class Kin:
 
 
 @lru_cache(maxsize=32)
-def rows_of(kin: Kin) -> tuple[Row, ...]:
-    """Every different row of the monomials of V."""
-    loop, degree = kin.loop, kin.structure.degree
-    columns = [Obligations(loop, (term,)) for term in signed_monomials(loop.states, degree, loop.domain)]
-    rows: dict[tuple[Any, ...], Row] = {}
-    for row in (*_functions(columns), *_falls(loop, columns)):
-        conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
-        rows.setdefault((row.function, row.fall, conditions), row)
-    return tuple(rows.values())
+def float_rows(kin: Kin) -> tuple[Row, ...]:
+    """Every different row of the monomials of V, each −V̇ with the V beside it."""
+    monomials = signed_monomials(kin.loop.states, kin.structure.degree, kin.loop.domain)
+    rows = rows_of(kin.loop, monomials, beside=True)
+    return tuple(replace(row, function=_floats(row.function), fall=_floats(row.fall)) for row in rows)
 
 
-def _functions(columns: Sequence[Obligations]) -> Iterator[Row]:
-    for cell in columns[0].sign_cells():
-        yield Row(cell=cell.name, function=_potential(columns, cell.signs))
-
-
-def _potential(columns: Sequence[Obligations], signs: Mapping[str, int]) -> tuple[Part, ...]:
-    return tuple((j, e, (), float(c)) for j, column in enumerate(columns) for e, c in column.potential(signs).items())
-
-
-def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[Row]:
-    first, ends = columns[0], ends_of(loop)
-    weights = {**loop.states, **first.lift_degrees}
-    kept = [i for i, name in enumerate(weights) if name in loop.states or name in first.with_variable]
-    terms = [(j, term) for j, column in enumerate(columns) for term in column.derivative]
-    for cell in first.cells:
-        plain = [(j, term.parameters, *_single(term, weights, cell.signs)) for j, term in terms]
-        function = _potential(columns, cell.signs)
-        word = "".join("+" if cell.signs[s] > 0 else "-" for s in loop.states)
-        for choice in product(*ends.values()):
-            vertex = dict(zip(ends, choice, strict=True))
-            total: dict[tuple[Any, ...], float] = {}
-            for j, names, exponents, coefficient in plain:
-                chosen = [vertex.get(name, (name, 1)) for name in names]
-                key = (j, tuple(exponents[i] for i in kept), tuple(sorted(name for name, _ in chosen)))
-                sign = math.prod(factor for _, factor in chosen)
-                total[key] = total.get(key, 0.0) - float(coefficient) * sign
-            parts = tuple(sorted((*key, c) for key, c in total.items() if c))
-            yield Row(
-                cell=word, function=function, fall=parts, equalities=cell.equalities, inequalities=cell.inequalities
-            )
-
-
-def _single(term: Term, weights: Mapping[str, int], signs: Mapping[str, int]) -> tuple[tuple[int, ...], Fraction]:
-    """Exponents and coefficient of one term on a cell, its parameters left out."""
-    bare = cell_polynomial((Term(term.coefficient, (), term.factors),), weights, signs, {})
-    return next(iter(bare.items()))
+def _floats(parts: Iterable[Part]) -> tuple[Part, ...]:
+    return tuple((j, e, names, float(c)) for j, e, names, c in parts)

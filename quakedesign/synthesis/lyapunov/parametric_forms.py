@@ -1,5 +1,6 @@
 """V_j and −V̇_j on every different cell and vertex, with gains and ranges left as names."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -7,37 +8,51 @@ from itertools import product
 from typing import Any
 
 from quakedesign.certificates import Loop
-from quakedesign.certificates.obligations import Cell, Obligations, power_sum
+from quakedesign.certificates.obligations import Obligations, power_sum
 from quakedesign.sos import Polynomial
-from quakedesign.symbolic.terms import Term, cell_polynomial, lie_terms
+from quakedesign.symbolic.terms import Term, cell_polynomial
 
 Ends = Mapping[str, tuple[tuple[str, int], ...]]
 """For every uncertain parameter its ends, each a name times ±1."""
-Part = tuple[int, tuple[int, ...], tuple[str, ...], Fraction]
+Part = tuple[int, tuple[int, ...], tuple[str, ...], Fraction | float]
 """j, exponents, names multiplied, coefficient."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One form Σ_j a_j P_j that must be non-negative on a cell.
+    """V, or −V̇ beside V, on one cell (and vertex): a form Σ_j a_j P_j that must be non-negative there.
 
     Attributes
     ----------
-    rate : bool
-        P_j is −V̇_j; else V_j.
-    parts : tuple of Part
-        Terms of all P_j.
-    margin : Polynomial
-        N = Σ u_i^n over the states, n the degree of the form.
+    cell : str
+        Signs of the states.
+    function, fall : tuple of Part
+        Terms of all V_j, and of all −V̇_j; the latter is empty for the row of V itself.
     equalities, inequalities : tuple of Polynomial
         Conditions on the variables, besides u ≥ 0.
     """
 
-    rate: bool
-    parts: tuple[Part, ...]
-    margin: Polynomial
+    cell: str
+    function: tuple[Part, ...]
+    fall: tuple[Part, ...] = ()
     equalities: tuple[Polynomial, ...] = ()
     inequalities: tuple[Polynomial, ...] = ()
+
+    @property
+    def rate(self) -> bool:
+        """Whether P_j is −V̇_j; else V_j."""
+        return bool(self.fall)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Terms of all P_j."""
+        return self.fall or self.function
+
+    @property
+    def margin(self) -> Polynomial:
+        """N = Σ u_i^n over the states, n the degree of the form."""
+        states, width = (len(parts[0][1]) for parts in (self.function, self.parts))
+        return power_sum(states, max(sum(e) for _, e, _, _ in self.parts), width)
 
 
 def ends_of(loop: Loop) -> dict[str, tuple[tuple[str, int], ...]]:
@@ -61,8 +76,8 @@ def values_of(loop: Loop) -> dict[str, float]:
     return values
 
 
-def rows_of(loop: Loop, monomials: Sequence[Term]) -> tuple[Row, ...]:
-    """Every different form of V, then of −V̇.
+def rows_of(loop: Loop, monomials: Sequence[Term], *, beside: bool = False) -> tuple[Row, ...]:
+    """Every different form of V, then of −V̇; two that differ in the V beside them alone are one unless told.
 
     Raises
     ------
@@ -71,45 +86,43 @@ def rows_of(loop: Loop, monomials: Sequence[Term]) -> tuple[Row, ...]:
     """
     columns = [Obligations(loop, (term,)) for term in monomials]
     rows: dict[tuple[Any, ...], Row] = {}
-    for row in (*_functions(columns), *_rates(loop, columns)):
+    for row in (*_functions(columns), *_falls(loop, columns)):
         conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
-        rows.setdefault((row.rate, row.parts, conditions), row)
+        rows.setdefault((row.rate, row.parts, row.function if beside else (), conditions), row)
     return tuple(rows.values())
 
 
 def _functions(columns: Sequence[Obligations]) -> Iterator[Row]:
     for cell in columns[0].sign_cells():
-        parts: list[Part] = [
-            (j, e, (), c) for j, column in enumerate(columns) for e, c in column.potential(cell.signs).items()
-        ]
-        yield from _row(parts, columns[0])
+        yield Row(cell=cell.name, function=_potential(columns, cell.signs))
 
 
-def _rates(loop: Loop, columns: Sequence[Obligations]) -> Iterator[Row]:
+def _potential(columns: Sequence[Obligations], signs: Mapping[str, int]) -> tuple[Part, ...]:
+    return tuple(sorted((j, e, (), c) for j, column in enumerate(columns) for e, c in column.potential(signs).items()))
+
+
+def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[Row]:
     first, ends = columns[0], ends_of(loop)
     weights = {**loop.states, **first.lift_degrees}
     kept = [i for i, name in enumerate(weights) if name in loop.states or name in first.with_variable]
-    terms = [(j, t) for j, column in enumerate(columns) for t in lie_terms(column.lyapunov[0], loop.field)]
+    terms = [(j, term) for j, column in enumerate(columns) for term in column.derivative]
     for cell in first.cells:
         plain = [(j, term.parameters, *_single(term, weights, cell.signs)) for j, term in terms]
+        function = _potential(columns, cell.signs)
+        word = "".join("+" if cell.signs[s] > 0 else "-" for s in loop.states)
         for choice in product(*ends.values()):
             vertex = dict(zip(ends, choice, strict=True))
             total: dict[tuple[Any, ...], Fraction] = {}
             for j, names, exponents, coefficient in plain:
                 chosen = [vertex.get(name, (name, 1)) for name in names]
-                for _, factor in chosen:
-                    coefficient = coefficient * factor
                 key = (j, tuple(exponents[i] for i in kept), tuple(sorted(name for name, _ in chosen)))
-                total[key] = total.get(key, Fraction(0)) - coefficient
-            yield from _row([(*key, c) for key, c in total.items() if c], first, cell)
-
-
-def _row(parts: list[Part], obligations: Obligations, cell: Cell | None = None) -> Iterator[Row]:
-    """The row of some parts, none for none; of −V̇ on a cell where one is given."""
-    if parts:
-        margin = power_sum(len(obligations.loop.states), max(sum(e) for _, e, _, _ in parts), len(parts[0][1]))
-        conditions = (cell.equalities, cell.inequalities) if cell else ((), ())
-        yield Row(cell is not None, tuple(sorted(parts)), margin, *conditions)
+                sign = math.prod(factor for _, factor in chosen)
+                total[key] = total.get(key, Fraction(0)) - coefficient * sign
+            parts = tuple(sorted((*key, c) for key, c in total.items() if c))
+            if parts:
+                yield Row(
+                    cell=word, function=function, fall=parts, equalities=cell.equalities, inequalities=cell.inequalities
+                )
 
 
 def _single(term: Term, weights: Mapping[str, int], signs: Mapping[str, int]) -> tuple[tuple[int, ...], Fraction]:

@@ -11,12 +11,11 @@ from quakedesign.controllers import LoopField, Subject, law
 from quakedesign.controllers.loop_field import lowest_degree
 from quakedesign.errors import CertificateError
 from quakedesign.rationals import nearest
-from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.polynomial import monomial
 from quakedesign.sos.solve.joint import Demand, Proposal, joint_program
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
-from quakedesign.synthesis.lyapunov.balancing import balance, below, exponents_of, lifted_scale, scaled
+from quakedesign.synthesis.lyapunov.balancing import balance, below, exponents_of, lifted_scale, normal, scaled
 from quakedesign.synthesis.lyapunov.certify_exactly import bounds_of, claims_of, finish
 from quakedesign.synthesis.lyapunov.kept import kept
 
@@ -161,17 +160,11 @@ def _moved(one: Obligation, scale: Sequence[Fraction], factor: Fraction) -> Obli
             one.name, {e: c * factor for e, c in one.polynomial.items()}, one.equalities, one.inequalities
         )
     whole = lifted_scale(one.equalities, scale)
-
-    def normal(p: Polynomial) -> Polynomial:
-        found = scaled(p, whole)
-        size = max(abs(c) for c in found.values())
-        return {e: c / size for e, c in found.items()}
-
     return Obligation(
         one.name,
         scaled(one.polynomial, whole, factor),
-        tuple(map(normal, one.equalities)),
-        tuple(map(normal, one.inequalities)),
+        tuple(normal(h, whole) for h in one.equalities),
+        tuple(normal(g, whole) for g in one.inequalities),
     )
 
 
