@@ -48,10 +48,11 @@ from itertools import product
 from math import ceil, sqrt
 from typing import Any
 
-from flint import arb, arb_mat, ctx, fmpq
+from flint import arb, arb_mat, ctx
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Task
+from quakedesign.certificates.guarantee.ball_matrices import ball, upper
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import fraction_of
 
@@ -100,8 +101,8 @@ class _Pushed:
     @property
     def pole(self) -> Any:
         """λ [1/s]."""
-        w = _ball(self.rate)
-        return ((w * w + 4 * _ball(self.slip)).sqrt() - w) / 2
+        w = ball(self.rate)
+        return ((w * w + 4 * ball(self.slip)).sqrt() - w) / 2
 
 
 def smallest_peak(task: Task, step: Fraction, delay: Fraction = _ZERO) -> SmallestPeak | None:
@@ -136,7 +137,7 @@ def longest_reaction(task: Task, withdrawal: Fraction) -> UpperBound | None:
     _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
 
     def longest(plant: _Pushed) -> Any:
-        ratio = _ball(plant.authority * withdrawal / task.amplitude)
+        ratio = ball(plant.authority * withdrawal / task.amplitude)
         return _at_least_one(ratio).log() / plant.pole
 
     return _least(task, longest)
@@ -148,7 +149,7 @@ def longest_diffusion(task: Task, withdrawal: Fraction, step: Fraction) -> Upper
 
     def longest(plant: _Pushed) -> Any:
         pole = plant.pole
-        ratio = _ball(plant.authority * withdrawal / task.amplitude) * (-pole * _ball(step)).exp()
+        ratio = ball(plant.authority * withdrawal / task.amplitude) * (-pole * ball(step)).exp()
         return _at_least_one(ratio).acosh() ** 2 / pole
 
     return _least(task, longest)
@@ -158,7 +159,7 @@ def farthest_well(diffusion_time: UpperBound, diffusivity: Fraction) -> UpperBou
     """L [m] of a diffusion time L²/D [s] at a diffusivity D [m²/s]."""
     _require(diffusivity > 0, "a diffusivity above 0", diffusivity)
     with ctx.workprec(_BITS):
-        return UpperBound(_upper(_ball(diffusion_time * diffusivity).sqrt()))
+        return UpperBound(upper(ball(diffusion_time * diffusivity).sqrt()))
 
 
 def smallest_withdrawal(task: Task, step: Fraction) -> LowerBound | None:
@@ -166,15 +167,14 @@ def smallest_withdrawal(task: Task, step: Fraction) -> LowerBound | None:
     _require(step >= 0, "a step of at least 0", step)
     with ctx.workprec(_BITS):
         withdrawals = [
-            _lower(_ball(task.amplitude / plant.authority) * (plant.pole * _ball(step)).exp())
-            for plant in _pushed(task)
+            _lower(ball(task.amplitude / plant.authority) * (plant.pole * ball(step)).exp()) for plant in _pushed(task)
         ]
     return LowerBound(max(withdrawals)) if withdrawals else None
 
 
 def _least(task: Task, value: Callable[[_Pushed], Any]) -> UpperBound | None:
     with ctx.workprec(_BITS):
-        bounds = [_upper(value(plant)) for plant in _pushed(task)]
+        bounds = [upper(value(plant)) for plant in _pushed(task)]
     return UpperBound(min(bounds)) if bounds else None
 
 
@@ -214,17 +214,17 @@ def _surprise(plant: _Surprised, step: Fraction, delay: Fraction, amplitude: Fra
     late = delay if float(delay) * pace <= most else Fraction(most / pace)
 
     def bound(slip: Fraction) -> Any:
-        flow = arb_mat([[arb(0), arb(1)], [_ball(slip), -_ball(plant.rate)]])
-        return 2 * _ball(amplitude) * (flow * _ball(held + late)).exp()[0, 1]
+        flow = arb_mat([[arb(0), arb(1)], [ball(slip), -ball(plant.rate)]])
+        return 2 * ball(amplitude) * (flow * ball(held + late)).exp()[0, 1]
 
     def holds(peak: Fraction, reach: Fraction) -> bool:
         force = 2 * peak / held + plant.slip * reach + abs(plant.rate) * peak
         slip = plant.slip - plant.weakening * force / plant.friction
-        return slip >= 0 and bool(bound(slip) >= _ball(peak))
+        return slip >= 0 and bool(bound(slip) >= ball(peak))
 
     if plant.reach is None:
         return max(_ZERO, _lower(bound(plant.slip)))
-    low, high = _ZERO, _upper(bound(plant.slip))
+    low, high = _ZERO, upper(bound(plant.slip))
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2
         low, high = (middle, high) if holds(middle, plant.reach) else (low, middle)
@@ -237,17 +237,9 @@ def _require(holds: bool, what: str, *values: Fraction) -> None:
         raise ParameterError(f"a limit needs {what}. Received {received}. Correct it.")
 
 
-def _ball(value: Fraction) -> Any:
-    return arb(fmpq(value.numerator, value.denominator))
-
-
 def _at_least_one(value: Any) -> Any:
     """Upper end of a ball, or one."""
     return value.upper().max(arb(1))
-
-
-def _upper(value: Any) -> Fraction:
-    return fraction_of(value.upper().fmpq())
 
 
 def _lower(value: Any) -> Fraction:

@@ -1,5 +1,6 @@
 """Quadratic Lyapunov functions as matrices, in floating point: proposals, no proofs."""
 
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -11,6 +12,17 @@ from quakedesign.certificates.obligations import Obligations
 from quakedesign.sos import Polynomial
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov.balancing import below
+
+
+def quadratic_terms(states: Sequence[str], coefficient: Callable[[int, int], Fraction]) -> tuple[Term, ...]:
+    """Σ c_ij·x_i·x_j over i ≤ j as terms, without zeros."""
+    squares = ((left, Fraction(2), "a") for left in states)
+    return tuple(
+        Term(value, (), (square,) if i == j else ((left, Fraction(1), "s"), (right, Fraction(1), "s")))
+        for i, (left, square) in enumerate(zip(states, squares, strict=True))
+        for j, right in enumerate(states)
+        if i <= j and (value := coefficient(i, j))
+    )
 
 
 def quadratic_matrix(loop: Loop, lyapunov: tuple[Term, ...]) -> Any:

@@ -11,6 +11,7 @@ from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import published
 from quakedesign.synthesis.linear.analysis.robust_stability import analysis, unstable_vertex, why_undecided
 from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop
+from quakedesign.synthesis.linear.plant.problem import loop_matrix
 
 LAB = qd.load_fault("lab-fault")
 GOOD = published("lab-fault")["elqr"]
@@ -30,7 +31,7 @@ def test_a_destabilising_gain_is_refuted_at_a_vertex_with_an_unstable_pole():
     assert found.verdict is Verdict.REFUTED
     assert found.certificates == {}
     loop = error_loop(tuple(bad.gains.values()), sectors(LAB))
-    matrix = np.array([[float(v) for v in row] for row in loop.matrix(*found.unstable_at)])
+    matrix = np.array([[float(v) for v in row] for row in loop_matrix(found.unstable_at, loop.authority, loop.gains)])
     assert np.linalg.eigvals(matrix).real.max() > 0
     assert "not stable near beta" in why_undecided(loop)
 

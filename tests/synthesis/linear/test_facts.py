@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import quakedesign as qd
-from quakedesign.synthesis.linear.analysis.facts import linear_facts
+from quakedesign.synthesis.linear.analysis.verdict import linear_facts
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.sampled.held import held_loop
 

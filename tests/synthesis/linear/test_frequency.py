@@ -15,6 +15,8 @@ from quakedesign.synthesis.linear.analysis.frequency import (
     stable_quartic,
 )
 from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.problem import loop_matrix
+from quakedesign.synthesis.linear.plant.rational_matrices import floats
 
 LOOP = ErrorLoop(
     gains=(F(104), F(14), F(150), F(78)),
@@ -26,7 +28,9 @@ LOOP = ErrorLoop(
 
 
 def eigenvalues(loop, *corner):
-    return np.linalg.eigvals(np.array([[float(v) for v in row] for row in loop.matrix(*corner)]))
+    return np.linalg.eigvals(
+        np.array([[float(v) for v in row] for row in loop_matrix(corner, loop.authority, loop.gains)])
+    )
 
 
 def test_routh_hurwitz_agrees_with_the_roots():
@@ -43,7 +47,7 @@ def test_routh_hurwitz_agrees_with_the_roots():
 
 def test_the_characteristic_polynomial_is_that_of_the_matrix():
     for corner in LOOP.corners():
-        matrix = np.array([[float(v) for v in row] for row in LOOP.matrix(*corner)])
+        matrix = floats(loop_matrix(corner, LOOP.authority, LOOP.gains))
         np.testing.assert_allclose(np.poly(matrix)[1:], [float(c) for c in characteristic(LOOP, *corner)], rtol=1e-9)
 
 
@@ -121,7 +125,7 @@ def test_margins_move_a_pole_onto_the_axis(corner):
 
 def test_norms_agree_with_python_control():
     for corner in LOOP.corners():
-        A = np.array([[float(v) for v in row] for row in LOOP.matrix(*corner)])
+        A = floats(loop_matrix(corner, LOOP.authority, LOOP.gains))
         facts = frequency_facts(LOOP, corner)
         for row, value in ((0, facts.disturbance_peak_slip), (1, facts.disturbance_peak_rate)):
             system = control.ss(A, np.array([[0.0], [1], [0], [0]]), np.eye(4)[[row]], [[0.0]])

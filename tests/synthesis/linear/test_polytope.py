@@ -12,7 +12,7 @@ from quakedesign.controllers import Signals, published
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic import plant
 from quakedesign.synthesis.linear.analysis.common_quadratic import sector_loop
-from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, Polytope, error_loop, modal_scaling, polytope_of
+from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, Polytope, modal_scaling, polytope_of
 
 
 @pytest.fixture(scope="module")
@@ -68,15 +68,6 @@ def test_the_substitution_turns_the_force_balance_into_the_error_loop(feedback):
     assert sp.simplify(moving + s_r * r.diff(t) / (mu_r * plant.N_hat)) == 0
 
 
-def test_both_coordinates_have_the_same_poles(real):
-    controller = published("real-fault")["elqr"]
-    first = polytope_of(sector_loop(controller, sectors(real))).floats()
-    second = error_loop(tuple(controller.gains.values()), sectors(real)).polytope().floats()
-    assert len(first) == len(second) == 4
-    for A, M in zip(first, second, strict=True):
-        np.testing.assert_allclose(np.poly(A), np.poly(M), rtol=1e-9)
-
-
 def test_a_field_that_is_not_linear_is_refused():
     from quakedesign.certificates import loop_of
     from quakedesign.controllers import control_law
@@ -98,7 +89,7 @@ def test_ranges_that_are_not_ordered_are_refused():
 
 
 def test_modal_coordinates_do_not_depend_on_the_units_of_the_states(real):
-    polytope = error_loop(tuple(published("real-fault")["elqr"].gains.values()), sectors(real)).polytope()
+    polytope = polytope_of(sector_loop(published("real-fault")["elqr"], sectors(real)))
     units = (F(1, 1000), F(1000), F(1, 64), F(7))
     other = Polytope(
         states=polytope.states,

@@ -22,7 +22,7 @@ from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.linear.plant.polytope import Polytope, modal_scaling, polytope_of
 from quakedesign.synthesis.lyapunov.balancing import below
 from quakedesign.synthesis.lyapunov.certify_exactly import finish
-from quakedesign.synthesis.lyapunov.quadratic import quadratic_margin
+from quakedesign.synthesis.lyapunov.quadratic import quadratic_margin, quadratic_terms
 
 _SHARES = (0.99, 0.9, 0.5, 0.1, 0.01)
 _LEAST_MARGIN = 1e-10
@@ -123,7 +123,7 @@ def robust_stability(loop: Loop, *, fastest: bool = False) -> Certificate | None
 
 def finished(loop: Loop, proposal: Proposal) -> Certificate | None:
     """Certificate for a proposed V, in exact arithmetic, with the largest share of its decay rate that holds."""
-    lyapunov = quadratic_terms(tuple(loop.states), proposal.form)
+    lyapunov = _decimal_terms(tuple(loop.states), proposal.form)
     positive = quadratic_margin(loop, lyapunov) / 2
     for share in _SHARES:
         claims = {"positive": positive, "rate": below(share * proposal.rate)}
@@ -138,14 +138,7 @@ def finished_exactly(loop: Loop, theta: Sequence[Sequence[Fraction]]) -> Certifi
 
     For a V so far from round that floating point cannot tell whether it decreases: witnesses are read off.
     """
-    lyapunov = tuple(
-        Term(theta[i][i], (), ((left, Fraction(2), "a"),))
-        if i == j
-        else Term(2 * theta[i][j], (), ((left, Fraction(1), "s"), (right, Fraction(1), "s")))
-        for i, left in enumerate(loop.states)
-        for j, right in enumerate(loop.states)
-        if i <= j and theta[i][j]
-    )
+    lyapunov = quadratic_terms(tuple(loop.states), lambda i, j: theta[i][j] * (1 if i == j else 2))
     slowest, positive = -polytope_of(loop).slowest(), quadratic_margin(loop, lyapunov) / 2
     for n in range(_DECADES) if slowest > 0 and positive > 0 else ():
         claims = {"positive": positive, "rate": below(slowest / 10**n)}
@@ -175,16 +168,11 @@ def quadratic_witness(one: Obligation) -> Witness:
     return Witness(multiplier=constant(size), squares=(Square(basis=basis, gram=gram),))
 
 
-def quadratic_terms(states: Sequence[str], form: Any) -> tuple[Term, ...]:
-    """xᵀPx as terms, every float of P read as the decimal that Python prints for it."""
-    names, size, terms = tuple(states), float(abs(form).max()), []
-    for i, left in enumerate(names):
-        terms.append(Term(rational(float(form[i, i] / size)), (), ((left, Fraction(2), "a"),)))
-        for j in range(i + 1, len(names)):
-            value = rational(float((form[i, j] + form[j, i]) / size))
-            if value:
-                terms.append(Term(value, (), ((left, Fraction(1), "s"), (names[j], Fraction(1), "s"))))
-    return tuple(terms)
+def _decimal_terms(states: Sequence[str], form: Any) -> tuple[Term, ...]:
+    """xᵀPx over its largest entry, every float of it read as the decimal that Python prints for it."""
+    size = float(abs(form).max())
+    both = form + form.T - np.diag(np.diag(form))
+    return quadratic_terms(states, lambda i, j: rational(float(both[i, j] / size)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, arb_mat, fmpq
+from flint import arb
 from scipy.optimize import minimize_scalar
 
+from quakedesign.certificates.guarantee.ball_matrices import ball, identity, matrix
 from quakedesign.certificates.premises import least_authority, plant_ranges
 from quakedesign.certificates.sectors import Sectors
 from quakedesign.fault import Fault, load_fault
@@ -172,14 +173,10 @@ def switched_growth(problem: LinearProblem, gains: Sequence[Fraction], switching
 
     |trace Mⁿ| ≤ 4ϱⁿ bounds the spectral radius ϱ of the 4 × 4 period M from below.
     """
-
-    def ball(v: Fraction) -> Any:
-        return arb(fmpq(v.numerator, v.denominator))
-
-    period = arb_mat([[arb(int(i == j)) for j in range(4)] for i in range(4)])
+    period = identity(4)
     for vertex, duration in zip(switching.vertices, switching.durations, strict=True):
         loop = loop_matrix(vertex, problem.sectors.authority, gains)
-        period = (arb_mat([[ball(v) for v in row] for row in loop]) * ball(duration)).exp() * period
+        period = (matrix(loop) * ball(duration)).exp() * period
     power, best, n = period, Fraction(0), 1
     for _ in range(7):
         power, n = power * power, 2 * n

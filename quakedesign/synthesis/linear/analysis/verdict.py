@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from quakedesign.certificates import Certificate
+from quakedesign.certificates import Certificate, Verdict
 from quakedesign.certificates.guarantee import ContinuousPeaks, NoGuarantee
 from quakedesign.certificates.guarantee.files import save_guarantee
 from quakedesign.controllers.elqr import ExtendedLQR
@@ -15,10 +15,13 @@ from quakedesign.rationals import rational
 from quakedesign.sos import Answer
 from quakedesign.synthesis.guaranteed.continuous import certified_peaks
 from quakedesign.synthesis.linear.analysis.definite_files import held_files, inverse_optimality_files
-from quakedesign.synthesis.linear.analysis.facts import linear_facts
 from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
+from quakedesign.synthesis.linear.analysis.printed_theorem import both_tests, printed_row
 from quakedesign.synthesis.linear.analysis.robust_stability import Analysis, analysis
+from quakedesign.synthesis.linear.design.admissible_weights import smallest_gain
+from quakedesign.synthesis.linear.plant.feedback import compare_feedback
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.plant.uncertainty_bounds import uncertainty_bounds
 from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
 
 
@@ -134,3 +137,36 @@ def judge(
         peaks=bounded,
         asked=peaks,
     )
+
+
+def linear_facts(fault: Fault, controller: ExtendedLQR, held: HeldLoop) -> dict[str, Any]:
+    """Bounds, both tests of Theorem 2, sampled stability and the cost of both kinds of feedback.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : ExtendedLQR
+    held : HeldLoop
+        What is decided of the same gains when p is held.
+
+    Returns
+    -------
+    dict
+        Keys ``inverse_optimal`` (whether K is optimal for a Q that covers the uncertainty; None when undecided),
+        ``tests``, ``bounds``, ``smallest_gain``, ``held`` and ``feedback``; SI.
+    """
+    gains, problem = tuple(controller.gains.values()), LinearProblem.of(fault)
+    tests = both_tests(problem, gains, printed_row(fault))
+    least = smallest_gain(problem)
+    decided = {Verdict.PROVED: True, Verdict.REFUTED: False, Verdict.UNDECIDED: None}
+    return {
+        "inverse_optimal": decided[tests.sound.verdict],
+        "tests": tests.to_dict(),
+        "bounds": uncertainty_bounds(fault).to_dict(),
+        "smallest_gain": {"k1": least.slip, "k2": least.rate},
+        "held": held.to_dict(),
+        "feedback": [
+            {"feedback": c.feedback, "lag": c.lag, "largest_term": c.largest_term, "pressure": c.pressure}
+            for c in (compare_feedback(fault, gains) if gains[3] else ())
+        ],
+    }

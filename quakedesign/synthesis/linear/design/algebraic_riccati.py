@@ -13,6 +13,7 @@ from quakedesign.synthesis.linear.plant import rational_matrices as matrices
 from quakedesign.synthesis.linear.plant.rational_matrices import (
     Matrix,
     exact,
+    floats,
     frobenius,
     product,
     riccati_residual,
@@ -92,7 +93,7 @@ def _propose(a: Matrix, g: Matrix, q: Matrix) -> Any:
     """Floating-point X from python-control, with BR⁻¹Bᵀ = G by its eigenvalues."""
     import control
 
-    A, G, Q = (np.array([[float(v) for v in row] for row in m]) for m in (a, g, q))
+    A, G, Q = map(floats, (a, g, q))
     values, vectors = np.linalg.eigh(G)
     kept = np.abs(values) > 1e-15 * np.abs(values).max()
     try:
@@ -109,11 +110,11 @@ def _refined(a: Matrix, g: Matrix, q: Matrix, proposal: Any) -> tuple[Matrix, Fr
     """Newton steps, Lyapunov equations in floating point, residuals exact; the best X and its relative residual."""
     best = rounded(proposal, 100)
     least = relative_residual(a, g, q, best)
-    closed = np.array([[float(v) for v in row] for row in matrices.total(a, times(-1, product(g, best)))])
+    closed = floats(matrices.total(a, times(-1, product(g, best))))
     for _ in range(_STEPS):
         if least < _ENOUGH:
             break
-        left = np.array([[float(v) for v in row] for row in riccati_residual(a, g, q, best)])
+        left = floats(riccati_residual(a, g, q, best))
         step = solve_continuous_lyapunov(closed.T, -(left + left.T) / 2)
         tried = rounded(matrices.total(best, exact((step + step.T) / 2)), 150)
         residual = relative_residual(a, g, q, tried)

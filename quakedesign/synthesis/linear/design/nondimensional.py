@@ -14,7 +14,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.design.algebraic_riccati import METHOD
 from quakedesign.synthesis.linear.design.specifications import Specifications, Weights
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Scales
-from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, diagonal, total
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, diagonal, floats, total
 
 LIGHTEST = -14.0
 _HEAVIEST, _LIMIT, _ROUNDS = 0.0, 10.0, 5
@@ -154,8 +154,3 @@ def _root(excess: Callable[[float], float], low: float, high: float, tolerance: 
     if excess(high) >= 0:
         return high
     return float(brentq(excess, low, high, xtol=tolerance))
-
-
-def floats(matrix: Any) -> Any:
-    """Array of floats."""
-    return np.array([[float(v) for v in row] for row in matrix])

@@ -14,10 +14,11 @@ from quakedesign.fault import Fault
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.linear.analysis.printed_theorem import decreases
 from quakedesign.synthesis.linear.design.algebraic_riccati import solve_care
-from quakedesign.synthesis.linear.design.nondimensional import Choice, ScaledDesign, floats, sound_bound
+from quakedesign.synthesis.linear.design.nondimensional import Choice, ScaledDesign, sound_bound
 from quakedesign.synthesis.linear.design.specifications import Specifications, Weights
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
-from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, outer, times, total
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, floats, outer, times, total
+from quakedesign.synthesis.lyapunov.quadratic import quadratic_terms
 
 BANDWIDTH_TIMES_STEP = 1.5
 _STATES = ("x1", "x2", "xi1", "xi2")
@@ -132,7 +133,8 @@ def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesig
     solution = solve_care(task.shifted(), times(1 / weight, outer(unit, unit)), Q)
     inner = [row[1] / weight for row in solution.X]
     gains = task.scales.gains_outside(inner)
-    lyapunov = _quadratic(task.scales.form_outside(solution.X))
+    form = task.scales.form_outside(solution.X)
+    lyapunov = quadratic_terms(_STATES, lambda i, j: _decimal(form[i][j] * (1 if i == j else 2)))
     exact = _rounded_gains(task.outside, gains, _matrix(lyapunov))
     loop = task.inside.loop((Fraction(1), -task.inside.stiffness, task.inside.damping), inner)
     return RiccatiDesign(
@@ -142,16 +144,12 @@ def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesig
         Q=floats(Q),
         R=R,
         S=floats(solution.X),
-        E=_eigenvalues(loop) / float(task.scales.time),
+        E=np.linalg.eigvals(floats(loop)) / float(task.scales.time),
         split=split,
         rate=float(task.rate / task.scales.time),
         residual=float(solution.residual),
         fastest_pole=task.fastest_pole([inner]),
     )
-
-
-def _eigenvalues(matrix: Any) -> Any:
-    return np.linalg.eigvals(floats(matrix))
 
 
 def _rounded_gains(problem: LinearProblem, gains: Sequence[Fraction], theta: Matrix) -> tuple[Fraction, ...]:
@@ -179,15 +177,3 @@ def _decimal(value: Fraction, digits: int = 17) -> Fraction:
         return value
     unit = Fraction(10) ** (math.floor(math.log10(abs(float(value)))) - digits + 1)
     return round(value / unit) * unit
-
-
-def _quadratic(matrix: Matrix) -> tuple[Term, ...]:
-    """xᵀMx as terms with exact decimals."""
-    terms = []
-    for i, left in enumerate(_STATES):
-        terms.append(Term(_decimal(matrix[i][i]), (), ((left, Fraction(2), "a"),)))
-        for j in range(i + 1, 4):
-            value = _decimal(2 * matrix[i][j])
-            if value:
-                terms.append(Term(value, (), ((left, Fraction(1), "s"), (_STATES[j], Fraction(1), "s"))))
-    return tuple(terms)

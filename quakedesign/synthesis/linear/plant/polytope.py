@@ -13,12 +13,9 @@ from quakedesign.certificates import Loop
 from quakedesign.certificates.sectors import Sectors
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic.terms import value
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, floats
 
-Row = tuple[Fraction, ...]
-Matrix = tuple[Row, ...]
 Range = tuple[Fraction, Fraction]
-
-ERROR_STATES = ("e1", "e2", "zeta", "chi")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +34,7 @@ class Polytope:
 
     def floats(self) -> list[Any]:
         """Vertices as arrays (n × n)."""
-        return [np.array([[float(v) for v in row] for row in matrix]) for matrix in self.vertices.values()]
+        return list(map(floats, self.vertices.values()))
 
     def slowest(self) -> float:
         """Largest real part of an eigenvalue of a vertex [1/s]; no V decays faster than its negative."""
@@ -66,7 +63,7 @@ def polytope_of(loop: Loop) -> Polytope:
     return Polytope(states=tuple(loop.states), vertices=vertices)
 
 
-def _row(loop: Loop, state: str, parameters: Mapping[str, Fraction]) -> Row:
+def _row(loop: Loop, state: str, parameters: Mapping[str, Fraction]) -> tuple[Fraction, ...]:
     entries = dict.fromkeys(loop.states, Fraction(0))
     for term in loop.field[state]:
         entries[term.factors[0][0]] += value(term, parameters)
@@ -101,25 +98,9 @@ class ErrorLoop:
         if not all(low <= high for low, high in (self.beta, self.slip, self.rate)):
             raise ParameterError(f"ranges must be ordered. Received {self.beta}, {self.slip}, {self.rate}.")
 
-    def matrix(self, beta: Fraction, slip: Fraction, rate: Fraction) -> Matrix:
-        """Matrix of the states e1, e2, ζ, χ for given parameters."""
-        k1, k2, k3, k4 = self.gains
-        zero, one, strength = Fraction(0), Fraction(1), beta * self.authority
-        return (
-            (zero, one, zero, zero),
-            (slip - strength * k1, -rate - strength * k2, -strength, zero),
-            (k3, zero, zero, one),
-            (k4, zero, zero, zero),
-        )
-
     def corners(self) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
         """β, s and w at every vertex, each once."""
         yield from product(*(sorted(set(ends)) for ends in (self.beta, self.slip, self.rate)))
-
-    def polytope(self) -> Polytope:
-        """All vertices."""
-        named = {f"beta={b} s={s} w={w}": self.matrix(b, s, w) for b, s, w in self.corners()}
-        return Polytope(states=ERROR_STATES, vertices=named)
 
 
 def error_loop(gains: Sequence[Fraction], sectors: Sectors) -> ErrorLoop:

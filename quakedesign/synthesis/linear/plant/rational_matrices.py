@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 from flint import arb, fmpq, fmpq_mat
 
 from quakedesign.rationals import fraction_of
@@ -12,6 +13,11 @@ from quakedesign.sos.exact.definiteness import positive_definite
 
 Rows = Sequence[Sequence[Fraction]]
 Matrix = tuple[tuple[Fraction, ...], ...]
+
+
+def floats(matrix: Any) -> Any:
+    """Array of floats."""
+    return np.array([[float(v) for v in row] for row in matrix])
 
 
 def exact(matrix: Any) -> Matrix:

@@ -31,6 +31,7 @@ from quakedesign.synthesis.linear.plant.rational_matrices import (
     Rows,
     congruent,
     definite,
+    floats,
     product,
     rounded,
     times,
@@ -183,7 +184,7 @@ def solved(program: Any, margin: Any) -> bool:
 def scaled(matrix: Rows, rows: Iterable[Fraction], columns: Iterable[Fraction]) -> Any:
     """Matrix in other units of its rows and columns, in floating point."""
     across = np.array([float(u) for u in columns]) / np.array([[float(u)] for u in rows])
-    return np.array([[float(v) for v in row] for row in matrix]) * across
+    return floats(matrix) * across
 
 
 def balanced_units(K: Sequence[Fraction]) -> tuple[Fraction, ...]:

@@ -13,11 +13,12 @@ from flint import ctx
 
 from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
+from quakedesign.certificates.guarantee.ball_matrices import ball
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Vertex
+from quakedesign.synthesis.linear.plant.rational_matrices import floats
 from quakedesign.synthesis.linear.sampled.zero_order_hold import (
-    ball,
     coefficients,
     conditions,
     held_matrix,
@@ -264,8 +265,8 @@ def _all_shorter(
 
 def _first_refuted(problem: LinearProblem, gains: Sequence[Fraction], judged: Any) -> tuple[Fraction, Verdict]:
     """Period that is refuted, twice one that is not, from the fastest pole of the vertices on; or the longest tried."""
-    loops = [np.array([[float(v) for v in row] for row in problem.loop(v, gains)]) for v in problem.vertices()]
-    fastest = max(float(np.abs(np.linalg.eigvals(m)).max()) for m in loops)
+    loops = (floats(problem.loop(vertex, gains)) for vertex in problem.vertices())
+    fastest = max(float(np.abs(np.linalg.eigvals(loop)).max()) for loop in loops)
     step = rational(f"{0.5 / fastest:.3e}")
     for _ in range(_DOUBLINGS):
         verdict = judged(step)

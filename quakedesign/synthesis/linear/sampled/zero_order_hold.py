@@ -15,17 +15,13 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat, fmpq
+from flint import arb, arb_mat
 from scipy.linalg import expm
 
+from quakedesign.certificates.guarantee.ball_matrices import ball
 from quakedesign.errors import require_known
 
 INTEGRATIONS = ("exact", "euler")
-
-
-def ball(value: Fraction) -> Any:
-    """Ball about a rational."""
-    return arb(fmpq(value.numerator, value.denominator))
 
 
 def interval(low: Fraction, high: Fraction) -> Any:
