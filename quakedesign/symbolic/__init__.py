@@ -1,4 +1,4 @@
-"""SymPy derivations: signed powers, plant, error dynamics, homogeneity, Filippov fields, cells, lifts, enclosures."""
+"""SymPy derivations: signed powers, plant, error dynamics, homogeneity, Filippov fields, terms, enclosures."""
 
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from quakedesign.symbolic.homogeneity import Homogeneity as Homogeneity
     from quakedesign.symbolic.homogeneity import dilate as dilate
     from quakedesign.symbolic.homogeneity import homogeneous as homogeneous
-    from quakedesign.symbolic.lifting import lift as lift
     from quakedesign.symbolic.model import Model as Model
     from quakedesign.symbolic.model import derive as derive
     from quakedesign.symbolic.normal_form import normal_form as normal_form
