@@ -9,6 +9,8 @@ from unicodedata import category
 _OBEYED = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, invisible formats, half characters, line separators
 _LONGEST_WORD = 200
 _LONGEST_MESSAGE = 2000
+_LONGEST_LINE = 200
+_MARKS = (". ", "; ", ": ", ", ")  # from what divides a sentence most
 
 
 def visible(text: str) -> str:
@@ -22,6 +24,19 @@ def one_line(message: str) -> str:
     """Message in one visible line; long words, such as paths, and long messages lose their middle."""
     short = re.sub(rf"\S{{{_LONGEST_WORD + 1},}}", lambda word: _shortened(word[0], _LONGEST_WORD), message)
     return _shortened(visible(" ".join(short.split())), _LONGEST_MESSAGE)
+
+
+def in_lines(text: str) -> list[str]:
+    """Text in lines of at most 200 characters, each ended behind what divides it most in its last two thirds.
+
+    That is a full stop, semicolon, colon or comma. Nothing is cut: where there is none, a line is as long as it takes.
+    """
+    if len(text) <= _LONGEST_LINE:
+        return [text]
+    within = (text.rfind(mark, _LONGEST_LINE // 3, _LONGEST_LINE + 1) for mark in _MARKS)
+    beyond = (text.find(mark, _LONGEST_LINE) for mark in _MARKS)
+    end = next((end for end in within if end > 0), None) or min((e for e in beyond if e > 0), default=None)
+    return [text] if end is None else [text[: end + 1], *in_lines(text[end + 2 :])]
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:

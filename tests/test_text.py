@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from quakedesign import errors
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
-from quakedesign.text import nearest_name, one_line, visible
+from quakedesign.text import in_lines, nearest_name, one_line, visible
 
 EXCEPTIONS = [e for e in vars(errors).values() if isinstance(e, type) and issubclass(e, errors.QuakedesignError)]
 
@@ -45,6 +45,28 @@ def test_long_words_and_long_messages_lose_their_middle():
     assert line.endswith("a/fault.toml: File name too long.")
     assert f"({len(path) + 1} characters)" in line
     assert len(one_line("word " * 5000)) <= 2000
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("short: as it is", ["short: as it is"]),
+        ("a" * 90 + ": " + "b, " * 50 + "c", ["a" * 90 + ":", "b, " * 50 + "c"]),
+        ("a: " + "b" * 90 + ", " + "c" * 150, ["a: " + "b" * 90 + ",", "c" * 150]),  # nothing alone on a line
+        ("a" * 199 + ". " + "b", ["a" * 199 + ".", "b"]),
+        ("a" * 200 + ". " + "b" * 90 + "; " + "c" * 150, ["a" * 200 + ".", "b" * 90 + ";", "c" * 150]),
+        ("x" * 500, ["x" * 500]),
+    ],
+)
+def test_a_long_text_is_told_in_lines_that_end_where_it_divides(text, lines):
+    assert in_lines(text) == lines
+
+
+@given(st.lists(st.text("ab", min_size=1, max_size=60), min_size=1), st.sampled_from([". ", "; ", ": ", ", "]))
+def test_lines_have_at_most_two_hundred_characters_and_lose_none(words, mark):
+    text = mark.join(words)
+    assert " ".join(in_lines(text)) == text
+    assert max(map(len, in_lines(text))) <= 200
 
 
 @pytest.mark.parametrize("kind", EXCEPTIONS)

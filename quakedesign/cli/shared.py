@@ -18,7 +18,7 @@ from rich.text import Text
 from quakedesign.errors import OutputError, ParameterError, UnitError
 from quakedesign.output import require_room
 from quakedesign.rationals import rational
-from quakedesign.text import visible
+from quakedesign.text import in_lines, visible
 
 # Negative decimals are values anyhow; with leading hyphens allowed, options after the values would be values too.
 Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
@@ -156,14 +156,15 @@ def print_lines(lines: Iterable[str]) -> None:
 
 
 class _Screen(Console):
-    """Console on which a string is text: no markup, no emoji, nothing that a terminal would obey."""
+    """Console on which a string is text: no markup, no emoji, nothing that a terminal would obey, no endless line."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        return super().render_str(visible(text), **options)
+        margin = " " * (len(text) - len(text.lstrip(" ")))
+        return super().render_str(f"\n  {margin}".join(in_lines(visible(text))), **options)
 
 
 def console(**options: Any) -> Console:
-    """Console for people, on stdout unless told; every string is one line of text."""
+    """Console for people, on stdout unless told; every string is one line of text, a long one several."""
     return _Screen(quiet=_quiet.get(), markup=False, emoji=False, highlight=False, soft_wrap=True, **options)
 
 

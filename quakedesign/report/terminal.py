@@ -36,12 +36,9 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
     for entry in (*comparison.of("designed"), *comparison.of("published")):
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in entry.design.gains.items())
         console.print()
-        console.print(entry.label, style="bold", end=": ")
-        for line in guarantee_lines(entry):
-            console.print(line, end="\n  ")
-        console.print(headline(entry))
-        for remark in remarks(entry):
-            console.print(f"  {remark}")
+        console.print(f"{entry.label}:", style="bold")
+        for line in (*guarantee_lines(entry), headline(entry), *remarks(entry)):
+            console.print(f"  {line}")
         console.print(f"  gains: {gains or 'none'}")
         for premise in entry.design.conditions:
             console.print(f"  {_line(premise)}")

@@ -6,7 +6,7 @@ from markupsafe import Markup, escape
 
 from quakedesign.text import visible
 
-_SIGNS = (("&lt;=", "≤"), ("&gt;=", "≥"), ("T_s", "T<sub>s</sub>"), ("|phi|", "|φ|"))
+_SIGNS = (("&lt;=", "≤"), ("&gt;=", "≥"), ("T_s", "T<sub>s</sub>"))
 
 
 def unit_html(unit: str) -> Markup:

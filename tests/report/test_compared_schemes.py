@@ -98,9 +98,10 @@ def test_the_terminal_says_it_and_no_table_is_wider_than_eighty_columns_or_break
     print_comparison(compared, console(file=out, width=80))
     said = out.getvalue()
     assert SCHEMES in " ".join(said.split())
-    first = said.split("\n\noutcome, ")[1].split("\n\n")[0].splitlines()[1:]
-    second = said.split("\n\nclosed loop, ")[1].splitlines()[1:]
-    shown = [line for line in (*first, *second) if not line.startswith(("guaranteed: the", "Schemes: "))]
+    assert max(map(len, said.splitlines())) <= 200
+    first = said.split("\n\noutcome, ")[1].split("\nguaranteed: the")[0].splitlines()[1:]
+    second = said.split("\n\nclosed loop, ")[1].split("\nSchemes: ")[0].splitlines()[1:]
+    shown = [*first, *second]
     assert max(map(len, shown)) <= 80
     cells = {cell for row in (*rows(compared), *outcome_rows(compared)) for cell in row[1:] if re.match(r"-?\d", cell)}
     assert len(cells) > 10

@@ -33,7 +33,7 @@ FAULT = qd.load_fault("real-fault")
 @pytest.mark.parametrize(
     ("written", "shown"),
     [
-        ("|phi| <= 0.00032 m/s^2", "|φ| ≤ 0.00032 m/s<sup>2</sup>"),
+        ("|h'| <= 0.00032 m/s^2", "|h&#39;| ≤ 0.00032 m/s<sup>2</sup>"),
         ("within 4.12e-05 m", "within 4.12·10<sup>−5</sup> m"),
         ("a 2-CTA from -14.4 MPa to 1e+02", "a 2-CTA from −14.4 MPa to 1·10<sup>2</sup>"),
         ("T_s < 1 & L^2/D", "T<sub>s</sub> &lt; 1 &amp; L<sup>2</sup>/D"),

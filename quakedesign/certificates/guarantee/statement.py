@@ -246,7 +246,7 @@ def sentence_of(task: Task, claims: Claims, when: str) -> str:
 
     Bounds of what is claimed are rounded up, those of the disturbances for which it is claimed down.
     """
-    kind = f"for every disturbance |phi| <= {LowerBound(task.amplitude):.3g} m/s^2"
+    kind = f"for every disturbance of at most {LowerBound(task.amplitude):.3g} m/s^2"
     if task.change is not None:
         kind += f" that starts at 0 and changes by at most {LowerBound(task.change):.3g} m/s^3"
     if not task.amplitude:
