@@ -51,10 +51,10 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
     when = "for a pressure that acts at once (continuous time), which no sampled controller has"
     if "step" in loop:
         when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s"
-        when += f", rock of L^2/D = {loop['diffusion']} s" if "diffusion" in loop else ""
-    kind = f"|phi| <= {lower(task.amplitude)} m/s^2"
+        when += f", rock of distance^2/diffusivity = {loop['diffusion']} s" if "diffusion" in loop else ""
+    kind = f"any acceleration of at most {lower(task.amplitude)} m/s^2"
     if task.change is not None:
-        kind += f", |phi'| <= {lower(task.change)} m/s^3, phi(0) = 0"
+        kind += f" that starts at 0 and changes by at most {lower(task.change)} m/s^3"
     implicit = " and an implicit step" if "root" in loop else ""
     alone = "root" not in loop and not any(line[1] != "0" for line in (*loop["measured"], loop["feedback"]))
     told = " of the slip alone" if alone else ""
@@ -66,8 +66,9 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction any function of "
         + ("the slip alone" if task.steady_beta else "slip and slip rate")
         + " within its bounds and slopes, continued to negative slip rates, parameters constant",
-        f"s in [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, w in [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, "
-        f"beta in [1, {upper(task.beta[1])}], b = {upper(task.b)} m^2/kg, derived",
+        f"derived accelerations: of a slip error [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, of a slip-rate error "
+        f"less [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, of a pressure {upper(task.b)} m^2/kg times "
+        f"[1, {upper(task.beta[1])}]",
         f"law with {len(loop['states'])} states{implicit}{told}, {when}{off}",
         f"disturbance: {kind}; from rest, along the reference, for ever; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",

@@ -346,7 +346,8 @@ def statement(
 ) -> list[str]:
     """What was verified, in ASCII; bounds on their outer side, what they hold for on its inner one."""
     loop, ranges = document["loop"], [f"{name} {inside(*fault.box[name])}" for name in CONSTANTS]
-    when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s, rock of L^2/D = {loop['diffusion']} s"
+    when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s"
+    when += f", rock of distance^2/diffusivity = {loop['diffusion']} s"
     off = f", measured slip within {loop['slip_noise']} m of the true one" if loop["slip_noise"] != "0" else ""
     peak = fault.rate * power_of_e(claims["log_rate"])
     highest = fault.stiffness * fault.distance / fault.box["coefficient"][0] + claims["push"]
@@ -356,7 +357,9 @@ def statement(
         f"law with {len(loop['states'])} states of the slip alone, {when}{off}",
         f"disturbance: any shear stress of at most {lower(fault.stress)} Pa; from steady sliding at "
         f"{exact(fault.rate)} m/s over {lower(fault.distance)} m; small gain {upper(small)}",
-        f"the slip rate of this fault never exceeds {upper(peak)} m/s: |ln(v/V)| <= {upper(claims['log_rate'])}",
-        f"|slip - reference| <= {upper(claims['slip_error'])} m, |ln(theta V/D)| <= {upper(claims['log_state'])}",
+        f"the slip rate of this fault never exceeds {upper(peak)} m/s: |ln(slip rate/first rate)| <= "
+        f"{upper(claims['log_rate'])}",
+        f"|slip - reference| <= {upper(claims['slip_error'])} m, |ln(state*first rate/critical_slip)| <= "
+        f"{upper(claims['log_state'])}",
         f"pressure in the fault from {lower(-claims['push'])} Pa to {upper(highest)} Pa",
     ]

@@ -1,6 +1,7 @@
 """Text of users as it may be shown: what a terminal would obey is written out, what is too long is shortened."""
 
 import re
+from bisect import bisect
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 from itertools import takewhile
@@ -10,7 +11,8 @@ _OBEYED = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, invisible form
 _LONGEST_WORD = 200
 _LONGEST_MESSAGE = 2000
 _LONGEST_LINE = 200
-_MARKS = (". ", "; ", ": ", ", ")  # from what divides a sentence most
+_STRENGTH = ",:;."  # of what divides a sentence, the last most
+_MARKS = re.compile(r"[(\[)\]]|[,:;.] ")
 
 
 def visible(text: str) -> str:
@@ -29,14 +31,33 @@ def one_line(message: str) -> str:
 def in_lines(text: str) -> list[str]:
     """Text in lines of at most 200 characters, each ended behind what divides it most in its last two thirds.
 
-    That is a full stop, semicolon, colon or comma. Nothing is cut: where there is none, a line is as long as it takes.
+    That is a full stop, semicolon, colon or comma outside of brackets. Nothing is cut: where there is none, a line is
+    as long as it takes.
     """
-    if len(text) <= _LONGEST_LINE:
-        return [text]
-    within = (text.rfind(mark, _LONGEST_LINE // 3, _LONGEST_LINE + 1) for mark in _MARKS)
-    beyond = (text.find(mark, _LONGEST_LINE) for mark in _MARKS)
-    end = next((end for end in within if end > 0), None) or min((e for e in beyond if e > 0), default=None)
-    return [text] if end is None else [text[: end + 1], *in_lines(text[end + 2 :])]
+    lines, begin = [], 0
+    ends = _divisions(text) if len(text) > _LONGEST_LINE else []
+    while len(text) - begin > _LONGEST_LINE:
+        first, last = (bisect(ends, begin + length, key=_place) for length in (_LONGEST_LINE // 3, _LONGEST_LINE))
+        if last == len(ends) == first:
+            break
+        place, _ = max(ends[first:last], key=lambda end: (end[1], end[0]), default=ends[min(last, len(ends) - 1)])
+        lines.append(text[begin:place])
+        begin = place + 1
+    return [*lines, text[begin:]]
+
+
+def _divisions(text: str) -> list[tuple[int, int]]:
+    """Places behind the marks of a text that stand outside of brackets, and how much each divides."""
+    found, depth = [], 0
+    for mark in _MARKS.finditer(text):
+        depth += (mark[0] in "([") - (mark[0] in ")]")
+        if depth <= 0 and mark[0].endswith(" "):
+            found.append((mark.start() + 1, _STRENGTH.index(mark[0][0])))
+    return found
+
+
+def _place(division: tuple[int, int]) -> int:
+    return division[0]
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:

@@ -1,18 +1,24 @@
 """The documentation is built without a warning, and what is built needs no network."""
 
+import json
 import os
 import re
 import subprocess
 import sys
 from html.parser import HTMLParser
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
 
 import quakedesign
+from quakedesign.certificates.guarantee.files import read_guarantee
 
 ROOT = Path(__file__).parents[1]
+SPECIFICATION = spec_from_file_location("generated_pages", ROOT / "docs" / "_extensions" / "generated.py")
+generated = module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(generated)
 PAGES = ("index.html", "reference/commands.html", "reference/fault_file.html", "explanation/glossary.html")
 
 
@@ -89,6 +95,33 @@ def test_every_public_name_and_command_is_told(pages):
     told = [name for name in app if not name.startswith("-")]
     assert len(told) > 15
     assert [name for name in told if f"quakedesign {name}" not in commands] == []
+
+
+def test_tables_in_pages_are_what_the_program_says_today():
+    """They stand in the pages, which are read where nothing is built; generated.py writes them again."""
+    for page, (head, _) in generated.TABLES.items():
+        text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+        assert text == generated.regenerated(page)
+        assert text.count(f"\n| {' | '.join(head)} |\n") == 1
+        assert len(re.findall(r"^\|", text, re.MULTILINE)) > 20
+
+
+@pytest.mark.parametrize("folder", ["howto", "reference", "explanation"])
+def test_every_page_is_linked_from_the_index_of_its_folder(folder):
+    index = ROOT / "docs" / folder / "index.md"
+    linked = re.findall(r"\]\((.*?)\)", index.read_text(encoding="utf-8"))
+    there = {page.name for page in index.parent.glob("[a-z]*.md")} - {"index.md"}
+    assert there <= set(linked)
+    assert all((index.parent / page).exists() for page in linked)
+    assert len(linked) == len(set(linked))
+
+
+def test_what_is_proved_begins_with_the_guarantee_that_is_printed():
+    """The sentence is that of the certificate in proofs, word by word."""
+    told = (ROOT / "docs" / "explanation" / "what_is_proved.md").read_text(encoding="utf-8").split("\n## ")[0]
+    quoted = " ".join(re.findall(r"^> (.*)$", told, re.MULTILINE)).replace("m/s²", "m/s^2")
+    raw = json.loads((ROOT / "proofs" / "certificates" / "guarantee_real-fault.json").read_text(encoding="utf-8"))
+    assert quoted.lower() == f"{read_guarantee(raw).sentence()}.".lower()
 
 
 def test_equations_are_drawn_without_a_script(pages):

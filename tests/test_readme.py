@@ -30,6 +30,12 @@ def test_it_is_one_page():
     assert max(map(len, README.splitlines())) <= 140
 
 
+def test_the_box_is_said_before_it_is_used():
+    first, *others = re.findall(r".{60}\bbox\b", README.replace("*", " ").replace("\n", " "))
+    assert "ranges" in first
+    assert others
+
+
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_links_lead_somewhere(document):
     links = re.findall(r"\]\((?!https?:)([^)#]+)\)", (ROOT / document).read_text(encoding="utf-8"))

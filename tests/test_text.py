@@ -2,6 +2,7 @@
 
 import pickle
 import unicodedata
+from time import perf_counter
 
 import pytest
 from hypothesis import given
@@ -56,6 +57,8 @@ def test_long_words_and_long_messages_lose_their_middle():
         ("a" * 199 + ". " + "b", ["a" * 199 + ".", "b"]),
         ("a" * 200 + ". " + "b" * 90 + "; " + "c" * 150, ["a" * 200 + ".", "b" * 90 + ";", "c" * 150]),
         ("x" * 500, ["x" * 500]),
+        ("V = " + "f(x, 2) + " * 30, ["V = " + "f(x, 2) + " * 30]),  # a formula stays whole
+        ("f(x, 2)*[1, 2]" * 20 + ", " + "b", ["f(x, 2)*[1, 2]" * 20 + ",", "b"]),
     ],
 )
 def test_a_long_text_is_told_in_lines_that_end_where_it_divides(text, lines):
@@ -67,6 +70,13 @@ def test_lines_have_at_most_two_hundred_characters_and_lose_none(words, mark):
     text = mark.join(words)
     assert " ".join(in_lines(text)) == text
     assert max(map(len, in_lines(text))) <= 200
+
+
+def test_a_megabyte_is_told_in_lines_at_once():
+    text = "L(x, y) = 13/64, " * 60_000
+    began = perf_counter()
+    assert " ".join(in_lines(text)) == text
+    assert perf_counter() - began < 5
 
 
 @pytest.mark.parametrize("kind", EXCEPTIONS)

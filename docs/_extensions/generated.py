@@ -1,12 +1,12 @@
-"""Tables that are written from the program itself, and the notebooks as pages."""
+"""Tables that are written from the program itself, and the notebooks as pages.
+
+``python docs/_extensions/generated.py`` writes the tables into their pages again.
+"""
 
 import json
+import re
 import shutil
 from pathlib import Path
-
-from docutils import nodes
-from docutils.parsers.rst import Directive
-from docutils.statemachine import StringList
 
 DOCS = Path(__file__).parents[1]
 
@@ -43,29 +43,38 @@ def _names():
         yield f"quakedesign.{name}", said.split("\n\n")[0].replace("\n", " ")
 
 
+def _commands():
+    """Rows of the commands: name, what it does."""
+    from quakedesign.cli import app
+
+    for name in sorted(name for name in app if not name.startswith("-")):
+        yield f"quakedesign {name}", " ".join(app[name].help.split("\n\n")[0].split())
+
+
 TABLES = {
-    "fault-file": (("table", "key", "needed", "example", "meaning"), _fault_file),
-    "names": (("name", "does"), _names),
+    "reference/fault_file.md": (("table", "key", "needed", "example", "meaning"), _fault_file),
+    "reference/api.md": (("name", "does"), _names),
+    "reference/commands.md": (("command", "does"), _commands),
 }
+"""Head and rows of the table of a page."""
+TABLE = re.compile(r"(?<=<!-- written by docs/_extensions/generated.py -->\n\n)(?:\|.*\n)*")
 
 
-class GeneratedTable(Directive):
-    """``.. generated-table:: NAME``."""
+def regenerated(page):
+    """Text of a page with its table as the program has it today."""
+    head, rows = TABLES[page]
+    lines = [_row(head), "|---" * len(head) + "|"]
+    for *cells, said in rows():
+        lines.append(_row([*(cell if cell in ("", "yes") else f"`{cell}`" for cell in cells), _escaped(said)]))
+    return TABLE.sub(lambda _: "\n".join([*lines, ""]), (DOCS / page).read_text(encoding="utf-8"))
 
-    required_arguments = 1
 
-    def run(self):
-        """Return the table."""
-        head, rows = TABLES[self.arguments[0]]
-        lines = [".. list-table::", "   :header-rows: 1", ""]
-        for row in (head, *rows()):
-            for i, cell in enumerate(row):
-                said = cell.replace("*", r"\*").replace("|", r"\|").replace("_ ", r"\_ ")
-                plain = row is head or i == len(row) - 1 or not cell
-                lines.append(f"   {'* -' if i == 0 else '  -'} {said if plain else f'``{cell}``'}".rstrip())
-        parent = nodes.container()
-        self.state.nested_parse(StringList(lines, "generated"), self.content_offset, parent)
-        return parent.children
+def _row(cells):
+    return f"| {' | '.join(cells)} |"
+
+
+def _escaped(text):
+    return re.sub(r"([*|<])", r"\\\1", text)
 
 
 def _bring_notebooks(app):
@@ -88,9 +97,13 @@ def _keep_bars(_app, _what, _name, _item, _options, lines):
 
 
 def setup(app):
-    """Register directive, copy and care for bars."""
+    """Register copies and care for bars."""
     app.connect("autodoc-process-docstring", _keep_bars, priority=900)
-    app.add_directive("generated-table", GeneratedTable)
     app.connect("builder-inited", _bring_notebooks)
     app.connect("builder-inited", _write_commands)
     return {"parallel_read_safe": True}
+
+
+if __name__ == "__main__":
+    for name in TABLES:
+        (DOCS / name).write_text(regenerated(name), encoding="utf-8")

@@ -131,5 +131,6 @@ def statement(certificate: Certificate) -> list[str]:
         point = ", ".join(f"{name}: {v}" for name, v in certificate.refutation.point.items())
         return [*lines, f"Filippov equilibrium away from the origin, in cell coordinates {point}"]
     lines.append("V = " + " + ".join(f"({written([term])})" for term in certificate.lyapunov))
-    lines.append(", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
+    lines.append("SignedPower(x, a) is |x|^a with the sign of x, AbsolutePower(x, a) is |x|^a")
+    lines.append("claims: " + ", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
     return lines

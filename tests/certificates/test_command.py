@@ -110,7 +110,8 @@ def test_a_certificate_is_said_in_lines():
     assert statement(small) == [
         *head,
         "V = (AbsolutePower(x, 3/2)/3) + (4*SignedPower(x, 3))",
-        "positive 1/2, decrease 2/3",
+        "SignedPower(x, a) is |x|^a with the sign of x, AbsolutePower(x, a) is |x|^a",
+        "claims: positive 1/2, decrease 2/3",
     ]
     refuted = replace(small, refutation=Equilibrium(point={"x": F(1, 4)}, parameters={}, weights={}))
     assert statement(refuted) == [*head, "Filippov equilibrium away from the origin, in cell coordinates x: 1/4"]

@@ -244,10 +244,11 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
     assert checker.statement(raw, task, claims, F(1, 3)) == [
         "fault a fault (a name; the data in the file are what counts), friction any function of slip and slip rate "
         "within its bounds and slopes, continued to negative slip rates, parameters constant",
-        "s in [-0.3334, 0.6667] 1/s^2, w in [-0.6667, 0.3334] 1/s, beta in [1, 0.3334], b = 0.6667 m^2/kg, derived",
+        "derived accelerations: of a slip error [-0.3334, 0.6667] 1/s^2, of a slip-rate error less [-0.6667, 0.3334] "
+        "1/s, of a pressure 0.6667 m^2/kg times [1, 0.3334]",
         "law with 1 states, every 1 s, 1/3 s late, lag 2/3 s",
-        "disturbance: |phi| <= 0.3333 m/s^2, |phi'| <= 0.1428 m/s^3, phi(0) = 0; from rest, along the reference, "
-        "for ever; small gain 0.3334",
+        "disturbance: any acceleration of at most 0.3333 m/s^2 that starts at 0 and changes by at most 0.1428 m/s^3; "
+        "from rest, along the reference, for ever; small gain 0.3334",
         "the slip rate of this fault never exceeds 0.1429 m/s",
         "|slip - reference| <= 0.3334 m, |slip rate - reference's| <= 0.6667 m/s",
         "pressure from -0.3334 Pa to 0.6667 Pa",
@@ -257,7 +258,7 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
     assert lines[0].startswith("fault gr\\xf6\\xdfe (a name")
     at_once = "for a pressure that acts at once (continuous time), which no sampled controller has"
     assert lines[2] == f"law with 1 states, {at_once}"
-    assert lines[3].startswith("disturbance: |phi| <= 0.3333 m/s^2; from rest")
+    assert lines[3].startswith("disturbance: any acceleration of at most 0.3333 m/s^2; from rest")
 
 
 def test_a_layer_in_numbers():
@@ -285,7 +286,7 @@ def test_a_layer_in_numbers():
 @pytest.mark.parametrize("lag", ["0", "1/3"])
 def test_the_statement_says_what_rock_there_is(lag):
     raw = changed(LAYERED, (("loop", "lag"), lag))
-    said = f"law with 1 states, every 1 s, 0 s late, lag {lag} s, rock of L^2/D = 2 s"
+    said = f"law with 1 states, every 1 s, 0 s late, lag {lag} s, rock of distance^2/diffusivity = 2 s"
     assert checker.statement(raw, checker.read_task(raw), dict.fromkeys(CLAIMS, F(1)), F(1, 3))[2] == said
     claim, lagging = read_guarantee(raw), "" if lag == "0" else ", through a lag of 0.333334 s"
     assert f"held over 1 s{lagging}, through rock of L^2/D = 2 s from well to fault, for every" in claim.sentence()
