@@ -2,13 +2,26 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output
-from quakedesign.cli.shared import ExactMetres, ExactMetresPerSecond, app, command_line, console, print_lines, progress
+from quakedesign.cli.shared import (
+    ExactMetres,
+    ExactMetresPerSecond,
+    ExactPascals,
+    ExactSeconds,
+    app,
+    command_line,
+    console,
+    print_lines,
+    progress,
+)
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
+
+if TYPE_CHECKING:
+    from quakedesign.fault import Fault
 
 
 @Parameter(name="*")
@@ -32,6 +45,13 @@ class DesignOptions:
     scheme
         Of the runs of gains designed with --continuous: continuous (unless given), as in the paper, or sampled and
         held: explicit, implicit, semi-implicit, compensated. Others run as they were designed.
+    diffusion
+        Of a fault with rate-and-state friction: L²/D of the rock between well and fault; D_c/(10 V) unless given.
+    stress
+        Of such a fault: bound of the shear stress disturbance, such as '25 kPa'; the largest that the design stands
+        unless given.
+    spread
+        Of such a fault: by how much of their values a, b and D_c may be off, such as 0.1.
     """
 
     objective: Literal["tracking", "peak"] = "tracking"
@@ -40,6 +60,9 @@ class DesignOptions:
     slip_noise: ExactMetres = "0"
     rate_noise: ExactMetresPerSecond = "0"
     scheme: str | None = None
+    diffusion: ExactSeconds | None = None
+    stress: ExactPascals | None = None
+    spread: str = "0"
 
     def told(self, names: list[str]) -> dict[str, Any]:
         """Options of `designed_comparison`.
@@ -59,7 +82,8 @@ class DesignOptions:
             raise ParameterError(
                 f"--measured and noise are for the e-LQR. Received --controller {', '.join(names)}. Leave them out."
             )
-        shared = {"objective": self.objective, "continuous": self.continuous}
+        sliding = {"diffusion": self.diffusion, "stress": self.stress, "spread": self.spread}
+        shared = {"objective": self.objective, "continuous": self.continuous, **sliding}
         return {"options": shared, "linear": linear, "scheme": self.scheme}
 
 
@@ -98,9 +122,10 @@ def design(
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare
 
-    names = controllers(controller)
-    told = options.told(names)
+    controllers(controller)
     found = load_fault(fault, box=box)
+    names = controllers(controller, found)
+    told = options.told(names)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
@@ -120,8 +145,8 @@ def design(
     return 0 if positive(comparison) else 1
 
 
-def controllers(name: str) -> list[str]:
-    """Laws to design: the one named, or all.
+def controllers(name: str, fault: "Fault | None" = None) -> list[str]:
+    """Laws to design: the one named, or all that apply to a fault.
 
     Raises
     ------
@@ -135,7 +160,7 @@ def controllers(name: str) -> list[str]:
         control_law(name)
     else:
         require_known(name, (*names, "all"), "controller", UnknownNameError)
-    return list(names) if name == "all" else [name]
+    return list(designable(fault)) if name == "all" else [name]
 
 
 def positive(comparison: Any) -> bool:

@@ -37,7 +37,9 @@ def compare(
     from quakedesign.report.numbers import printed_lines
     from quakedesign.studies.paper_numbers import printed, table
 
-    names, found = controllers(controller), load_fault(fault, box=box)
+    controllers(controller)
+    found = load_fault(fault, box=box)
+    names = controllers(controller, found)
     told = options.told(names)
     with progress() as tell:
         comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
@@ -82,7 +84,9 @@ def figures(
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare, write_folder
 
-    names, found = controllers(controller), load_fault(fault, box=box)
+    controllers(controller)
+    found = load_fault(fault, box=box)
+    names = controllers(controller, found)
     told = options.told(names)
     folder = out or Path(f"quakedesign-{found.name}-figures")
     prepare(folder, force=force)

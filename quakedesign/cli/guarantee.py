@@ -118,8 +118,8 @@ def guarantee(
             spread=rational(spread, "spread"),
             **times,
         )
-        if out is not None and isinstance(sliding.proof, SlidingGuarantee):
-            save_sliding(sliding.proof, out)
+        if out is not None and isinstance(sliding.found, SlidingGuarantee):
+            save_sliding(sliding.found, out)
         return _shown(sliding, out, began, output)
     if stress is not None or rational(spread, "spread"):
         raise ParameterError(

@@ -98,7 +98,8 @@ class Fault:
         if self.friction.state_names:
             raise ParameterError(
                 f"{purpose} needs a friction law of slip and slip rate alone. Received {self.friction.name}, with the "
-                f"state {', '.join(self.friction.state_names)}. Use fault, derive, simulate or guarantee for it."
+                f"state {', '.join(self.friction.state_names)}. "
+                "Use fault, derive, simulate, guarantee or design for it."
             )
 
     def with_box(self, name: str) -> "Fault":

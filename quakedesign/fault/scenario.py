@@ -96,7 +96,8 @@ def _fault(table: Table, problems: Problems) -> Any:
     whole = task if given == parts else None
     with problems.collected():
         if whole is not None:
-            return completed(parts, whole, () if "disturbance" in table.entries else (_UNDISTURBED,))
+            said = "disturbance" in table.entries or parts["friction"].state_names
+            return completed(parts, whole, () if said else (_UNDISTURBED,))
         require_plant(**{key: given[key] for key in PLANT if key in given})
     with problems.collected():
         if whole is None and "name" in given:

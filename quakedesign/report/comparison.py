@@ -9,6 +9,7 @@ from quakedesign.report.headlines import headline, remarks, said
 from quakedesign.report.page import table_html
 from quakedesign.simulation import simulation_scheme
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared, designs_of
+from quakedesign.studies.state_runs import StateRun
 from quakedesign.synthesis import Design
 
 
@@ -21,15 +22,18 @@ class Comparison(Compared):
             o: {e.design.name: e.to_dict() | {"headline": headline(e), "remarks": remarks(e)} for e in self.of(o)}
             for o in ("designed", "published")
         }
+        run = self.uncontrolled
         return {
             "controllers": by_origin["designed"],
             "published": by_origin["published"],
             "uncontrolled": {
-                "outcome": self.uncontrolled.outcome.to_dict(),
-                "metrics": self.uncontrolled.metrics.to_dict(),
-                "events": dict(self.uncontrolled.events),
-                "run": dict(self.uncontrolled.provenance),
+                "outcome": run.outcome.to_dict(),
+                "metrics": run.metrics.to_dict(),
+                "events": dict(run.events),
+                "run": dict(run.provenance),
+                "cycle": run.cycle if isinstance(run, StateRun) else None,
             },
+            "not_applicable": self.left_out,
         }
 
     def figures(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from quakedesign.controllers import control_laws
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Entry
+    from quakedesign.studies.comparison import Entry, Run
 
 WIDTH = 7.16  # two columns of a printed page [in]
 SMALL = 8  # size of letters [pt], still readable in print
@@ -65,7 +65,7 @@ def figure(rows: int, height: float, columns: int = 1, *, sharex: Any = None, **
     return drawing, axes
 
 
-def finish(drawing: Any, title: str, runs: Sequence["Trajectory"], note: str = "", *, legend: Any = None) -> Any:
+def finish(drawing: Any, title: str, runs: Sequence["Run"], note: str = "", *, legend: Any = None) -> Any:
     """Give a figure its title above, and below the legend of one axis (three columns) and how the runs were made."""
     drawing.suptitle(title, fontsize=SMALL + 2)
     whole = "; ".join(part for part in (note, made(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
@@ -88,7 +88,7 @@ def named(axis: Any, title: str) -> None:
     axis.set_title(title, fontsize=SMALL)
 
 
-def made(runs: Iterable["Trajectory"]) -> str:
+def made(runs: Iterable["Run"]) -> str:
     """Scheme, step, method and plant of runs, every distinct combination once."""
     told = [
         f"scheme {p['scheme']}, step {p['step']:.4g} s, method {p['method']}, {p['plant']} plant"

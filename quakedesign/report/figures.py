@@ -20,14 +20,18 @@ from quakedesign.report.drawing import (
     style,
     with_diverged,
 )
+from quakedesign.report.sliding_figures import sliding_figures
+from quakedesign.studies.state_runs import StateRun
 
 if TYPE_CHECKING:
-    from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Compared
+    from quakedesign.studies.comparison import Compared, Run
 
 
 def figures(comparison: "Compared") -> dict[str, Any]:
-    """Figures by name: ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``."""
+    """Figures by name: ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``; others with a state."""
+    if isinstance(comparison.uncontrolled, StateRun):
+        slowly = {"errors": errors(comparison)} if runs_of(comparison.entries) else {}
+        return sliding_figures(comparison, comparison.uncontrolled) | slowly
     drawn = {"uncontrolled": uncontrolled(comparison)}
     if runs_of(comparison.entries):
         drawn |= {
@@ -57,7 +61,7 @@ def uncontrolled(comparison: "Compared") -> Any:
     return finish(drawing, f"{fault.name} without control: magnitude {fault.magnitude:.2f}", [run])
 
 
-def end(*runs: "Trajectory") -> float:
+def end(*runs: "Run") -> float:
     """Time [s] until which earthquakes are shown: somewhat longer than the last takes to complete its slip."""
     settled = [run.time[int(np.argmax(np.abs(run.slip) >= 0.995 * np.abs(run.slip).max()))] for run in runs]
     return float(min(1.4 * max(settled), min(run.time[-1] for run in runs))) or float(runs[0].time[-1])

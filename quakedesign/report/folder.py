@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from quakedesign.certificates import certificate_text
-from quakedesign.certificates.guarantee import Guarantee
-from quakedesign.certificates.guarantee.files import guarantee_text, save_guarantee
+from quakedesign.certificates.guarantee.files import guarantee_text
+from quakedesign.certificates.slow_sliding import SlidingGuarantee, sliding_text
 from quakedesign.errors import OutputError
 from quakedesign.fault import fault_toml
-from quakedesign.output import require_room, whole_folder
+from quakedesign.output import require_room, whole_folder, write_whole
 from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.comparison import Comparison
 from quakedesign.report.figure_files import DEFAULT, figure_bytes
@@ -58,7 +58,7 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
             told = found[group][entry.design.name]
             if entry.design.certificate is not None:
                 told["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
-            if isinstance(entry.guarantee, Guarantee):
+            if entry.guaranteed is not None:
                 path = f"certificates/{entry.design.name}-guarantee.json"
                 told["guaranteed"]["certificate"] = path
                 told["certificate"] = told["certificate"] or path
@@ -71,7 +71,7 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
 def study_results(study: "PaperStudy", formats: Sequence[str] = DEFAULT) -> dict[str, Any]:
     """Results of the comparison, and of a study: ``induced``, ``figures``, ``numbers`` and ``printed``."""
     induced = study.induced
-    told = {
+    told = induced and {
         "outcome": induced.outcome.to_dict(),
         "metrics": induced.metrics.to_dict(),
         "events": dict(induced.events),
@@ -83,7 +83,7 @@ def study_results(study: "PaperStudy", formats: Sequence[str] = DEFAULT) -> dict
         **results(compared),
         "induced": told,
         "figures": drawn,
-        "numbers": table(compared, {"induced": induced}),
+        "numbers": table(compared, {"induced": induced} if induced else {}),
         "printed": printed(compared),
     }
 
@@ -149,8 +149,10 @@ def _write_certificates(folder: Path, comparison: Comparison) -> None:
         if entry.design.certificate is not None:
             path = folder / "certificates" / _file(entry.origin, entry.design.name)
             path.write_text(certificate_text(entry.design.certificate), encoding="utf-8")
-        if isinstance(entry.guarantee, Guarantee):
-            save_guarantee(entry.guarantee, folder / "certificates" / f"{entry.design.name}-guarantee.json")
+        found = entry.guaranteed
+        if found is not None:
+            text = sliding_text(found) if isinstance(found, SlidingGuarantee) else guarantee_text(found)
+            write_whole(folder / "certificates" / f"{entry.design.name}-guarantee.json", text)
         for kind, peaks in entry.peaks.items():
             path = folder / "certificates" / f"{entry.design.name}-peaks-{kind}.json"
             path.write_text(guarantee_text(peaks), encoding="utf-8")

@@ -4,11 +4,12 @@ from typing import TYPE_CHECKING
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
-from quakedesign.certificates.guarantee import Guarantee
 from quakedesign.certificates.premise import Premise
 from quakedesign.rationals import rational
 
 if TYPE_CHECKING:
+    from quakedesign.certificates.guarantee import Guarantee
+    from quakedesign.certificates.slow_sliding import SlidingGuarantee
     from quakedesign.studies.comparison import Entry
 
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
@@ -22,8 +23,8 @@ GRADES = (
 
 def grade(entry: "Entry") -> str:
     """Verdict on one controller, and what of its loop and task the proof leaves out."""
-    if isinstance(entry.guarantee, Guarantee):
-        return f"{_guaranteed(entry.guarantee)}{_unmet(entry)}"
+    if entry.guaranteed is not None:
+        return f"{_guaranteed(entry.guaranteed)}{_unmet(entry)}"
     if entry.design.verdict is not Verdict.PROVED:
         return str(entry.design.verdict)
     missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _held(entry)
@@ -31,9 +32,8 @@ def grade(entry: "Entry") -> str:
     return f"{reach}; UNSTABLE if p is held over T_s" if _unstable_if_held(entry) else reach
 
 
-def _guaranteed(guarantee: Guarantee) -> str:
-    claims = guarantee.claims
-    return f"guaranteed: slip rate <= {claims.peak_slip_rate:.3g} m/s, slip error <= {claims.slip_error:.3g} m"
+def _guaranteed(found: "Guarantee | SlidingGuarantee") -> str:
+    return f"guaranteed: slip rate <= {found.peak_slip_rate:.3g} m/s, slip error <= {found.claims.slip_error:.3g} m"
 
 
 def _unmet(entry: "Entry") -> str:

@@ -75,7 +75,8 @@ def sentences(entry: "Entry") -> list[str]:
     if design.controller is None:
         return _because(Verdict.UNDECIDED, design.details.get("reason", "no gains with a proof were found"))
     outcome, *of_run = run_sentences(entry.run, design.fault) if entry.run else ("",)
-    told = [outcome, *_verdict(design), *_step_verdict(entry), *_premises(entry), *of_run, *_bounds(entry)]
+    assumed = [f"assumed: {what}" for what in filter(None, [design.details.get("assumed")])]
+    told = [outcome, *_verdict(design), *_step_verdict(entry), *_premises(entry), *of_run, *_bounds(entry), *assumed]
     return [sentence for sentence in (*told, *_reversed(entry.run)) if sentence]
 
 
@@ -108,7 +109,7 @@ def _step_verdict(entry: "Entry") -> list[str]:
 def _premises(entry: "Entry") -> list[str]:
     """Every premise that fails, and what the proof is about besides."""
     design, told = entry.design, _broken(entry.design.conditions)
-    if design.verdict is Verdict.PROVED and all(p.holds for p in design.conditions):
+    if design.verdict is Verdict.PROVED and design.conditions and all(p.holds for p in design.conditions):
         told.append("every premise holds")
     if _sampled(design):
         told += ["its base gains are proved in continuous time too"] if design.certificate is not None else []

@@ -1,9 +1,14 @@
 """What is said of a run first: outcome, pressure, and whether that was what its task needs."""
 
+from typing import TYPE_CHECKING
+
 from quakedesign.fault import Fault
 from quakedesign.simulation import Trajectory
 from quakedesign.simulation.waiting import waiting
 from quakedesign.studies.needed_pressure import pressure_extremes, shortfall
+
+if TYPE_CHECKING:
+    from quakedesign.studies.comparison import Run
 
 _NEGLIGIBLE = 1e-6
 """Of the larger end of a range of pressures: a smaller end is said to be zero."""
@@ -38,7 +43,7 @@ def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
     return f"{said}: growing by {event.growth:.3g} 1/s it would at about {event.onset:.3g} s"
 
 
-def outcome_cells(run: Trajectory | None) -> tuple[str, ...]:
+def outcome_cells(run: "Run | None") -> tuple[str, ...]:
     """Texts under `OUTCOME_COLUMNS`; a dash means not applicable or not known."""
     if run is None:
         return ("–", "–", "–")

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from quakedesign.certificates.guarantee import Guarantee
 from quakedesign.report.account import ASKED, Account, accounts
 from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.grade import GRADES
@@ -15,10 +14,12 @@ from quakedesign.report.headlines import FEEDFORWARD_COLUMNS, scheme_sentence
 from quakedesign.report.mathml import mathml
 from quakedesign.report.parameter_table import HEADINGS, parameter_rows
 from quakedesign.report.reproduction import Reproduction
+from quakedesign.report.state_runs import cycle_sentence, left_out_lines
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.report.units import typeset
-from quakedesign.studies.equations import plant_latex
+from quakedesign.studies.equations import coordinates, plant_latex
 from quakedesign.studies.facts import fault_sentences
+from quakedesign.studies.state_runs import StateRun
 from quakedesign.text import visible
 
 if TYPE_CHECKING:
@@ -29,9 +30,18 @@ MODEL_LIMITS = (
     "of heating, or of seismicity around the fault",
     "a guarantee is about every friction law, parameter and disturbance of its box; whether the fault is in the box is "
     "a question of geology",
+    "in these runs the pressure has no limit and is even over the patch",
+)
+REST_LIMITS = (
     "proofs are about a plant continued to negative slip rates; the worst found with stick is what a search found on "
     "one that stops and reverses",
-    "in these runs the pressure acts at once and without limit, and is even over the patch",
+    "in these runs the pressure acts at once",
+)
+SLIDING_LIMITS = (
+    "the fault slides at the rate of its task from the start, and its far end rests: how it came to slide is not part "
+    "of the run nor of the proof",
+    "the stress disturbance of the run is a sine with the period of the largest tide, which need not be the worst; no "
+    "search for worse ones was made",
 )
 
 
@@ -51,6 +61,7 @@ def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Repro
             fault=comparison.fault,
             answer=answer(comparison),
             facts=fault_sentences(comparison.fault),
+            coordinates=coordinates(comparison.fault),
             plant=[mathml(equation) for equation in plant_latex(comparison.fault)],
             **_tables(comparison),
             accounts=told,
@@ -74,26 +85,30 @@ def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Repro
 def answer(comparison: "Compared") -> list[str]:
     """What a reader in a hurry wants: the earthquake, what is guaranteed against it, and of whom nothing is."""
     designed = comparison.of("designed")
-    lines, proved = [_natural(comparison)], {}
+    lines, proved, covers = [_natural(comparison)], {}, ""
     for entry in designed:
-        if isinstance(entry.guarantee, Guarantee):
-            proved[entry.design.title] = f"{entry.guarantee.claims.peak_slip_rate:.3g} m/s ({entry.design.title})"
+        if entry.guaranteed is not None:
+            title = entry.design.title
+            proved[title] = f"{entry.guaranteed.peak_slip_rate:.3g} m/s ({title})"
+            covers = entry.guaranteed.covers
     faster = {e.design.title: e.design.other_step for e in designed if e.design.title in proved and e.design.other_step}
     lines += [f"{title}: {said}" for title, said in faster.items()]
     if proved:
         lines.append(
             f"With a designed controller the slip rate never exceeds {', '.join(proved.values())}: proved, for the "
-            "loop as it runs, every friction law of the box and every disturbance up to the stated size"
+            f"loop as it runs, {covers}"
         )
     without = [e.design.title for e in designed if e.design.title not in proved]
     if without:
         lines.append(f"No guarantee was found for the designed {', '.join(without)}")
-    return lines
+    return [*lines, *left_out_lines(comparison)]
 
 
 def _natural(comparison: "Compared") -> str:
     """What the fault does without control."""
     fault, run = comparison.fault, comparison.uncontrolled
+    if isinstance(run, StateRun):
+        return cycle_sentence(run)
     size = f" of magnitude {fault.magnitude:.2f}" if run.outcome.kind == "earthquake" and fault.stress_drop > 0 else ""
     rate = run.outcome.peak_slip_rate
     return f"Without control: {run.outcome.kind}{size}" + ("" if rate is None else f", slip rate up to {rate:.3g} m/s")
@@ -114,7 +129,7 @@ def _limits(comparison: "Compared", told: list[Account]) -> list[str]:
     reverse = (
         [f"the slip rate is negative, outside the model, in part of the steps: {', '.join(shares)}"] if shares else []
     )
-    return [*own, *reverse, *MODEL_LIMITS]
+    return [*own, *reverse, *MODEL_LIMITS, *(SLIDING_LIMITS if comparison.fault.friction.state_names else REST_LIMITS)]
 
 
 def _tables(comparison: "Compared") -> dict[str, Any]:

@@ -28,6 +28,7 @@ from quakedesign.studies.paper_numbers import BARS, baseline, relative
 from quakedesign.studies.paper_study import friction_curve
 
 if TYPE_CHECKING:
+    from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Compared, Entry
     from quakedesign.studies.paper_study import PaperRuns
 
@@ -46,10 +47,14 @@ PAPER = {
 def paper_figures(study: "PaperRuns") -> dict[str, Any]:
     """Figures of a study by name: those of a comparison, and the paper's (`PAPER`).
 
-    Those in closed loop are there if anything ran, the bars if an e-LQR did.
+    Those in closed loop are there if anything ran, the bars if an e-LQR did. Friction with a state has its own.
     """
     comparison = study.comparison
-    drawn = {"friction-law": friction_law(comparison), "earthquakes": earthquakes(study), **figures(comparison)}
+    if study.induced is None:
+        seen = {"friction-coefficient": friction_coefficient(comparison)} if runs_of(comparison.entries) else {}
+        return figures(comparison) | seen
+    quakes = earthquakes(comparison, study.induced)
+    drawn = {"friction-law": friction_law(comparison), "earthquakes": quakes, **figures(comparison)}
     if runs_of(comparison.entries):
         drawn["pressure"] = pressure(comparison, study.close_ups)
         drawn["friction-coefficient"] = friction_coefficient(comparison)
@@ -102,9 +107,9 @@ def friction_law(comparison: "Compared") -> Any:
     return finish(drawing, f"{fault.name}: friction law of the simulations", [], "from the law itself, not from a run")
 
 
-def earthquakes(study: "PaperRuns") -> Any:
+def earthquakes(comparison: "Compared", induced: "Trajectory") -> Any:
     """Slip and slip rate of the natural and of the induced earthquake."""
-    fault, natural, induced = study.comparison.fault, study.comparison.uncontrolled, study.induced
+    fault, natural = comparison.fault, comparison.uncontrolled
     drawing, ((slip,), (rate,)) = figure(2, 4.4)
     size, unit = length(float(induced.slip.max()))
     divisor, name = clock(end(natural, induced))

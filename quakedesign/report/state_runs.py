@@ -1,6 +1,12 @@
 """What is said of a run of a fault whose friction has a state, free or held in slow sliding."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.controllers import control_laws
+
+if TYPE_CHECKING:
+    from quakedesign.studies.comparison import Compared
+    from quakedesign.studies.state_runs import StateRun
 
 _YEAR = 31_557_600.0
 _MOST_EVENTS = 8
@@ -29,6 +35,24 @@ def state_run_lines(answer: dict[str, Any]) -> list[str]:
         lines.append(f"and {len(events) - _MOST_EVENTS} events more (--json has them all)")
     lines.append(f"energy that the integration loses: {answer['energy']['relative_residual']:.2g} of the largest share")
     return lines
+
+
+def cycle_sentence(run: "StateRun") -> str:
+    """What a fault whose friction has a state does without control, with its last complete event."""
+    cycle, peak = run.cycle, f"slip rate up to {run.outcome.peak_slip_rate:.3g} m/s"
+    if not run.slip_events:
+        return f"Without control: the fault creeps, {peak}"
+    size = "" if cycle["magnitude"] is None else f" of magnitude {cycle['magnitude']:.2f}"
+    again = "" if cycle["recurrence_interval"] is None else f" every {_time(cycle['recurrence_interval'])}"
+    return f"Without control: {run.outcome.kind}{size}{again}, {peak}, loaded at {run.loading_rate:.3g} m/s"
+
+
+def left_out_lines(comparison: "Compared") -> list[str]:
+    """Laws that are not for this fault, each reason once."""
+    named: dict[str, list[str]] = {}
+    for name, why in comparison.left_out.items():
+        named.setdefault(why, []).append(control_laws()[name].title)
+    return [f"Not designed, {', '.join(titles)}: {why}" for why, titles in named.items()]
 
 
 def sliding_run_lines(answer: dict[str, Any]) -> list[str]:

@@ -17,8 +17,10 @@ from quakedesign.report.headlines import (
     scheme_sentence,
 )
 from quakedesign.report.outcomes import run_sentences
+from quakedesign.report.state_runs import cycle_sentence, left_out_lines
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.studies.facts import fault_sentences
+from quakedesign.studies.state_runs import StateRun
 
 if TYPE_CHECKING:
     from quakedesign.certificates.premises import Premise
@@ -32,6 +34,10 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
     console.print(comparison.fault.name, style="bold", end=" ")
     console.print(f"({comparison.fault.source})")
     for line in fault_sentences(comparison.fault):
+        console.print(f"  {line}")
+    if isinstance(comparison.uncontrolled, StateRun):
+        console.print(f"  {cycle_sentence(comparison.uncontrolled)}")
+    for line in left_out_lines(comparison):
         console.print(f"  {line}")
     for entry in (*comparison.of("designed"), *comparison.of("published")):
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in entry.design.gains.items())

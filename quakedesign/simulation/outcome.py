@@ -57,7 +57,7 @@ class OutcomeCriterion:
     - ``slow slip`` otherwise.
 
     A stable fault has no natural earthquake. What it is compared with instead is the speed at which its own spring and
-    mass would swing through the whole target slip, ω_n·d_max.
+    mass would swing through the whole target slip, ω_n·d_max; friction with a state always with its `dynamic_rate`.
 
     Attributes
     ----------
@@ -69,12 +69,15 @@ class OutcomeCriterion:
         Largest r' [m/s].
     target_slip : float
         d_max [m].
+    dynamic_rate : float, optional
+        aσ'A/(η + √(km)) [m/s] of friction with a state, whose natural peak takes a cycle to know.
     """
 
     natural_peak: float | None
     inertial_rate: float
     reference_rate: float
     target_slip: float
+    dynamic_rate: float | None = None
 
     @classmethod
     def of(cls, fault: Fault, natural_peak: float | None) -> "OutcomeCriterion":
@@ -111,7 +114,7 @@ class OutcomeCriterion:
 
     def _kind(self, peak_slip_rate: float, slip_error: float, followed: bool) -> str:
         excess = peak_slip_rate - (self.reference_rate if followed else 0.0)
-        scale = self.natural_peak or self.inertial_rate
+        scale = self.dynamic_rate or self.natural_peak or self.inertial_rate
         if followed and slip_error <= SLIP_BAND * self.target_slip and excess <= TRACKED_SHARE * scale:
             return "tracked"
         return "earthquake" if excess >= EARTHQUAKE_SHARE * scale else "slow slip"

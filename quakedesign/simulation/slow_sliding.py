@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from time import perf_counter
 from typing import Any
 
 import casadi as ca
@@ -14,23 +15,22 @@ from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_nonnegative, require_positive
 from quakedesign.loop import Layer, LinearLaw
 from quakedesign.simulation.integrators import adaptive_integrators
-from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
-from quakedesign.simulation.recording import Recording
+from quakedesign.simulation.metrics import Metrics
+from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.run import library_versions
+from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.slip_events import dynamic_rate
 from quakedesign.simulation.state_plants import SpringSlider
+from quakedesign.simulation.trajectory import Trajectory
 
 MODES = 24  # of the layer; the law has fewer
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run is recorded
 _RTOL = 1e-11
 
 SIGNALS = {
-    "slip": ("slip", "m"),
-    "slip_rate": ("slip rate", "m/s"),
     "slip_error": ("slip less that of the reference", "m"),
     "theta": ("state of friction", "s"),
     "asked": ("pressure that the law asks for beside that of the reference", "Pa"),
-    "pressure": ("fluid pressure in the fault", "Pa"),
     "stress": ("shear stress disturbance", "Pa"),
 }
 
@@ -56,40 +56,27 @@ class Tide:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SlidingRun(Recording):
-    """One run of a law around slow sliding.
+class SlidingRun(Trajectory):
+    """One run of a law around slow sliding: four instants a period, all of them kept; no energy.
 
     Attributes
     ----------
-    name : str
-    time, slip, slip_rate, slip_error, theta, asked, pressure, stress : ndarray
-        Four times a period; units in `SIGNALS`, time in s.
-    outcome : Outcome
-    opened : float or None
-        Time [s] at which the pressure would reach the effective normal stress, where the run ends.
-    provenance : mapping
+    theta, asked, stress : ndarray
+        As in `SIGNALS`, shape (n,).
     """
 
-    name: str
-    time: "np.ndarray" = field(repr=False)
-    slip: "np.ndarray" = field(repr=False)
-    slip_rate: "np.ndarray" = field(repr=False)
-    slip_error: "np.ndarray" = field(repr=False)
     theta: "np.ndarray" = field(repr=False)
     asked: "np.ndarray" = field(repr=False)
-    pressure: "np.ndarray" = field(repr=False)
     stress: "np.ndarray" = field(repr=False)
-    outcome: Outcome
-    opened: float | None
-    provenance: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def opened(self) -> float | None:
+        """Time [s] at which the pressure would reach the effective normal stress, where the run ends."""
+        return self.events.get("opening")
 
     def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
         """Values, long name and SI unit of every signal, by name."""
-        return {name: (getattr(self, name), *described) for name, described in SIGNALS.items()}
-
-    def attributes(self) -> Mapping[str, Any]:
-        """Provenance."""
-        return self.provenance
+        return super().signals() | {name: (getattr(self, name), *described) for name, described in SIGNALS.items()}
 
 
 def simulate_sliding(
@@ -139,11 +126,14 @@ def simulate_sliding(
             f"{fault.friction.name}. Use simulate for other loops."
         )
     require_known(method, adaptive_integrators(), "method")
-    length = fault.reference.operation_time if duration is None else duration
+    began, length = perf_counter(), fault.reference.operation_time if duration is None else duration
     require_positive(duration=length, step=float(step))
+    setting = Setting.of(fault, float(step), max(length, float(step)), 1, None)
     loop = _Loop.of(fault, diffusion, tide or Tide(), inertia)
     rows, opened = _followed(loop, law, float(step), length, method, progress)
-    return _recorded(fault, loop, rows, opened, {"method": method, "inertia": str(inertia), "step": float(step)})
+    told = {"scheme": "explicit", "step": float(step), "method": method, "inertia": str(inertia)}
+    run = _recorded(fault, loop, rows, opened, told | {"plant": "smooth" if inertia else "quasi-dynamic"})
+    return replace(run, metrics=_metrics(run, setting, perf_counter() - began))
 
 
 @dataclass(frozen=True)
@@ -215,27 +205,64 @@ def _followed(
 def _recorded(
     fault: Fault, loop: _Loop, rows: "np.ndarray", opened: float | None, told: Mapping[str, Any]
 ) -> SlidingRun:
-    time, slip, _, log_rate, log_state, asked, pressure = rows.T
-    error, rate = slip - loop.speed * time, np.exp(log_rate)
-    criterion = OutcomeCriterion(
-        natural_peak=dynamic_rate(fault),
-        inertial_rate=math.inf,
-        reference_rate=loop.speed,
-        target_slip=fault.reference.target_slip,
-    )
-    events = {} if opened is None else {"opening": opened}
-    found = criterion.outcome(float(rate.max()), float(np.max(np.abs(error))), events, followed=True)
+    time, slip, _, log_rate, log_state, asked, pressure = rows.T.copy()
+    friction = loop.slider.readings.map(len(time))(rows[:, 1:5].T, pressure)[0].full().ravel()
     return SlidingRun(
         name=f"{fault.name}, held in slow sliding",
         time=time,
         slip=slip,
-        slip_rate=rate,
-        slip_error=error,
+        slip_rate=np.exp(log_rate),
+        pressure=pressure,
+        reference=loop.speed * time,
+        reference_rate=np.full(len(time), loop.speed),
+        matched_perturbation=None,
+        friction=friction,
+        shear_stress=friction * (loop.slider.normal_stress - pressure),
+        moment_per_slip=fault.moment_of(1.0),
+        integrals=np.empty((0, len(time))),
+        integral_units=(),
+        metrics=Metrics(settled_from=0.0, steps=0, seconds=0.0),
+        energy=None,
+        events={} if opened is None else {"opening": opened},
+        criterion=OutcomeCriterion(
+            natural_peak=None,
+            inertial_rate=math.inf,
+            reference_rate=loop.speed,
+            target_slip=fault.reference.target_slip,
+            dynamic_rate=dynamic_rate(fault),
+        ),
+        provenance={"friction": fault.friction.name, "controller": "elqr", **told}
+        | library_versions("casadi", "numpy", "quakedesign"),
         theta=np.exp(log_state),
         asked=asked,
-        pressure=pressure,
         stress=loop.stress(time),
-        outcome=replace(found, share_of_natural=None),
-        opened=opened,
-        provenance={"friction": fault.friction.name, **told} | library_versions("casadi", "numpy", "quakedesign"),
+    )
+
+
+def _metrics(run: SlidingRun, setting: Setting, seconds: float) -> Metrics:
+    """Figures of all instants of a run that followed its reference."""
+    late = run.time > setting.settled_from
+    slip, rate = (values[late] for values in (run.slip - run.reference, run.slip_rate - run.reference_rate))
+    pressure = run.pressure[late]
+    of_errors: dict[str, float] = {}
+    if late.any():
+        of_errors = {
+            "max_slip_error": float(np.max(np.abs(slip))),
+            "max_slip_rate_error": float(np.max(np.abs(rate))),
+            "mise_slip": float(np.mean(slip**2)),
+            "mise_slip_rate": float(np.mean(rate**2)),
+            "rms_slip_error": math.sqrt(np.mean(slip**2)),
+            "rms_slip_rate_error": math.sqrt(np.mean(rate**2)),
+            "rms_pressure": math.sqrt(np.mean(pressure**2)),
+            "pressure_total_variation": float(np.sum(np.abs(np.diff(pressure)))),
+            "reverse_slip_fraction": 0.0,  # its logarithm is what is integrated
+        }
+    return Metrics(
+        **of_errors,
+        peak_slip_rate=float(run.slip_rate.max()),
+        max_pressure=float(run.pressure.max()),
+        min_pressure=float(run.pressure.min()),
+        settled_from=setting.settled_from,
+        steps=len(run.time) - 1,
+        seconds=seconds,
     )

@@ -9,10 +9,12 @@ from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_positive
 from quakedesign.simulation.slip_events import direct_strength
 from quakedesign.simulation.state_run import simulate_state
+from quakedesign.simulation.state_trajectory import StateTrajectory
 from quakedesign.symbolic import derive
 
 _CYCLES = 3  # the first one depends on its start
-_MOST_LOADS = 1000.0  # by which a strength aσ' is loaded, before a fault is taken to have no cycle
+_FIRST_LOADS, _MOST_LOADS = 10.0, 1000.0  # by which a strength aσ' is loaded, before a fault is taken to have no cycle
+_OLDER = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,20 +73,40 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
             f"late in the cycle needs a fault with repeated events. Received {fault.name}, which slides stably. "
             "Start it in steady sliding."
         )
-    unit = direct_strength(fault) * fault.area / (fault.stiffness * rate)
-    start: dict[str, Any] = {"start_rate": rate, "start_state": [1.5 * v for v in fault.friction.steady_state(rate)]}
-    loads = 10.0
-    while loads <= _MOST_LOADS:
-        onsets = simulate_state(fault, rate, duration=loads * unit, **start, **settings).onsets
-        if len(onsets) >= _CYCLES:
-            before, after = onsets[-2:]
-            time = float(before + share * (after - before))
-            run = simulate_state(
-                fault, rate, duration=math.nextafter(time, math.inf), times=[time], **start, **settings
-            )
-            return StartingState(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
-        loads *= 2
-    raise ParameterError(
-        f"late in the cycle needs a fault with repeated events. Received {fault.name}, with {len(onsets)} of them in "
-        f"{loads / 2 * unit:.3g} s at {rate:.3g} m/s. Start it in steady sliding."
+    found = cycles(fault, rate, **settings)
+    if len(found.onsets) < _CYCLES:
+        raise ParameterError(
+            f"late in the cycle needs a fault with repeated events. Received {fault.name}, with {len(found.onsets)} of "
+            f"them in {found.time[-1]:.3g} s at {rate:.3g} m/s. Start it in steady sliding."
+        )
+    before, after = found.onsets[-2:]
+    time = float(before + share * (after - before))
+    run = simulate_state(
+        fault, rate, duration=math.nextafter(time, math.inf), times=[time], **_disturbed(fault, rate), **settings
     )
+    return StartingState(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
+
+
+def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
+    """A fault loaded at a rate [m/s], near steady sliding at first, until it has repeated its events.
+
+    One that does not ends after a thousand times the load of its direct effect, a stable one after ten. `settings` as
+    in `locked`.
+    """
+    unit = direct_strength(fault) * fault.area / (fault.stiffness * rate)
+    loads, most = _FIRST_LOADS, _MOST_LOADS if derive(fault).unstable else _FIRST_LOADS
+    while True:
+        run = simulate_state(fault, rate, duration=loads * unit, **_disturbed(fault, rate), **settings)
+        loads *= 2
+        if len(run.onsets) >= _CYCLES or loads > most:
+            return run
+
+
+def disturbed(fault: Fault, rate: float) -> StartingState:
+    """Sliding at a rate [m/s] with a state that is older than steady."""
+    return StartingState(slip_rate=rate, state=tuple(_OLDER * float(v) for v in fault.friction.steady_state(rate)))
+
+
+def _disturbed(fault: Fault, rate: float) -> dict[str, Any]:
+    start = disturbed(fault, rate)
+    return {"start_rate": start.slip_rate, "start_state": start.state}

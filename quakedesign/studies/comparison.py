@@ -2,25 +2,30 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee
 from quakedesign.certificates.premises import Variant
 from quakedesign.certificates.sectors import sectors
+from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.controllers import Controller, published
 from quakedesign.fault import Fault, require_fault
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate, simulation_scheme
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.studies.on_trajectory import certified_bound
-from quakedesign.synthesis import Design, assess
+from quakedesign.studies.state_runs import StateRun, designed_run, natural_run
+from quakedesign.synthesis import Design, assess, left_out
 from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.analysis.lipschitz_on_run import largest_sampling_time, on_trajectory
 from quakedesign.synthesis.guaranteed import CLASSES, Answer, attacked
+from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
 from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
 from quakedesign.synthesis.linear.sampled.held import HeldLoop
 
 Tell = Callable[[str, float], None]
+Run = Trajectory | StateRun
 
 AS_IN_THE_PAPER = "continuous"
 """Scheme of the paper's simulations."""
@@ -51,7 +56,7 @@ class Entry:
         For a linear law: what is decided when p is held over T_s, see `Design.held_loop`.
     peaks : mapping of str to ContinuousPeaks
         For a designed linear law that is proved: peaks in continuous time by class; no class without any.
-    answer : Answer or None
+    answer : Answer, SlidingAnswer or None
         For a designed law: what is guaranteed of it with p held over T_s, see `Design.guarantee`, and the worst found.
     """
 
@@ -64,12 +69,17 @@ class Entry:
     variants: tuple[Variant, ...] = ()
     held: HeldLoop | None = None
     peaks: Mapping[str, ContinuousPeaks] = field(default_factory=dict)
-    answer: Answer | None = None
+    answer: Answer | SlidingAnswer | None = None
 
     @property
-    def guarantee(self) -> Guarantee | NoGuarantee | None:
+    def guarantee(self) -> Guarantee | SlidingGuarantee | NoGuarantee | None:
         """Of the loop with p held over T_s."""
         return self.answer.found if self.answer else None
+
+    @property
+    def guaranteed(self) -> Guarantee | SlidingGuarantee | None:
+        """The guarantee, if there is one."""
+        return None if isinstance(self.guarantee, NoGuarantee) else self.guarantee
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None for what a report adds."""
@@ -104,14 +114,19 @@ class Compared:
     Attributes
     ----------
     fault : Fault
-    uncontrolled : Trajectory
-        The natural earthquake.
+    uncontrolled : Trajectory or StateRun
+        The natural earthquake; of friction with a state the cycle of them.
     entries : tuple of Entry
     """
 
     fault: Fault
-    uncontrolled: Trajectory
+    uncontrolled: Run
     entries: tuple[Entry, ...]
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Why laws that are designed for other faults are not for this one, by name."""
+        return left_out(self.fault)
 
     def of(self, origin: str) -> tuple[Entry, ...]:
         """Entries of one origin."""
@@ -126,6 +141,8 @@ def compared(
     for name in schemes.values():
         simulation_scheme(name)
     tell("uncontrolled", 0.0)
+    if fault.friction.state_names:
+        return _slowly_compared(fault, designs, tell)
     uncontrolled = natural_earthquake(fault)
     entries: list[Entry] = []
     for controller in published(fault.name).values() if with_published else ():
@@ -134,9 +151,28 @@ def compared(
     for designed in designs:
         entry = _entry("designed", designed, schemes, tell)
         tell(f"{entry.label}: worst cases", 0.0)
-        answer = replace(attacked(fault, designed.guarantee), compensation=designed.compensation)
-        entries.append(replace(entry, answer=answer))
+        entries.append(replace(entry, answer=_answer(fault, designed)))
     return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
+
+
+def _answer(fault: Fault, design: Design) -> Answer | SlidingAnswer | None:
+    found = design.guarantee
+    if isinstance(found, SlidingGuarantee):
+        return design.sliding
+    return replace(attacked(fault, found), compensation=design.compensation)
+
+
+def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell) -> Compared:
+    """Of friction with a state: its cycle, and its designs as they run."""
+    natural = natural_run(fault)
+    entries = []
+    for designed in designs:
+        entry = Entry(label=f"{designed.title} (designed)", origin="designed", design=designed, run=None)
+        if designed.controller is not None:
+            told = partial(tell, entry.label)
+            entry = replace(entry, run=designed_run(designed, natural.natural_peak, told))
+        entries.append(replace(entry, answer=designed.sliding))
+    return Compared(fault=fault, uncontrolled=natural, entries=tuple(entries))
 
 
 def designs_of(

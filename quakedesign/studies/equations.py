@@ -6,18 +6,41 @@ import sympy as sp
 
 from quakedesign.controllers import Controller, Signals
 from quakedesign.fault import Fault
+from quakedesign.simulation.state_plants import spring_acceleration, stretch
 from quakedesign.symbolic import plant
+from quakedesign.symbolic.state_plant import rate, state_symbols
 
 _LONG = 100  # numerators and denominators of more are written as decimals
 
 
+def coordinates(fault: Fault) -> str:
+    """What the plant is written in, for a sentence that goes on with its equations."""
+    if not fault.friction.state_names:
+        return "Slip x₁ and slip rate x₂, measured from the equilibrium without pressure,"
+    return "Slip x₁, slip rate v, the stretch s of the spring, whose far end rests, and the state of friction"
+
+
 def plant_latex(fault: Fault) -> list[str]:
-    """Plant of a fault whose friction has no state, and its friction law."""
+    """Plant of a fault, and its friction law."""
+    if fault.friction.state_names:
+        return _with_state(fault)
     friction = plant.mu(plant.x1, plant.x2)
     acceleration = plant.shifted_acceleration().subs(friction, sp.Symbol("mu"))
     law = sp.sympify(fault.friction.symbolic().coefficient(plant.x1, plant.x2))
     motion = rf"\dot x_1 = x_2, \qquad \dot x_2 = {sp.latex(acceleration)}"
     return [motion, rf"\mu = {sp.latex(law)}"]
+
+
+def _with_state(fault: Fault) -> list[str]:
+    states = state_symbols(fault.friction.state_names)
+    law, mu, named = fault.friction.symbolic(), sp.Symbol("mu"), {stretch: sp.Symbol("s", real=True)}
+    acceleration = spring_acceleration().replace(plant.mu, lambda *_: mu).subs(named)
+    moved = zip(states, law.state_rates(plant.x1, rate, *states), strict=True)
+    return [
+        rf"\dot x_1 = v, \qquad \dot s = -v, \qquad \dot v = {sp.latex(acceleration)}",
+        rf"\mu = {sp.latex(sp.sympify(law.coefficient(plant.x1, rate, *states)))}",
+        *(rf"\dot {{{sp.latex(state)}}} = {sp.latex(sp.sympify(change))}" for state, change in moved),
+    ]
 
 
 def law_latex(law: Controller | None) -> list[str]:

@@ -25,8 +25,9 @@ class PaperRuns:
     Attributes
     ----------
     comparison : Compared
-    induced : Trajectory
-        Without control, under a constant pressure of a tenth of the effective normal stress.
+    induced : Trajectory or None
+        Without control, under a constant pressure of a tenth of the effective normal stress; None for friction with a
+        state, which has none of the short runs.
     close_ups : mapping of str to Trajectory
         By label of the entry: its first `PERIODS` natural periods with every step kept.
     front : tuple of FrontPoint
@@ -34,7 +35,7 @@ class PaperRuns:
     """
 
     comparison: Compared
-    induced: Trajectory
+    induced: Trajectory | None
     close_ups: Mapping[str, Trajectory]
     front: tuple[FrontPoint, ...] = ()
 
@@ -53,6 +54,8 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     PaperRuns
     """
     tell, fault = progress or (lambda _what, _done: None), comparison.fault
+    if fault.friction.state_names:
+        return PaperRuns(comparison=comparison, induced=None, close_ups={})
     tell("induced earthquake", 0.0)
     induced = natural_earthquake(fault, INDUCING_SHARE * fault.effective_normal_stress)
     length = min(PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)

@@ -1,8 +1,11 @@
-"""One run of a fault whose friction has a state, as the command line asks for it: free, or held in slow sliding."""
+"""Runs of a fault whose friction has a state: free, as it is by nature, or held in slow sliding."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -13,11 +16,13 @@ from quakedesign.fault.checks import require_positive
 from quakedesign.loop import SlidingModel
 from quakedesign.rationals import rational
 from quakedesign.simulation import PressureCourse, StateTrajectory, simulate_state
+from quakedesign.simulation.metrics import Metrics
 from quakedesign.simulation.outcome import Outcome
 from quakedesign.simulation.slip_events import SlipEvent, cycle_outcome, dynamic_rate, slip_events
 from quakedesign.simulation.slow_sliding import SlidingRun, Tide, simulate_sliding
-from quakedesign.simulation.starting_state import StartingState, late_in_cycle, locked, sliding
+from quakedesign.simulation.starting_state import StartingState, cycles, disturbed, late_in_cycle, locked, sliding
 from quakedesign.symbolic import derive
+from quakedesign.synthesis import Design
 from quakedesign.synthesis.linear.plant.sliding_model import growth_rate, sliding_model
 from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
 
@@ -38,12 +43,15 @@ class StateRun:
         v_∞ [m/s].
     start : StartingState
     trajectory : StateTrajectory
+    seconds : float
+        Time that it took [s], where that was measured.
     """
 
     fault: Fault
     loading_rate: float
     start: StartingState
     trajectory: StateTrajectory
+    seconds: float = 0.0
 
     @property
     def outcome(self) -> Outcome:
@@ -51,9 +59,59 @@ class StateRun:
         return cycle_outcome(self.fault, self.trajectory)
 
     @property
-    def events(self) -> tuple[SlipEvent, ...]:
+    def time(self) -> "np.ndarray":
+        """[s], shape (n,)."""
+        return self.trajectory.time
+
+    @property
+    def slip(self) -> "np.ndarray":
+        """[m], shape (n,)."""
+        return self.trajectory.slip
+
+    @property
+    def slip_rate(self) -> "np.ndarray":
+        """[m/s], shape (n,)."""
+        return self.trajectory.slip_rate
+
+    @cached_property
+    def slip_events(self) -> tuple[SlipEvent, ...]:
         """Every event."""
         return slip_events(self.fault, self.trajectory, self.loading_rate)
+
+    @property
+    def cycle(self) -> dict[str, float | None]:
+        """Recurrence interval [s], slip [m] and magnitude of the last one that is complete; None for none."""
+        intervals = [later.onset - event.onset for event, later in pairwise(self.slip_events)]
+        whole = [event for event in self.slip_events if event.arrest is not None]
+        return {
+            "recurrence_interval": intervals[-1] if intervals else None,
+            "slip": whole[-1].slip if whole else None,
+            "magnitude": whole[-1].magnitude if whole else None,
+        }
+
+    @property
+    def natural_peak(self) -> float | None:
+        """Largest slip rate of its events [m/s]; None without any."""
+        return self.outcome.peak_slip_rate if self.slip_events else None
+
+    @property
+    def metrics(self) -> Metrics:
+        """Largest slip rate and number of steps: nothing is followed."""
+        run = self.trajectory
+        return Metrics(
+            peak_slip_rate=self.outcome.peak_slip_rate, settled_from=0.0, steps=len(run.time) - 1, seconds=self.seconds
+        )
+
+    @property
+    def events(self) -> dict[str, float]:
+        """Nothing that ends a run happened."""
+        return {}
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """How it was made, as of runs with a controller."""
+        run, plant = self.trajectory.provenance, "smooth" if self.trajectory.provenance["inertia"] == "True" else ""
+        return {**run, "scheme": "continuous", "step": None, "plant": plant or "quasi-dynamic", "controller": "none"}
 
     @property
     def resting(self) -> bool:
@@ -63,9 +121,7 @@ class StateRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Answer of ``simulate`` for such a fault, SI units; the cycle is the last one that is complete."""
-        run, events = self.trajectory, self.events
-        intervals = [later.onset - event.onset for event, later in pairwise(events)]
-        whole = [event for event in events if event.arrest is not None]
+        run = self.trajectory
         return {
             "outcome": self.outcome.to_dict() | {"earthquake_from": 0.1 * dynamic_rate(self.fault)},
             "resting": self.resting,
@@ -74,12 +130,8 @@ class StateRun:
                 "slip_rate": self.start.slip_rate,
                 "state": dict(zip(run.state_names, self.start.state, strict=True)),
             },
-            "cycle": {
-                "recurrence_interval": intervals[-1] if intervals else None,
-                "slip": whole[-1].slip if whole else None,
-                "magnitude": whole[-1].magnitude if whole else None,
-            },
-            "slip_events": [asdict(event) for event in events],
+            "cycle": self.cycle,
+            "slip_events": [asdict(event) for event in self.slip_events],
             "pressure": [float(run.pressure.min()), float(run.pressure.max())],
             "slip": float(run.slip[-1]),
             "duration": float(run.time[-1]),
@@ -145,6 +197,31 @@ def run_state(
     return StateRun(fault=fault, loading_rate=rate, start=begun, trajectory=run)
 
 
+def natural_run(fault: Fault) -> StateRun:
+    """What a fault does that is loaded at the reference rate of its law, with inertia: its cycle, or that it creeps."""
+    began, rate = perf_counter(), fault.friction.operating_rate
+    run = cycles(fault, rate, inertia=True, method="radau", rtol=_RTOL)
+    start = disturbed(fault, rate)
+    return StateRun(fault=fault, loading_rate=rate, start=start, trajectory=run, seconds=perf_counter() - began)
+
+
+def designed_run(design: Design, natural_peak: float | None, progress: Callable[[float], None]) -> SlidingRun:
+    """The law of a design for slow sliding over its task, under the stress that it is designed for as a tide."""
+    answer = design.sliding
+    if answer is None or answer.held is None:
+        raise ParameterError(f"a designed run needs a law for slow sliding. Received {design!r:.60}. Use simulate.")
+    run = simulate_sliding(
+        design.fault,
+        answer.held.law,
+        answer.held.step,
+        diffusion=answer.held.diffusion,
+        tide=Tide(amplitude=float(answer.task.stress), period=TIDE),
+        inertia=True,
+        progress=progress,
+    )
+    return replace(run, criterion=replace(run.criterion, natural_peak=natural_peak))
+
+
 @dataclass(frozen=True, kw_only=True)
 class HeldRun:
     """A controlled run, and what it comes to.
@@ -175,7 +252,7 @@ class HeldRun:
             "diffusion": float(self.diffusion),
             "metrics": {
                 "max_log_rate": float(np.max(np.abs(np.log(run.slip_rate / rate)))),
-                "max_slip_error": float(np.max(np.abs(run.slip_error))),
+                "max_slip_error": float(np.max(np.abs(run.slip - rate * run.time))),
                 "max_asked": float(np.max(np.abs(run.asked))),
             },
             "pressure": [float(run.pressure.min()), float(run.pressure.max())],

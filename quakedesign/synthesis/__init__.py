@@ -14,5 +14,6 @@ if TYPE_CHECKING:
     from quakedesign.synthesis.guarantee import answer as answer
     from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding as answer_sliding
     from quakedesign.synthesis.methods.base import designable as designable
+    from quakedesign.synthesis.methods.base import left_out as left_out
 
 face(__name__)

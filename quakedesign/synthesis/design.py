@@ -6,13 +6,13 @@ from typing import Any
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.premises import least_authority
 from quakedesign.controllers import Controller, control_law
-from quakedesign.controllers.feed_forward import feed_forward
-from quakedesign.errors import ParameterError, require_known
+from quakedesign.controllers.feed_forward import NONE, feed_forward
+from quakedesign.errors import ParameterError, UnsupportedError, require_known
 from quakedesign.fault import Fault, require_fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.designed import Design
 from quakedesign.synthesis.guaranteed import MEASURED, OBJECTIVES
-from quakedesign.synthesis.methods.base import Problem
+from quakedesign.synthesis.methods.base import Problem, Sliding, method_of
 
 
 def design(
@@ -25,6 +25,9 @@ def design(
     measured: str = MEASURED[0],
     slip_noise: str | float | Fraction = 0,
     rate_noise: str | float | Fraction = 0,
+    diffusion: str | float | Fraction | None = None,
+    stress: str | float | Fraction | None = None,
+    spread: str | float | Fraction = 0,
 ) -> Design:
     """Find gains with a proof for a fault.
 
@@ -38,6 +41,9 @@ def design(
     With `continuous` those of the paper, without a guarantee of the loop that runs. 2-CTA, 2-DIA: λ grows until L̄
     exceeds by a tenth what the reference and the disturbance need; so does it where no T_s has a guarantee. e-LQR:
     Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
+
+    A fault whose friction has a state is held in slow sliding along its task by an e-LQR of the slip alone, through
+    the rock between well and fault (`Design.sliding`); sliding modes do not apply to it.
 
     Parameters
     ----------
@@ -57,6 +63,13 @@ def design(
         What the e-LQR of samples is told: ``"slip-and-rate"``, or ``"slip"``, from which it estimates the slip rate.
     slip_noise, rate_noise : str, float or Fraction
         Bounds of what it is told wrongly of slip [m] and slip rate [m/s], for its guarantee.
+    diffusion : str, float or Fraction, optional
+        Of friction with a state: L²/D [s] of the rock between well and fault; a tenth of D_c/V unless given.
+    stress : str, float or Fraction, optional
+        Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that the design stands unless
+        given.
+    spread : str, float or Fraction
+        Of friction with a state: by how much of their values a, b and D_c may be off [-].
 
     Returns
     -------
@@ -69,12 +82,14 @@ def design(
         For a controller that cannot be designed, or an unknown feed-forward.
     ParameterError
         For a feed-forward with a law that takes none or runs sampled, an unknown objective, or one of a design in
-        continuous time.
+        continuous time; for diffusion, stress or spread without a state of friction.
+    UnsupportedError
+        For a law that does not apply to friction with a state.
     """
     require_fault(fault)
     law = control_law(controller)
-    fault.require_memoryless("design")
-    added = feed_forward(feedforward, fault, least_authority(fault))
+    sliding = _sliding(fault, law, diffusion, stress, spread)
+    added = NONE if feedforward == NONE.name else feed_forward(feedforward, fault, least_authority(fault))
     noise = Around(slip_noise=rational(slip_noise, "slip_noise"), rate_noise=rational(rate_noise, "rate_noise"))
     require_known(objective, OBJECTIVES, "objective")
     if continuous and objective != OBJECTIVES[0]:
@@ -83,7 +98,26 @@ def design(
             "Leave it out, or continuous."
         )
     told: Any = {"objective": objective, "continuous": continuous, "measured": measured, "noise": noise}
-    return law.design(Problem(fault=fault, answer=Design, feedforward=added, **told))
+    return law.design(Problem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **told))
+
+
+def _sliding(fault: Fault, law: type[Controller], diffusion: Any, stress: Any, spread: Any) -> Sliding:
+    """What is asked of slow sliding, which only friction with a state has; refuses laws that do not apply to it."""
+    asked = Sliding(
+        diffusion=None if diffusion is None else rational(diffusion, "diffusion"),
+        stress=None if stress is None else rational(stress, "stress"),
+        spread=rational(spread, "spread"),
+    )
+    if not fault.friction.state_names and asked != Sliding():
+        raise ParameterError(
+            "diffusion, stress and spread of a design need friction with a state. Received "
+            f"{fault.friction.name}. Leave them out; guarantee takes a diffusion."
+        )
+    if asked.diffusion is not None and asked.diffusion <= 0:
+        raise ParameterError(f"a diffusion must be above 0 s. Received {float(asked.diffusion):g} s. Leave it out.")
+    if fault.friction.state_names and (why := method_of(law).without_state):
+        raise UnsupportedError(f"{why}. Received {law.name}. Design an elqr.")
+    return asked
 
 
 def assess(fault: Fault, controller: Controller) -> Design:

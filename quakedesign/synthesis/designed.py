@@ -10,11 +10,13 @@ from quakedesign.certificates import Certificate, Verdict
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.premises import Domain, Premise, Variant
+from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.controllers import Controller, control_laws
 from quakedesign.fault import Fault
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.synthesis.guaranteed import Compensation
 from quakedesign.synthesis.guaranteed.default_design import REACH
+from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
 from quakedesign.synthesis.linear.sampled.held import HeldLoop
 from quakedesign.synthesis.methods.base import method_of
 
@@ -42,8 +44,10 @@ class Design:
         What synthesis decided: exact numbers as texts.
     slip_noise, rate_noise : Fraction
         Bounds of what a law of samples is told wrongly of slip [m] and slip rate [m/s].
-    runs : Guarantee or NoGuarantee, optional
+    runs : Guarantee, SlidingGuarantee or NoGuarantee, optional
         What was proved of the loop that runs while it was designed; None to find it when `guarantee` is asked for.
+    sliding : SlidingAnswer, optional
+        For friction with a state: the law as it runs, with its rock, and the task that it is designed for.
     """
 
     fault: Fault
@@ -56,7 +60,8 @@ class Design:
     details: Mapping[str, Any] = field(default_factory=dict)
     slip_noise: Fraction = Fraction(0)
     rate_noise: Fraction = Fraction(0)
-    runs: Guarantee | NoGuarantee | None = None
+    runs: Guarantee | SlidingGuarantee | NoGuarantee | None = None
+    sliding: SlidingAnswer | None = None
 
     @property
     def gains(self) -> dict[str, Fraction]:
@@ -125,7 +130,7 @@ class Design:
         return method_of(type(law)).certified_peaks(self.fault, law, disturbance_class)
 
     @property
-    def guarantee(self) -> Guarantee | NoGuarantee:
+    def guarantee(self) -> Guarantee | SlidingGuarantee | NoGuarantee:
         """What is proved of the law as it runs, once per T_s, p held; or why nothing.
 
         A law of samples has its own T_s, a sliding mode of samples runs in the scheme ``compensated``; the integrals of
@@ -142,8 +147,10 @@ class Design:
     @property
     def compensation(self) -> Compensation | None:
         """A sliding mode of samples with its guarantee; None for another law."""
-        law = self.controller
-        return method_of(type(law)).compensation(law, self.guarantee) if law and law.sampling else None
+        law, found = self.controller, self.guarantee
+        if law is None or law.sampling is None or isinstance(found, SlidingGuarantee):
+            return None
+        return method_of(type(law)).compensation(law, found)
 
     def held_loop(self) -> HeldLoop | None:
         """What is decided of an e-LQR when p is held over the fault's sampling time; None for another law."""

@@ -54,4 +54,4 @@ def test_friction_with_a_state_has_no_limits_and_the_line_names_what_it_has(caps
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "a limit of all controllers needs a friction law of slip and slip rate alone" in said
-    assert "Use fault, derive, simulate or guarantee for it." in said
+    assert "Use fault, derive, simulate, guarantee or design for it." in said

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, log10
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any, ClassVar, TypedDict
 
 from quakedesign import loop as loops
 from quakedesign.bounds import LowerBound, UpperBound
@@ -193,17 +193,25 @@ class Guarantee:
     claims : Claims
     slow_gain : SlowGain, optional
         How the proof uses that the input gain is slow; None for one that lets it jump.
+    covers : str
+        For what it holds, in short.
     """
 
     task: Task
     held: Held
     claims: Claims
     slow_gain: SlowGain | None = None
+    covers: ClassVar[str] = "every friction law of the box and every disturbance up to the stated size"
 
     def __repr__(self) -> str:
         held, claims = self.held, self.claims
         errors = f"|e1| <= {claims.slip_error:.4g} m, |e2| <= {claims.slip_rate_error:.4g} m/s"
         return f"Guarantee({self.task.name} held over {six_digits(held.step)} s: {errors})"
+
+    @property
+    def peak_slip_rate(self) -> UpperBound:
+        """What the slip rate never exceeds [m/s]."""
+        return self.claims.peak_slip_rate
 
     @property
     def loop(self) -> PeriodicLoop:

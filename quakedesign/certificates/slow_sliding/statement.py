@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
@@ -25,12 +25,15 @@ class SlidingGuarantee:
     cuts : Cuts
         How the box of constants falls into cells.
     claims : SlidingClaims
+    covers : str
+        For what it holds, in short.
     """
 
     task: SlidingTask
     held: Held
     cuts: Cuts
     claims: SlidingClaims
+    covers: ClassVar[str] = "the stated constants of friction and every shear stress disturbance up to the stated size"
 
     def __repr__(self) -> str:
         return f"SlidingGuarantee({self.task.name}: |ln(v/V)| <= {self.claims.log_rate:.4g})"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, Unpack
+from typing import Any, ClassVar, Unpack
 
 from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.statement import Around
@@ -26,30 +26,40 @@ class SlidingAnswer:
 
     Attributes
     ----------
-    proof : SlidingGuarantee or NoGuarantee
+    found : SlidingGuarantee or NoGuarantee
+    task : SlidingTask
+    held : Held or None
+        The law as it runs; None where no law was found.
     """
 
-    proof: SlidingGuarantee | NoGuarantee
+    found: SlidingGuarantee | NoGuarantee
+    task: SlidingTask
+    held: Held | None
+    compensation: ClassVar[None] = None
 
     @property
     def proved(self) -> bool:
         """Whether there is a guarantee."""
-        return isinstance(self.proof, SlidingGuarantee)
+        return isinstance(self.found, SlidingGuarantee)
 
     def lines(self) -> list[str]:
         """For people."""
-        sentence = self.proof.sentence()
+        sentence = self.found.sentence()
         return [f"proved: {sentence}" if self.proved else sentence]
+
+    def limit_lines(self) -> list[str]:
+        """What no controller can do at the same T_s; none is known."""
+        return []
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        if not isinstance(self.proof, SlidingGuarantee):
-            return {"verdict": "undecided", "reason": self.proof.reason}
-        held = self.proof.held
+        if not isinstance(self.found, SlidingGuarantee):
+            return {"verdict": "undecided", "reason": self.found.reason}
+        held = self.found.held
         return {
             "verdict": "proved",
-            "guarantee": self.proof.sentence(),
-            **self.proof.to_dict(),
+            "guarantee": self.found.sentence(),
+            **self.found.to_dict(),
             "step": str(held.step),
             "diffusion": str(held.diffusion),
             "lag": str(held.lag),
@@ -108,10 +118,9 @@ def answer_sliding(
     task = sliding_task(fault, stress or Fraction(1), spread)
     design = designed_sliding(task, held_over, **around)
     if isinstance(design, NoGuarantee):
-        return SlidingAnswer(proof=design)
-    if stress is None:
-        return SlidingAnswer(proof=_with_the_largest_stress(task, design))
-    return SlidingAnswer(proof=proved_sliding(task, design))
+        return SlidingAnswer(found=design, task=task, held=None)
+    proved = proved_sliding(task, design) if stress is not None else _with_the_largest_stress(task, design)
+    return SlidingAnswer(found=proved, task=proved.task if isinstance(proved, SlidingGuarantee) else task, held=design)
 
 
 def _with_the_largest_stress(task: SlidingTask, design: Held) -> SlidingGuarantee | NoGuarantee:

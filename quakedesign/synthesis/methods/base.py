@@ -14,6 +14,7 @@ from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.linear_premises import linear_premises
 from quakedesign.certificates.premises import Domain, Premise, Variant
 from quakedesign.certificates.sectors import sectors
+from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.controllers import Controller, Signals, control_laws
 from quakedesign.controllers.feed_forward import NONE, FeedForward
 from quakedesign.discovery import discovered
@@ -26,7 +27,27 @@ from quakedesign.synthesis.linear.sampled.held import HeldLoop
 from quakedesign.synthesis.lyapunov.search import find_certificate
 
 Designed = TypeVar("Designed")
+MEMORYLESS = "laws of one's own are designed for friction of slip and slip rate alone"
 L = TypeVar("L", bound=Controller)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sliding:
+    """What is asked of a law that holds a fault with a state in slow sliding; see `quakedesign.synthesis.design`.
+
+    Attributes
+    ----------
+    diffusion : Fraction or None
+        L²/D [s]; None for a well near the fault.
+    stress : Fraction or None
+        [Pa]; None for the largest that the design stands.
+    spread : Fraction
+        [-].
+    """
+
+    diffusion: Fraction | None = None
+    stress: Fraction | None = None
+    spread: Fraction = Fraction(0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +64,8 @@ class Problem(Generic[Designed]):
     feedforward : FeedForward
     measured : str
     noise : Around
+    sliding : Sliding
+        Of friction with a state.
     """
 
     fault: Fault
@@ -52,6 +75,7 @@ class Problem(Generic[Designed]):
     feedforward: FeedForward = NONE
     measured: str = MEASURED[0]
     noise: Around = field(default_factory=Around)
+    sliding: Sliding = field(default_factory=Sliding)
 
     @property
     def told(self) -> bool:
@@ -71,7 +95,7 @@ class Problem(Generic[Designed]):
         controller: Controller,
         certificate: Certificate | None = None,
         *,
-        runs: Guarantee | NoGuarantee | None = None,
+        runs: Guarantee | SlidingGuarantee | NoGuarantee | None = None,
         premises: tuple[Premise, ...] = (),
         **more: Any,
     ) -> Designed:
@@ -87,10 +111,10 @@ class Problem(Generic[Designed]):
         known = (*premises, *own, *controller.premises(self.fault, certificate))
         return self.answer(fault=self.fault, controller=controller, certificate=certificate, premises=known, **found)
 
-    def undecided(self, name: str, reason: str, runs: NoGuarantee | None = None) -> Designed:
+    def undecided(self, name: str, reason: str, runs: NoGuarantee | None = None, **more: Any) -> Designed:
         """Answer where no gains were found."""
         none: dict[str, Any] = {"controller": None, "certificate": None, "premises": (), "details": {"reason": reason}}
-        return self.answer(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none)
+        return self.answer(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none, **more)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,11 +164,14 @@ class Method(Generic[L]):
         From which the laws of the family derive.
     designs : bool
         Whether it finds gains for a fault.
+    without_state : str
+        Why it finds none for friction with a state; empty where it does.
     """
 
     name: ClassVar[str] = "any"
     family: ClassVar[type] = Controller
     designs: ClassVar[bool] = False
+    without_state: ClassVar[str] = MEMORYLESS
 
     def design(self, problem: Problem[Designed], law: type[L]) -> Designed:
         """Find gains with a proof.
@@ -210,6 +237,14 @@ def method_of(law: type[Controller]) -> Method[Any]:
     return next(known[base] for base in law.__mro__ if base in known)
 
 
-def designable() -> tuple[str, ...]:
-    """Names of the package's laws that find gains for a fault."""
-    return tuple(name for name, law in control_laws().items() if method_of(law).designs)
+def designable(fault: Fault | None = None) -> tuple[str, ...]:
+    """Names of the package's laws that find gains for a fault; for some fault if none is given."""
+    left = left_out(fault) if fault is not None else {}
+    return tuple(name for name, law in control_laws().items() if method_of(law).designs and name not in left)
+
+
+def left_out(fault: Fault) -> dict[str, str]:
+    """Why laws of the package that find gains for others find none for a fault, by name."""
+    able = {name: method_of(law) for name, law in control_laws().items()}
+    found = {name: method.without_state for name, method in able.items() if method.designs and method.without_state}
+    return found if fault.friction.state_names else {}

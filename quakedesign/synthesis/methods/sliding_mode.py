@@ -46,6 +46,10 @@ class SlidingModes(Method[SlidingMode]):
     name: ClassVar[str] = "sliding-mode"
     family: ClassVar[type] = SlidingMode
     designs: ClassVar[bool] = True
+    without_state: ClassVar[str] = (
+        "sliding modes of second order do not apply to friction with a state, where the slip rate follows the pressure "
+        "at once (it is algebraic without inertia)"
+    )
 
     def design(self, problem: Problem[Designed], law: type[SlidingMode]) -> Designed:
         """λ for what is guaranteed in the scheme ``compensated``, or for L̄ in continuous time."""

@@ -21,6 +21,8 @@ from quakedesign.fault import Fault
 from quakedesign.loop import summed_integrals
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import (
+    MEASURED,
+    OBJECTIVES,
     Answer,
     attacked,
     best_guarantee,
@@ -29,12 +31,14 @@ from quakedesign.synthesis.guaranteed import (
     sampled_design,
 )
 from quakedesign.synthesis.guaranteed.reach import design_at, longest_step
+from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
 from quakedesign.synthesis.linear.analysis.robust_stability import unstable_vertex, why_undecided
 from quakedesign.synthesis.linear.design.riccati import RiccatiDesign, riccati_design
 from quakedesign.synthesis.linear.plant.polytope import error_loop
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix
+from quakedesign.synthesis.linear.plant.sliding_model import near_path, sliding_model
 from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
 from quakedesign.synthesis.lyapunov.certify_exactly import claims_of, finish
 from quakedesign.synthesis.lyapunov.quadratic import quadratic_margin
@@ -48,6 +52,7 @@ class StateFeedback(Method[ExtendedLQR]):
     name: ClassVar[str] = "state-feedback"
     family: ClassVar[type] = ExtendedLQR
     designs: ClassVar[bool] = True
+    without_state: ClassVar[str] = ""
 
     def design(self, problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
         """As it runs, or with an exact proof about any constant reference in continuous time."""
@@ -61,6 +66,8 @@ class StateFeedback(Method[ExtendedLQR]):
                 "a design in continuous time knows slip and slip rate exactly. Received noise, or the slip alone. "
                 "Leave continuous out."
             )
+        if problem.fault.friction.state_names:
+            return _sliding(problem, law)
         return _continuous(problem, law) if problem.continuous else _sampled(problem, law)
 
     def assess(self, problem: Problem[Designed], controller: ExtendedLQR) -> Designed:
@@ -125,6 +132,26 @@ def _sampled(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
         **{name: str(value) for name, value in held.noise.items()},
     }
     return problem.judged(held.controller, name=law.name, details=details, runs=found.runs, premises=found.premises())
+
+
+def _sliding(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
+    """A law of the slip alone that holds slow sliding along the task."""
+    if problem.continuous or problem.objective != OBJECTIVES[0] or any(problem.noise.values()):
+        raise ParameterError(
+            "a law for friction with a state is designed as it runs, told the slip as it is, with the objective "
+            f"{OBJECTIVES[0]}. Received continuous, noise or another objective. Leave them out; guarantee takes noise "
+            "of the slip."
+        )
+    wanted, fault = problem.sliding, problem.fault
+    path = wanted.diffusion or near_path(sliding_model(fault))
+    answer = answer_sliding(fault, stress=wanted.stress, spread=wanted.spread, diffusion=path)
+    reason = answer.found.reason if isinstance(answer.found, NoGuarantee) else None
+    if answer.held is None:
+        return problem.undecided(law.name, str(reason), sliding=answer)
+    assumed = None if wanted.diffusion else f"a well near the fault, L^2/D = {float(path):g} s"
+    details = {"step": str(answer.held.step), "diffusion": str(path), "measured": MEASURED[1]}
+    details |= {name: said for name, said in {"assumed": assumed, "reason": reason}.items() if said}
+    return problem.judged(answer.held.controller, name=law.name, details=details, runs=answer.found, sliding=answer)
 
 
 def _continuous(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:

@@ -11,7 +11,7 @@ from quakedesign.loop import SlidingModel
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic.slow_sliding import sliding_errors, sliding_rate
 
-_ONE = Fraction(1)
+_ONE, _NEAR = Fraction(1), Fraction(1, 10)
 
 
 def sliding_model(fault: Fault) -> SlidingModel:
@@ -45,6 +45,11 @@ def sliding_model(fault: Fault) -> SlidingModel:
 def mean_rate(fault: Fault) -> Fraction:
     """V [m/s]: the target slip over the operation time."""
     return rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
+
+
+def near_path(model: SlidingModel) -> Fraction:
+    """L²/D [s] of rock that hardly delays the pressure: a tenth of the time in which the state ages, D_c/V."""
+    return _NEAR / model.state_rate
 
 
 def growth_rate(model: SlidingModel) -> float:

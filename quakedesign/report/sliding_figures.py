@@ -1,0 +1,75 @@
+"""Figures of faults whose friction has a state: their cycle, and how they are held in slow sliding."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from quakedesign.report.drawing import NATURAL, SMALL, band, clock, colour, figure, finish, known, length, scaled
+from quakedesign.simulation.slow_sliding import SlidingRun
+
+if TYPE_CHECKING:
+    from quakedesign.studies.comparison import Compared, Entry
+    from quakedesign.studies.state_runs import StateRun
+
+_YEAR = 31_557_600.0
+_PER_BAND = 16  # instants, four periods
+
+
+def sliding_figures(comparison: "Compared", natural: "StateRun") -> dict[str, Any]:
+    """``cycle``, and ``slow-sliding`` of the first law that ran."""
+    held = next(((e, e.run) for e in comparison.entries if isinstance(e.run, SlidingRun)), None)
+    drawn = {"cycle": cycle(comparison, natural)}
+    return drawn if held is None else drawn | {"slow-sliding": slow_sliding(*held)}
+
+
+def cycle(comparison: "Compared", natural: "StateRun") -> Any:
+    """Slip and slip rate without control."""
+    run, name = natural.trajectory, comparison.fault.name
+    drawing, ((slip,), (rate,)) = figure(2, 3.6)
+    size, unit = length(float(run.slip.max()))
+    slip.plot(run.time / _YEAR, run.slip / size, color=NATURAL)
+    slip.set_ylabel(f"slip [{unit}]")
+    rate.semilogy(run.time / _YEAR, run.slip_rate, color=NATURAL)
+    rate.axhline(natural.loading_rate, color="grey", linestyle=":", label="loading rate")
+    rate.set_ylabel("slip rate [m/s]")
+    rate.set_xlabel("time [years]")
+    rate.legend(loc="upper right", fontsize=SMALL)
+    made = f"method {run.provenance['method']}, tolerance {run.provenance['rtol']:g}, with inertia"
+    return finish(drawing, f"{name} without control", [], made)
+
+
+def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
+    """Slip, slip rate, pressure and state of a law that holds slow sliding."""
+    fault, shade = entry.design.fault, colour(entry.design.name)
+    drawing, ((slip,), (rate,), (pressure,), (state,)) = figure(4, 6.6)
+    divisor, unit = clock(float(run.time[-1]))
+    time, speed = run.time / divisor, known(run.reference_rate)
+    size, name = length(float(run.slip.max()))
+    slip.plot(time, run.slip / size, color=shade, linewidth=2.5)
+    slip.plot(time, known(run.reference) / size, color="black", linestyle=":", linewidth=1, label="reference")
+    slip.set_ylabel(f"slip [{name}]")
+    slip.legend(loc="lower right", fontsize=SMALL)
+    rate.set_yscale("log")
+    _filled(rate, time, run.slip_rate, shade)
+    rate.axhline(speed[0], color="black", linestyle=":", linewidth=1, label="reference")
+    if entry.guaranteed is not None:
+        rate.axhline(
+            float(entry.guaranteed.peak_slip_rate), color="black", linestyle="--", label="never exceeded, proved"
+        )
+    rate.set_ylabel("slip rate [m/s]")
+    rate.legend(loc="center right", fontsize=SMALL)
+    largest, pascal = scaled(float(np.abs(run.pressure).max()) or 1.0, "Pa")
+    _filled(pressure, time, run.pressure / largest, shade)
+    pressure.set_ylabel(f"pressure [{pascal}]")
+    (steady,) = map(float, fault.friction.steady_state(float(speed[0])))
+    _filled(state, time, run.theta / steady, shade)
+    state.set_ylabel("state / steady [-]")
+    state.set_xlabel(f"time [{unit}]")
+    shaken = f"shear stress up to {float(np.abs(run.stress).max()) / 1e3:.3g} kPa"
+    note = f"bands between the extremes of {_PER_BAND} instants; {shaken}"
+    return finish(drawing, f"{fault.name} held in slow sliding", [run], note)
+
+
+def _filled(axis: Any, time: "np.ndarray", values: "np.ndarray", shade: str) -> None:
+    middle, low, high = band(time, values, _PER_BAND)
+    axis.fill_between(middle, low, high, color=shade, linewidth=0.8)

@@ -1,0 +1,144 @@
+"""What `design` says and writes of a fault with rate-and-state friction: outcome, guarantee, cycle, one report."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quakedesign import compare
+from quakedesign.certificates.slow_sliding import parse_sliding
+from quakedesign.cli import main
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.fault import load_fault
+from quakedesign.report.folder import write_folder
+from quakedesign.simulation import simulate_state
+from quakedesign.simulation.starting_state import sliding
+from quakedesign.studies import comparison as compared_in
+from quakedesign.studies import state_runs
+from quakedesign.synthesis import design, designable, left_out
+from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
+from quakedesign.synthesis.methods import state_feedback
+
+PROOF = Path(__file__).parents[2] / "proofs" / "certificates" / "sliding_crustal-patch.json"
+PATCH = load_fault("crustal-patch")
+SHORT = replace(PATCH, reference=replace(PATCH.reference, target_slip=0.3, operation_time=3e5))
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    """A law whose proof is known, over a third of its task, beside a fault that nothing has disturbed yet."""
+    guarantee = parse_sliding(PROOF.read_text())
+    answer = SlidingAnswer(found=guarantee, task=guarantee.task, held=guarantee.held)
+    still = simulate_state(SHORT, 1e-9, duration=1e7, inertia=False, method="dop853")
+    natural = state_runs.StateRun(fault=SHORT, loading_rate=1e-9, start=sliding(SHORT, 1e-9), trajectory=still)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(state_feedback, "answer_sliding", lambda fault, **asked: answer)
+        patched.setattr(compared_in, "natural_run", lambda fault: natural)
+        return compare(SHORT, [design(SHORT, "elqr")])
+
+
+@pytest.fixture(scope="module")
+def folder(comparison, tmp_path_factory):
+    out = tmp_path_factory.mktemp("design") / "patch"
+    write_folder(comparison, out, force=False)
+    return out
+
+
+def test_the_run_is_told_by_the_outcomes_of_all_faults_and_stays_inside_its_guarantee(comparison):
+    (entry,) = comparison.entries
+    run, claims = entry.run, entry.guaranteed.claims
+    assert run.outcome.kind == "tracked"
+    assert run.outcome.peak_slip_rate == np.max(run.slip_rate) < entry.guaranteed.peak_slip_rate
+    assert run.metrics.max_slip_error <= np.max(np.abs(run.slip - 1e-6 * run.time)) <= claims.slip_error
+    assert float(np.max(run.stress)) == pytest.approx(float(entry.guaranteed.task.stress), rel=1e-4)
+    late = run.slip_error[run.time > 7.5e4]
+    assert run.metrics.rms_slip_error == pytest.approx(np.linalg.norm(late) / len(late) ** 0.5, rel=1e-12)
+    assert run.metrics.settled_from == 7.5e4
+    balance = run.friction * (50e6 - run.pressure)
+    assert run.shear_stress == pytest.approx(balance)
+
+
+def test_the_folder_holds_the_certificate_the_figures_and_the_keys_of_all_designs(folder, comparison):
+    found = json.loads((folder / "results.json").read_text())
+    elqr = found["controllers"]["elqr"]
+    assert elqr["verdict"] == "proved"
+    assert elqr["outcome"]["kind"] == "tracked"
+    assert elqr["guaranteed"]["stress"] == str(comparison.entries[0].guaranteed.task.stress)
+    assert parse_sliding((folder / elqr["certificate"]).read_text()).claims == comparison.entries[0].guarantee.claims
+    assert found["uncontrolled"]["cycle"] == {"recurrence_interval": None, "slip": None, "magnitude": None}
+    assert set(found["not_applicable"]) == {"cta", "dia"}
+    assert {path.stem for path in (folder / "figures").iterdir()} == {"cycle", "slow-sliding", "errors"}
+
+
+def test_the_report_is_the_one_of_all_faults(folder):
+    page = (folder / "report.html").read_text()
+    parts = ("fault", "outcome", "limits", "proof", "figures", "parameters", "again")
+    places = [page.index(f'<section id="{part}"') for part in parts]
+    assert places == sorted(places)
+    first = page[page.index('<div class="answer">') : page.index("<nav>")]
+    assert first.index("Without control: the fault creeps") < first.index("With a designed controller the slip rate")
+    assert first.index("never exceeds") < first.index("Not designed, 2-CTA, 2-DIA")
+    assert "the slip rate follows the pressure at once" in first
+    assert "guaranteed as it runs" in page
+    assert "a well near the fault" in page
+    assert "continued to negative slip rates" not in page
+
+
+def test_a_fault_that_nothing_disturbs_creeps_and_has_no_event(comparison):
+    assert comparison.uncontrolled.natural_peak is None
+    assert comparison.uncontrolled.outcome.kind == "creep"
+
+
+def test_laws_that_do_not_apply_are_left_out_with_their_reason():
+    assert designable(PATCH) == ("elqr",)
+    assert left_out(load_fault("real-fault")) == {}
+    assert set(left_out(PATCH)) == {"cta", "dia"}
+    with pytest.raises(UnsupportedError, match=r"the slip rate follows the pressure at once .* Received cta"):
+        design(PATCH, "cta")
+
+
+@pytest.mark.parametrize(
+    ("fault", "asked", "said"),
+    [
+        ("real-fault", {"stress": 1e3}, "need friction with a state"),
+        ("real-fault", {"diffusion": "1"}, "need friction with a state"),
+        ("crustal-patch", {"diffusion": 0}, "above 0 s"),
+        ("crustal-patch", {"continuous": True}, "designed as it runs"),
+        ("crustal-patch", {"slip_noise": "1e-6"}, "guarantee takes noise of the slip"),
+        ("crustal-patch", {"spread": 1}, "a spread must be from 0 to below 1"),
+    ],
+)
+def test_what_does_not_apply_is_refused(fault, asked, said):
+    with pytest.raises(ParameterError, match=said):
+        design(load_fault(fault), "elqr", **asked)
+
+
+def test_without_a_diffusion_the_well_is_near(monkeypatch):
+    """A tenth of D_c/V: 8 mm over 1 µm/s."""
+    asked = {}
+
+    def answer(fault, **told):
+        asked.update(told)
+        raise ParameterError("enough")
+
+    monkeypatch.setattr(state_feedback, "answer_sliding", answer)
+    with pytest.raises(ParameterError, match="enough"):
+        design(PATCH, "elqr", stress="25000")
+    assert asked == {"stress": Fraction(25000), "spread": 0, "diffusion": Fraction(800)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("preset", "natural"), [("crustal-patch", "earthquake"), ("creeping-patch", "creep")])
+def test_one_command_takes_a_preset_from_file_to_a_guaranteed_controller(preset, natural, tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["design", preset, "--out", str(tmp_path / "out"), "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert stop.value.code == 0
+    assert found["uncontrolled"]["outcome"]["kind"] == natural
+    elqr, cycle = found["controllers"]["elqr"], found["uncontrolled"]["cycle"]
+    assert (elqr["verdict"], elqr["outcome"]["kind"]) == ("proved", "tracked")
+    if natural == "earthquake":  # what is loaded in a cycle is slipped in it, nearly all of it in its event
+        assert 0.9 < cycle["slip"] / (1e-9 * cycle["recurrence_interval"]) < 1
