@@ -128,6 +128,7 @@ def test_every_guarantee_is_said_first_and_holds_in_what_was_seen(main_job):
     page = (folder / "report.html").read_text()
     for law, entry in results["controllers"].items():
         assert next(iter(entry)) == "guarantee"
+        assert entry["class"] == "amplitude"
         told, metrics = entry["guaranteed"], entry["metrics"]
         bounds = {name: Fraction(told[name]) for name in ("slip_error", "slip_rate_error")}
         for seen in (told["worst_found"], told["worst_found_with_stick"]):

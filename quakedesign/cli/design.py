@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output
+from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Formats, Output
 from quakedesign.cli.shared import (
     ExactMetres,
     ExactMetresPerSecond,
@@ -42,6 +42,9 @@ class DesignOptions:
         a standard deviation by this name.
     rate_noise
         The same of the slip rate.
+    disturbance_class
+        Of the guarantee: amplitude, any disturbance as large as the fault's; rate, one that starts at 0 and is no
+        faster either, such as a tide.
     scheme
         Of the runs of gains designed with --continuous: continuous (unless given), as in the paper, or sampled and
         held: explicit, implicit, semi-implicit, compensated. Others run as they were designed.
@@ -59,6 +62,7 @@ class DesignOptions:
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate"
     slip_noise: ExactMetres = "0"
     rate_noise: ExactMetresPerSecond = "0"
+    disturbance_class: DisturbanceClass = "amplitude"
     scheme: str | None = None
     diffusion: ExactSeconds | None = None
     stress: ExactPascals | None = None
@@ -83,7 +87,8 @@ class DesignOptions:
                 f"--measured and noise are for the e-LQR. Received --controller {', '.join(names)}. Leave them out."
             )
         sliding = {"diffusion": self.diffusion, "stress": self.stress, "spread": self.spread}
-        shared = {"objective": self.objective, "continuous": self.continuous, **sliding}
+        shared: dict[str, Any] = {"objective": self.objective, "continuous": self.continuous, **sliding}
+        shared["disturbance_class"] = self.disturbance_class
         return {"options": shared, "linear": linear, "scheme": self.scheme}
 
 

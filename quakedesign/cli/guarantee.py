@@ -1,11 +1,9 @@
 """The command about the loop that runs."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from cyclopts import Parameter
-
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Output
+from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output
 from quakedesign.cli.shared import (
     ExactMetres,
     ExactMetresPerSecond,
@@ -36,7 +34,7 @@ def guarantee(
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
     slip_noise: ExactMetres = "0",
     rate_noise: ExactMetresPerSecond = "0",
-    disturbance_class: Annotated[Literal["amplitude", "rate"], Parameter(name="--class")] = "amplitude",
+    disturbance_class: DisturbanceClass = "amplitude",
     stress: ExactPascals | None = None,
     spread: str = "0",
     box: Box = None,
@@ -120,7 +118,7 @@ def guarantee(
         )
         if out is not None and isinstance(sliding.found, SlidingGuarantee):
             save_sliding(sliding.found, out)
-        return _shown(sliding, out, began, output)
+        return _shown(sliding, disturbance_class, out, began, output)
     if stress is not None or rational(spread, "spread"):
         raise ParameterError(
             f"stress and spread need friction with a state. Received {chosen.friction.name}. Leave them out."
@@ -139,12 +137,13 @@ def guarantee(
     )
     if out is not None and isinstance(proof.found, Guarantee):
         save_guarantee(proof.found, out)
-    return _shown(proof, out, began, output)
+    return _shown(proof, disturbance_class, out, began, output)
 
 
-def _shown(proof: Any, out: Path | None, began: float, output: Output) -> int:
+def _shown(proof: Any, disturbance_class: str, out: Path | None, began: float, output: Output) -> int:
     from time import perf_counter
 
     written = str(out) if out is not None and proof.proved else None
-    output.show({**proof.to_dict(), "certificate": written, "seconds": perf_counter() - began}, proof.lines())
+    facts = {**proof.to_dict(), "class": disturbance_class, "certificate": written, "seconds": perf_counter() - began}
+    output.show(facts, proof.lines())
     return 0 if proof.proved else 1

@@ -28,6 +28,7 @@ FaultName = Annotated[
         converter=_fault_name,
     ),
 ]
+DisturbanceClass = Annotated[Literal["amplitude", "rate"], Parameter(name="--class")]
 Box = Annotated[str | None, Parameter(help="Uncertainty box: paper or ten-percent.")]
 Formats = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],

@@ -42,7 +42,8 @@ def _meaning(limits: Limits) -> list[str]:
         return ["without a disturbance no limit is known"]
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
     told = [
-        "impossible for every controller, linear or not, for some friction of the box",
+        "impossible for every controller, linear or not, for some friction of the box and some disturbance of the "
+        "class amplitude, which may jump",
         "slip-rate error: even with slip, slip rate and disturbance known up to the sample, if the slip error stays "
         f"{within}; slip rates may be negative, as in the guarantees",
     ]

@@ -86,6 +86,7 @@ class Entry:
         design = self.design
         return {
             "guarantee": self.guarantee.sentence() if self.guarantee else None,
+            "class": design.disturbance_class,
             "guaranteed": self.answer.to_dict() | {"certificate": None} if self.answer else None,
             "outcome": self.run.outcome.to_dict() if self.run else None,
             "gains": {name: str(v) for name, v in design.gains.items()},

@@ -116,6 +116,7 @@ class Limits:
             "fault": self.fault.name,
             "box": self.fault.box.name,
             "disturbance": self.fault.disturbance.largest_explicit,
+            "class": "amplitude",
             "step": self.fault.sampling_time,
             "withdrawal": float(self.withdrawal),
             "diffusivity": float(self.diffusivity),
@@ -135,6 +136,8 @@ class Limits:
 
 def limits(fault: Fault, *, pressure: float | None = None, diffusivity: float = 1.0, prove: bool = True) -> Limits:
     """What no controller can do with a fault whose disturbance is of the class ``amplitude``.
+
+    There are none of the class ``rate``: every proof pushes the fault with a disturbance that jumps.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from quakedesign.errors import ParameterError, UnsupportedError, require_known
 from quakedesign.fault import Fault, require_fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.designed import Design
-from quakedesign.synthesis.guaranteed import MEASURED, OBJECTIVES
+from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, OBJECTIVES
 from quakedesign.synthesis.methods.base import Problem, Sliding, method_of
 
 
@@ -28,6 +28,7 @@ def design(
     diffusion: str | float | Fraction | None = None,
     stress: str | float | Fraction | None = None,
     spread: str | float | Fraction = 0,
+    disturbance_class: str = CLASSES[0],
 ) -> Design:
     """Find gains with a proof for a fault.
 
@@ -70,6 +71,9 @@ def design(
         given.
     spread : str, float or Fraction
         Of friction with a state: by how much of their values a, b and D_c may be off [-].
+    disturbance_class : str
+        Of the guarantee: ``"amplitude"``, any disturbance as large as the fault's, or ``"rate"``, one that starts at 0
+        and is no faster either, such as a tide.
 
     Returns
     -------
@@ -92,12 +96,14 @@ def design(
     added = NONE if feedforward == NONE.name else feed_forward(feedforward, fault, least_authority(fault))
     noise = Around(slip_noise=rational(slip_noise, "slip_noise"), rate_noise=rational(rate_noise, "rate_noise"))
     require_known(objective, OBJECTIVES, "objective")
+    require_known(disturbance_class, CLASSES, "class")
     if continuous and objective != OBJECTIVES[0]:
         raise ParameterError(
             f"the objective of a design in continuous time must be {OBJECTIVES[0]}. Received {objective!r}. "
             "Leave it out, or continuous."
         )
     told: Any = {"objective": objective, "continuous": continuous, "measured": measured, "noise": noise}
+    told["disturbance_class"] = disturbance_class
     return law.design(Problem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **told))
 
 

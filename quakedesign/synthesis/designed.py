@@ -7,14 +7,14 @@ from html import escape
 from typing import Any
 
 from quakedesign.certificates import Certificate, Verdict
-from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee, task_of
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.premises import Domain, Premise, Variant
 from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.controllers import Controller, control_laws
 from quakedesign.fault import Fault
 from quakedesign.loop.sensing.measurement import Measurement
-from quakedesign.synthesis.guaranteed import Compensation
+from quakedesign.synthesis.guaranteed import CLASSES, Compensation
 from quakedesign.synthesis.guaranteed.default_design import REACH
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
 from quakedesign.synthesis.linear.sampled.held import HeldLoop
@@ -48,6 +48,8 @@ class Design:
         What was proved of the loop that runs while it was designed; None to find it when `guarantee` is asked for.
     sliding : SlidingAnswer, optional
         For friction with a state: the law as it runs, with its rock, and the task that it is designed for.
+    disturbance_class : str
+        Of the disturbances that the guarantee is about: ``amplitude``, or ``rate`` for those of bounded rate.
     """
 
     fault: Fault
@@ -62,6 +64,7 @@ class Design:
     rate_noise: Fraction = Fraction(0)
     runs: Guarantee | SlidingGuarantee | NoGuarantee | None = None
     sliding: SlidingAnswer | None = None
+    disturbance_class: str = CLASSES[0]
 
     @property
     def gains(self) -> dict[str, Fraction]:
@@ -142,7 +145,8 @@ class Design:
         if law is None:
             return NoGuarantee(reason=f"no gains of {self.title} are known", small_gain=None)
         noise = Around(slip_noise=self.slip_noise, rate_noise=self.rate_noise)
-        return method_of(type(law)).guarantee(self.fault, law, noise)
+        task = task_of(self.fault, rate_limited=self.disturbance_class == "rate")
+        return method_of(type(law)).guarantee(self.fault, task, law, noise)
 
     @property
     def compensation(self) -> Compensation | None:

@@ -22,7 +22,7 @@ def answer(
     scheme: str | None = None,
     step: Fraction | None = None,
     measured: str = MEASURED[0],
-    disturbance_class: str = "amplitude",
+    disturbance_class: str = CLASSES[0],
     **around: Unpack[Around],
 ) -> Answer:
     """Guarantee of given e-LQR gains with summed integrals, of a law that is designed for it, or of a sliding mode.

@@ -64,6 +64,7 @@ def test_gains_that_are_not_guaranteed_say_what_fails(call):
     assert (code, found["verdict"], found["shorter"]) == (1, "undecided", None)
     assert found["reason"].startswith("small gain")
     assert F(found["small_gain"]) >= 1
+    assert found["class"] == "amplitude"
 
 
 def test_gains_that_do_not_hold_the_nominal_fault_either(call):

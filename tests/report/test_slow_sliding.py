@@ -107,6 +107,7 @@ def test_laws_that_do_not_apply_are_left_out_with_their_reason():
         ("real-fault", {"diffusion": "1"}, "need friction with a state"),
         ("crustal-patch", {"diffusion": 0}, "above 0 s"),
         ("crustal-patch", {"continuous": True}, "designed as it runs"),
+        ("crustal-patch", {"disturbance_class": "rate"}, "for any stress of an amplitude"),
         ("crustal-patch", {"slip_noise": "1e-6"}, "guarantee takes noise of the slip"),
         ("crustal-patch", {"spread": 1}, "a spread must be from 0 to below 1"),
     ],

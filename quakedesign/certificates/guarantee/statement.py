@@ -256,7 +256,7 @@ def sentence_of(task: Task, claims: Claims, when: str) -> str:
     """
     kind = f"for every disturbance of at most {LowerBound(task.amplitude):.3g} m/s^2"
     if task.change is not None:
-        kind += f" that starts at 0 and changes by at most {LowerBound(task.change):.3g} m/s^3"
+        kind += f" that starts at 0 and changes by at most {LowerBound(task.change):.3g} m/s^3 (class rate)"
     if not task.amplitude:
         kind = "without disturbance"
     pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import sympy as sp
 
 from quakedesign.certificates import Certificate, Verdict
-from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee, Task
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee, Task, task_of
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.linear_premises import linear_premises
 from quakedesign.certificates.premises import Domain, Premise, Variant
@@ -21,7 +21,7 @@ from quakedesign.discovery import discovered
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.rationals import to_sympy
-from quakedesign.synthesis.guaranteed import MEASURED, OBJECTIVES, Answer, Compensation
+from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, OBJECTIVES, Answer, Compensation
 from quakedesign.synthesis.linear.analysis.common_quadratic import sector_loop
 from quakedesign.synthesis.linear.sampled.held import HeldLoop
 from quakedesign.synthesis.lyapunov.search import find_certificate
@@ -66,6 +66,8 @@ class Problem(Generic[Designed]):
     noise : Around
     sliding : Sliding
         Of friction with a state.
+    disturbance_class : str
+        ``amplitude`` or ``rate``, of the disturbances that a guarantee is about.
     """
 
     fault: Fault
@@ -76,6 +78,12 @@ class Problem(Generic[Designed]):
     measured: str = MEASURED[0]
     noise: Around = field(default_factory=Around)
     sliding: Sliding = field(default_factory=Sliding)
+    disturbance_class: str = CLASSES[0]
+
+    @property
+    def task(self) -> Task:
+        """What a guarantee uses of the fault."""
+        return task_of(self.fault, rate_limited=self.disturbance_class == "rate")
 
     @property
     def told(self) -> bool:
@@ -108,12 +116,14 @@ class Problem(Generic[Designed]):
         if runs is not None and controller.sampling is not None:
             verdict = runs.check()
         found = {"name": controller.name, "verdict": verdict, "domain": domain, "runs": runs, **self.noise, **more}
+        found["disturbance_class"] = self.disturbance_class
         known = (*premises, *own, *controller.premises(self.fault, certificate))
         return self.answer(fault=self.fault, controller=controller, certificate=certificate, premises=known, **found)
 
     def undecided(self, name: str, reason: str, runs: NoGuarantee | None = None, **more: Any) -> Designed:
         """Answer where no gains were found."""
         none: dict[str, Any] = {"controller": None, "certificate": None, "premises": (), "details": {"reason": reason}}
+        none["disturbance_class"] = self.disturbance_class
         return self.answer(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none, **more)
 
 
@@ -197,8 +207,8 @@ class Method(Generic[L]):
         known = linear_about_a_reference(controller)
         return tuple(linear_premises(fault, controller, certificate)) if known else (), None
 
-    def guarantee(self, fault: Fault, controller: L, noise: Around) -> Guarantee | NoGuarantee:
-        """What is proved of the law as it runs, p held."""
+    def guarantee(self, fault: Fault, task: Task, controller: L, noise: Around) -> Guarantee | NoGuarantee:
+        """What is proved of the law as it runs on a task of the fault, p held."""
         return NoGuarantee(
             reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
         )

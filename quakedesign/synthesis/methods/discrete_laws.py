@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from quakedesign.certificates import Certificate
-from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, task_of
+from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, Task
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.premises import Domain, Premise
 from quakedesign.fault import Fault
@@ -20,7 +20,7 @@ class Samples(Method[SampledController]):
 
     def assess(self, problem: Problem[Designed], controller: SampledController) -> Designed:
         """By the guarantee."""
-        return problem.judged(controller, runs=self.guarantee(problem.fault, controller, problem.noise))
+        return problem.judged(controller, runs=self.guarantee(problem.fault, problem.task, controller, problem.noise))
 
     def premises(
         self, fault: Fault, controller: SampledController, certificate: Certificate | None
@@ -28,6 +28,8 @@ class Samples(Method[SampledController]):
         """None: those of the guarantee stand with it."""
         return (), None
 
-    def guarantee(self, fault: Fault, controller: SampledController, noise: Around) -> Guarantee | NoGuarantee:
+    def guarantee(
+        self, fault: Fault, task: Task, controller: SampledController, noise: Around
+    ) -> Guarantee | NoGuarantee:
         """At its own T_s."""
-        return best_guarantee(task_of(fault), Held(law=controller.law, step=controller.step, **noise))
+        return best_guarantee(task, Held(law=controller.law, step=controller.step, **noise))

@@ -6,7 +6,7 @@ from math import floor, log10
 from typing import Any, ClassVar
 
 from quakedesign.certificates import Certificate, Loop, loop_of
-from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task, task_of
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.premises import (
     Domain,
@@ -69,7 +69,7 @@ class SlidingModes(Method[SlidingMode]):
 
     def assess(self, problem: Problem[Designed], controller: SlidingMode) -> Designed:
         """Try 99, 90 and 50 % of the bound on |h'| that no V can exceed."""
-        runs = guarantee_of(task_of(problem.fault), controller) if controller.sampling else None
+        runs = guarantee_of(problem.task, controller) if controller.sampling else None
         limit = controller.lipschitz_limit / controller.scale
         beta = coefficient_range(problem.fault, controller.divisor)
         for share in _SHARES if limit > 0 else ():
@@ -91,9 +91,9 @@ class SlidingModes(Method[SlidingMode]):
         premises, domain = sliding_mode_premises(fault, controller, certificate)
         return tuple(premises), domain
 
-    def guarantee(self, fault: Fault, controller: SlidingMode, noise: Around) -> Guarantee | NoGuarantee:
+    def guarantee(self, fault: Fault, task: Task, controller: SlidingMode, noise: Around) -> Guarantee | NoGuarantee:
         """In the scheme ``compensated``, and in no other."""
-        return guarantee_of(task_of(fault), controller)
+        return guarantee_of(task, controller)
 
     def compensation(self, controller: SlidingMode, found: Guarantee | NoGuarantee) -> Compensation:
         """With the weight and the authority of its scheme."""
@@ -128,7 +128,7 @@ def _compensated(problem: Problem[Designed], base: BaseGains[SlidingMode], certi
     """As it runs with a guarantee; in continuous time where no T_s has one."""
     fault = problem.fault
     law = base.law.with_divisor(least_authority(fault))
-    made, found = sampled_sliding_mode(task_of(fault), law, rational(fault.sampling_time), problem.objective)
+    made, found = sampled_sliding_mode(problem.task, law, rational(fault.sampling_time), problem.objective)
     if found.runs is None:
         none = NoGuarantee(reason=f"run in the scheme compensated, {found.reason}", small_gain=None)
         return _scaled(problem, base, certificate, runs=none)

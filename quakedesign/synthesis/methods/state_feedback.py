@@ -10,7 +10,6 @@ from quakedesign.certificates.guarantee import (
     Held,
     NoGuarantee,
     Task,
-    task_of,
 )
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.sectors import sectors
@@ -21,6 +20,7 @@ from quakedesign.fault import Fault
 from quakedesign.loop import summed_integrals
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import (
+    CLASSES,
     MEASURED,
     OBJECTIVES,
     Answer,
@@ -75,14 +75,12 @@ class StateFeedback(Method[ExtendedLQR]):
         loop = sector_loop(controller, sectors(problem.fault))
         return _judged(problem, controller, quadratic_certificate(loop), {})
 
-    def guarantee(self, fault: Fault, controller: ExtendedLQR, noise: Around) -> Guarantee | NoGuarantee:
+    def guarantee(self, fault: Fault, task: Task, controller: ExtendedLQR, noise: Around) -> Guarantee | NoGuarantee:
         """With integrals summed over the T_s of the fault."""
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
-            return super().guarantee(fault, controller, noise)
+            return super().guarantee(fault, task, controller, noise)
         step = rational(fault.sampling_time)
-        return best_guarantee(
-            task_of(fault), Held(law=summed_integrals(tuple(controller.gains.values()), step), step=step)
-        )
+        return best_guarantee(task, Held(law=summed_integrals(tuple(controller.gains.values()), step), step=step))
 
     def certified_peaks(
         self, fault: Fault, controller: ExtendedLQR, disturbance_class: str
@@ -120,7 +118,7 @@ def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
 def _sampled(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
     fault = problem.fault
     step, measured = rational(fault.sampling_time), problem.measured
-    found = sampled_design(task_of(fault), step, problem.objective, measured=measured, **problem.noise)
+    found = sampled_design(problem.task, step, problem.objective, measured=measured, **problem.noise)
     if found.runs is None:
         return problem.undecided(law.name, found.reason)
     held = found.runs.held
@@ -136,11 +134,12 @@ def _sampled(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
 
 def _sliding(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
     """A law of the slip alone that holds slow sliding along the task."""
-    if problem.continuous or problem.objective != OBJECTIVES[0] or any(problem.noise.values()):
+    usual = OBJECTIVES[0], CLASSES[0]
+    if problem.continuous or (problem.objective, problem.disturbance_class) != usual or any(problem.noise.values()):
         raise ParameterError(
             "a law for friction with a state is designed as it runs, told the slip as it is, with the objective "
-            f"{OBJECTIVES[0]}. Received continuous, noise or another objective. Leave them out; guarantee takes noise "
-            "of the slip."
+            f"{OBJECTIVES[0]}, for any stress of an amplitude. Received continuous, noise, another objective or the class "
+            "rate. Leave them out; guarantee takes noise of the slip."
         )
     wanted, fault = problem.sliding, problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))

@@ -75,9 +75,13 @@ def test_four_digits_are_not_below(value, rounded):
         (
             F("0.00032"),
             F("0.0002208"),
-            "of at most 0.00032 m/s^2 that starts at 0 and changes by at most 0.00022 m/s^3, for",
+            "of at most 0.00032 m/s^2 that starts at 0 and changes by at most 0.00022 m/s^3 (class rate), for",
         ),
-        (F(1, 3), F(2, 3), "of at most 0.333 m/s^2 that starts at 0 and changes by at most 0.666 m/s^3, for"),
+        (
+            F(1, 3),
+            F(2, 3),
+            "of at most 0.333 m/s^2 that starts at 0 and changes by at most 0.666 m/s^3 (class rate), for",
+        ),
         (F(0), None, "held over 1 s, without disturbance, for all friction"),
         (F(0), F(0), "held over 1 s, without disturbance, for all friction"),
     ],
