@@ -138,7 +138,7 @@ def _sliding(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
     if problem.continuous or (problem.objective, problem.disturbance_class) != usual or any(problem.noise.values()):
         raise ParameterError(
             "a law for friction with a state is designed as it runs, told the slip as it is, with the objective "
-            f"{OBJECTIVES[0]}, for any stress of an amplitude. Received continuous, noise, another objective or the class "
+            f"{OBJECTIVES[0]}, for any stress of an amplitude. Received continuous, noise, another objective or class "
             "rate. Leave them out; guarantee takes noise of the slip."
         )
     wanted, fault = problem.sliding, problem.fault
