@@ -30,10 +30,17 @@ IMPORTS = {
     "guarantee_loop": ("guarantee_reading", "guarantee_task", "guarantee_numbers", "guarantee_root"),
     "guarantee_flows": ("guarantee_reading", "guarantee_numbers", "guarantee_loop"),
     "guarantee_gains": ("guarantee_reading", "guarantee_numbers", "guarantee_loop", "guarantee_flows"),
-    "guarantee_slow": ("guarantee_reading", "guarantee_task", "guarantee_loop", "guarantee_gains"),
+    "guarantee_start": (
+        *("guarantee_reading", "guarantee_numbers"),
+        *("guarantee_loop", "guarantee_flows", "guarantee_gains"),
+    ),
+    "guarantee_slow": (
+        *("guarantee_reading", "guarantee_task"),
+        *("guarantee_loop", "guarantee_gains", "guarantee_start"),
+    ),
     "guarantee_bounds": (
         *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_gains", "guarantee_slow"),
+        *("guarantee_loop", "guarantee_slow"),
     ),
     "guarantee": (
         *("guarantee_reading", "guarantee_task", "guarantee_root"),

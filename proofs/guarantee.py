@@ -10,7 +10,7 @@ from typing import Any
 
 from guarantee_bounds import bounds
 from guarantee_loop import read_loop
-from guarantee_reading import keys, lower, need, numbers, upper
+from guarantee_reading import Row, keys, lower, need, numbers, upper
 from guarantee_root import root_within
 from guarantee_slow import read_slow
 from guarantee_task import Task, read_task
@@ -26,15 +26,16 @@ def verify(document: dict[str, Any]) -> list[str]:
     Refused
         When a rule is broken, or a claim does not follow.
     """
-    more = ["slow_gain"] if "slow_gain" in document else []
+    more = [name for name in ("slow_gain", "start") if name in document]
     keys(document, "the file", "format", "kind", "fault", "reference", "disturbance", "loop", "claims", *more)
     claims = numbers(document["claims"], "claims", *CLAIMS)
     task = read_task(document)
-    loop = read_loop(document["loop"], task)
+    start = read_start(document["start"]) if "start" in more else [Fraction(0)] * 2
+    loop = read_loop(document["loop"], task, start)
     errors = [claims[name] + off for name, off in zip(CLAIMS[:2], loop.noise, strict=True)]
     within = loop.root is None or root_within(loop.root, loop.step, *errors)
     need(within, "the root of the implicit step must lie between its lines for all errors that are claimed")
-    slow = read_slow(document["slow_gain"], task, loop) if more else None
+    slow = read_slow(document["slow_gain"], task, loop) if "slow_gain" in more else None
     (slip, rate, push), small = bounds(task, loop, slow, claims["slip_error"])
     need(not slow or slip < claims["slip_error"], "the slip error that moves the input gain must stay below its claim")
     low, high = task.rest[0] - push / task.b, task.rest[1] + push / task.b
@@ -43,6 +44,13 @@ def verify(document: dict[str, Any]) -> list[str]:
         holds = value >= claims[name] if name == "least_pressure" else value <= claims[name]
         need(holds, f"the claim {name} must follow from the rest. It does not")
     return statement(document, task, claims, small)
+
+
+def read_start(value: Any) -> Row:
+    """Bounds of the slip and of the slip rate at the start."""
+    found = [*numbers(value, "start", "slip", "rate").values()]
+    need(min(found) >= 0 and any(found), "bounds of the start must be >= 0, one of them above")
+    return found
 
 
 def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction], small: Fraction) -> list[str]:
@@ -62,6 +70,10 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
     if "noise" in loop:
         rate = "" if alone else f", slip rate within {loop['noise']['rate']} m/s"
         off = f", measured slip within {loop['noise']['slip']} m of the true one{rate}"
+    where = "from rest"
+    if "start" in document:
+        slip, rate = (lower(Fraction(document["start"][name])) for name in ("slip", "rate"))
+        where = f"from |slip| <= {slip} m, |slip rate| <= {rate} m/s at first"
     return [
         f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction any function of "
         + ("the slip alone" if task.steady_beta else "slip and slip rate")
@@ -70,7 +82,7 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         f"less [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, of a pressure {upper(task.b)} m^2/kg times "
         f"[1, {upper(task.beta[1])}]",
         f"law with {len(loop['states'])} states{implicit}{told}, {when}{off}",
-        f"disturbance: {kind}; from rest, along the reference, for ever; small gain {upper(small)}",
+        f"disturbance: {kind}; {where}, along the reference, for ever; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",
         f"|slip - reference| <= {upper(claims['slip_error'])} m, "
         f"|slip rate - reference's| <= {upper(claims['slip_rate_error'])} m/s",

@@ -4,11 +4,10 @@ from dataclasses import replace
 from fractions import Fraction
 from math import ceil
 
-from guarantee_gains import input_gains
 from guarantee_loop import Loop
 from guarantee_numbers import BITS
 from guarantee_reading import Refused, Row, need, upper
-from guarantee_slow import Slow, slow_gains
+from guarantee_slow import Slow, all_gains, slow_gains
 from guarantee_task import Task
 
 ONE_OVER_E = Fraction(3679, 10000)  # from above
@@ -23,7 +22,7 @@ def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fr
     if slow:
         off = (task.beta[1] - task.beta[0]) / (2 * slow.parts) + 2 * task.slope_of_beta * slip
         spread = off, task.slope_of_beta * task.reference_rate * ONE_OVER_E / slow.growth
-    found = slow_gains(task, loop, slow) if slow else input_gains(loop)
+    found = slow_gains(task, loop, slow) if slow else all_gains(loop)
     proved, refusals = [], []
     for one in [task] if task.change is None else [task, replace(task, change=None)]:
         try:
@@ -63,6 +62,9 @@ def of_class(
             own.append(Fraction(0))
             shares.append([Fraction(0)] * 4)
         shares[-1 if loop.fade else 0][3] = task.beta[1]
+    if loop.start:
+        own.append(Fraction(1))
+        shares.append([Fraction(0)] * len(loop.outputs))
     if spread:
         own.append(Fraction(0))
         shares.append([Fraction(0), Fraction(0), spread[1], *[Fraction(0)] * (len(loop.outputs) - 3)])

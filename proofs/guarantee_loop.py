@@ -39,7 +39,7 @@ class Loop:
     event. `noise` bounds what the measured e1 and e2 are off, an input each where it is not 0. Without events there may
     be two inputs more, the second and third derivatives of the reference.
     With a layer of rock a fourth output bounds what its modes leave out; where `fade` is given, that is one more
-    input, the last one.
+    input, the last one. `start` has the columns of the box from which it starts, none where that is rest.
     """
 
     flow: list[Row]
@@ -52,6 +52,7 @@ class Loop:
     cuts: Sequence[Fraction] = field(default_factory=lambda: EVEN)
     past_cuts: Sequence[Fraction] = field(default_factory=lambda: EVEN)
     fade: Fade | None = None
+    start: list[Row] = field(default_factory=list)
 
 
 @dataclass
@@ -68,6 +69,7 @@ class Held:
     feedback: Row
     root: Root | None
     noise: tuple[Fraction, Fraction]
+    first: list[Row]  # what the law makes of slip and slip rate before its first sample
 
     def __post_init__(self) -> None:
         whole, self.part = self.delay // self.step, self.delay % self.step  # arrival after a sample
@@ -81,13 +83,14 @@ class Held:
         self.size = self.well + len(self.path) + self.stepped
 
 
-def read_loop(value: Any, task: Task) -> Loop:
+def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0), Fraction(0))) -> Loop:
     """Build the error loop: e1, e2, the law's states, pressures on their way, valve, and what lies behind it.
 
     That is: where there is a lag, the well's pressure less the valve's; modes of a layer of rock, less the well's.
-    Where a layer has no lag before it, the last state is the last step of the valve.
+    Where a layer has no lag before it, the last state is the last step of the valve. `errors`: e1, e2 at first.
     """
     if type(value) is dict and "rates" in value:
+        need(not any(errors), "a law in continuous time must start at rest")
         return read_continuous(value, task)
     law = read_held(value)
     flow, push = flow_of(law, task)
@@ -100,13 +103,13 @@ def read_loop(value: Any, task: Task) -> Loop:
     told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
     inputs += [entry for entry, off in zip(told, law.noise, strict=True) if off]
     outputs = [unit(size)[0], unit(size)[1], push]
-    loop = Loop(flow, events, outputs, inputs, root, step, law.noise)
+    loop = Loop(flow, events, outputs, inputs, root, step, law.noise, start=starts_of(law, errors))
     return with_left_out(loop, law) if law.diffusion else loop
 
 
 def read_held(value: Any) -> Held:
     """Read step, delay, lag and diffusion, the law's matrices, the implicit step and the noise."""
-    more = [k for k in ("root", "noise", "diffusion") if type(value) is dict and k in value]
+    more = [k for k in ("root", "noise", "diffusion", "first") if type(value) is dict and k in value]
     parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
     given = keys(value, "loop", *parts, *more)
     implicit = "root" in more
@@ -120,7 +123,8 @@ def read_held(value: Any) -> Held:
     need(implicit or not noise[1] or uses_rate(seen, feedback), "noise of the slip rate needs a law that measures it")
     time = number(given.get("diffusion", "0"), "diffusion")
     need("diffusion" not in more or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
-    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise)
+    first = matrix(given["first"], "first", n, 2) if "first" in more else [[Fraction(0)] * 2] * n
+    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first)
     need(law.size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
     return law
 
@@ -169,6 +173,16 @@ def drift_of(law: Held, b: Fraction) -> Row:
     steady = steady_states(still, law.output, [Fraction(0)] * law.own, Fraction(1))
     behind = [Fraction(0)] * (law.size - law.well)
     return [Fraction(0), Fraction(0), *(-v / b for v in steady), *[Fraction(-1)] * (law.waiting + 1), *behind]
+
+
+def starts_of(law: Held, errors: Sequence[Fraction]) -> list[Row]:
+    """Columns of the box of starts: both errors with what the law makes of them, and what it makes of the noise."""
+    found = []
+    for k in (0, 1):
+        made = [line[k] for line in law.first] + [Fraction(0)] * (law.size - 2 - law.own)
+        found.append([errors[k] * v for v in [*unit(2)[k], *made]])
+        found.append([law.noise[k] * v for v in [Fraction(0), Fraction(0), *made]])
+    return [column for column in found if any(column)]
 
 
 def with_left_out(loop: Loop, law: Held) -> Loop:

@@ -7,6 +7,7 @@ from typing import Any
 from guarantee_gains import gains, input_gains
 from guarantee_loop import Loop
 from guarantee_reading import keys, need, number
+from guarantee_start import start_gains
 from guarantee_task import Task
 
 MAX_PARTS = 16  # of the range of a slow input gain
@@ -36,14 +37,20 @@ def with_gain(loop: Loop, gain: Fraction, growth: Fraction) -> Loop:
     return replace(loop, flow=flow)
 
 
+def all_gains(loop: Loop) -> list[list[list[Fraction]]]:
+    """Gains of every input, and of the start where that is not rest."""
+    return [*input_gains(loop), *([start_gains(loop)] if loop.start else [])]
+
+
 def slow_gains(task: Task, loop: Loop, slow: Slow) -> list[list[list[Fraction]]]:
     """Gains of every input, and of one more, the past of what enters as the first, one part after another."""
     width = (task.beta[1] - task.beta[0]) / slow.parts
-    total: list[list[list[Fraction]]] = [[[] for _ in loop.outputs] for _ in [*loop.inputs, None]]
+    count = len(loop.inputs) + bool(loop.start) + 1
+    total: list[list[list[Fraction]]] = [[[] for _ in loop.outputs] for _ in range(count)]
     for part in range(slow.parts):
         gain = task.beta[0] + (2 * part + 1) * width / 2
         steady, grown = (with_gain(loop, gain, growth) for growth in (Fraction(0), slow.growth))
-        for whole, found in zip(total, [*input_gains(steady), gains(grown, loop.inputs[0], False)], strict=True):
+        for whole, found in zip(total, [*all_gains(steady), gains(grown, loop.inputs[0], False)], strict=True):
             for line, values in zip(whole, found, strict=True):
                 line += values
     return total

@@ -34,6 +34,8 @@ def guarantee(
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
     slip_noise: ExactMetres = "0",
     rate_noise: ExactMetresPerSecond = "0",
+    initial_slip: ExactMetres = "0",
+    initial_slip_rate: ExactMetresPerSecond = "0",
     disturbance_class: DisturbanceClass = "amplitude",
     stress: ExactPascals | None = None,
     spread: str = "0",
@@ -44,8 +46,8 @@ def guarantee(
 ) -> int:
     """Prove how far slip, slip rate and pressure of the loop that runs can go: sampled, held, late, for ever.
 
-    For all friction and constant parameters of the box and every disturbance of a class, from rest, along the
-    reference. Exit code 0 only if proved.
+    For all friction and constant parameters of the box and every disturbance of a class, from rest or from every start
+    near it, along the reference. Exit code 0 only if proved.
 
     Parameters
     ----------
@@ -73,6 +75,10 @@ def guarantee(
         simulate takes a standard deviation by this name.
     rate_noise
         The same of the measured slip rate.
+    initial_slip
+        Bound of the slip at the start, of either sign, such as '0.01 mm'; the law begins as it always does.
+    initial_slip_rate
+        The same of the slip rate, such as '0.1 mm/s'. Slip rates below zero are those of the continued plant.
     disturbance_class
         amplitude: any disturbance as large as the fault's; rate: one that starts at 0 and is no faster either.
     stress
@@ -101,11 +107,17 @@ def guarantee(
         "diffusion": rational(diffusion, "diffusion"),
         "slip_noise": rational(slip_noise, "slip noise"),
     }
+    start = {
+        "initial_slip": rational(initial_slip, "initial slip"),
+        "initial_slip_rate": rational(initial_slip_rate, "initial slip rate"),
+    }
     if chosen.friction.state_names:
-        if gains or scheme or rational(rate_noise, "rate noise") or (objective, disturbance_class) != _USUAL:
+        unusual = gains or scheme or rational(rate_noise, "rate noise") or (objective, disturbance_class) != _USUAL
+        if unusual or any(start.values()):
             raise ParameterError(
-                "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude. "
-                "Received gains, a scheme, noise of the slip rate, an objective or a class. Leave them out."
+                "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
+                "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class or an initial "
+                "slip or slip rate. Leave them out."
             )
         told = None if stress is None else rational(stress, "stress")
         sliding = answer_sliding(
@@ -134,6 +146,7 @@ def guarantee(
         rate_noise=rational(rate_noise, "rate noise"),
         disturbance_class=disturbance_class,
         **times,
+        **start,
     )
     if out is not None and isinstance(proof.found, Guarantee):
         save_guarantee(proof.found, out)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.continuous import exact_integrals as exact_integrals
     from quakedesign.loop.held import SHORTEST as SHORTEST
     from quakedesign.loop.held import held_loop as held_loop
+    from quakedesign.loop.held import starts as starts
     from quakedesign.loop.implicit_root import ImplicitRoot as ImplicitRoot
     from quakedesign.loop.implicit_root import Power as Power
     from quakedesign.loop.internal_model import PathModel as PathModel

@@ -30,6 +30,8 @@ def answered(rate_error: Any, end_rate: Any, estimate: Any, gain: Any) -> Any:
 def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearLaw:
     """The compensated step as matrices; its states are e2⁻, T_sB0·p⁻ and T_sB0·d, all in m/s, for numbers of one size.
 
+    The first sample, before which there is none, says nothing of the disturbance: there e2⁻ = e2.
+
     Parameters
     ----------
     root : ImplicitRoot
@@ -61,6 +63,7 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
         output=output[:3],
         feedback=output[3:],
         root=root,
+        first=tuple(tuple(Fraction(k == 1 == entry) for k in (0, 1)) for entry in (1, 0, 0)),
     )
 
 

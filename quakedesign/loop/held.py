@@ -85,6 +85,21 @@ def held_loop(
     )
 
 
+def starts(
+    law: LinearLaw, size: int, errors: tuple[Fraction, Fraction], noise: tuple[Fraction, Fraction]
+) -> tuple[Row, ...]:
+    """Columns of the box from which a held loop of so many states starts, see `PeriodicLoop.start`.
+
+    Its pressures are 0, the errors within their bounds [m], [m/s], and the law's states what it makes of them as they
+    are measured, within bounds of noise.
+    """
+    made = list(zip(*law.first, strict=True)) or [(Fraction(0),) * len(law.states)] * 2
+    rest = [Fraction(0)] * (size - 2 - len(law.states))
+    found = [(error, [*_unit(2, k), *made[k], *rest]) for k, error in enumerate(errors)]
+    found += [(off, [Fraction(0), Fraction(0), *made[k], *rest]) for k, off in enumerate(noise)]
+    return tuple(tuple(bound * v for v in column) for bound, column in found if bound and any(column))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Path:
     """The way of a pressure from a law with so many states of its own to the fault, and its places in the loop."""

@@ -16,7 +16,7 @@ MOST_STATES = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearLaw:
-    """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z from 0.
+    """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z from 0 unless told.
 
     With an implicit root the law is linear but for w, the end of an implicit step from e1 and e2, and y = (e1, e2, w).
 
@@ -34,6 +34,8 @@ class LinearLaw:
         D [Pa/m, Pa·s/m]; a third entry for w [Pa·s/m].
     root : ImplicitRoot, optional
         What w solves; None for a linear law.
+    first : tuple of rows
+        S, two columns: z = S(e1, e2) at the first sample, as they are measured then; without rows 0.
 
     Raises
     ------
@@ -47,10 +49,16 @@ class LinearLaw:
     output: Row
     feedback: Row
     root: ImplicitRoot | None = None
+    first: Matrix = ()
 
     def __post_init__(self) -> None:
         seen = len(MEASURED) + (self.root is not None)
         require_sizes(self.states, self.update, self.measured, self.output, self.feedback, seen)
+        if self.first and [len(row) for row in self.first] != [len(MEASURED)] * len(self.states):
+            raise ParameterError(
+                f"first of a linear law needs {len(self.states)} rows of {len(MEASURED)} entries, or none. Received "
+                f"{len(self.first)} rows. Complete them."
+            )
 
     @property
     def of_slip_alone(self) -> bool:

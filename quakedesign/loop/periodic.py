@@ -76,6 +76,8 @@ class PeriodicLoop:
         j_i by the name of an input that adds j_i·w_i to the state once a period, with the jump of the first segment.
     fading : dict of str to Fading
         Inputs of which only what a jump leaves is known.
+    start : tuple of tuple of Fraction
+        Columns s_i of the box from which it starts: x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, before the first jump; none for 0.
     """
 
     states: tuple[str, ...]
@@ -85,6 +87,7 @@ class PeriodicLoop:
     outputs: dict[str, Row]
     sampled: dict[str, Row] = field(default_factory=dict)
     fading: dict[str, Fading] = field(default_factory=dict)
+    start: tuple[Row, ...] = ()
 
     def __hash__(self) -> int:
         rows = frozenset(self.inputs.items()), frozenset(self.outputs.items())

@@ -46,7 +46,8 @@ def answer(
     disturbance_class : str
         ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
     **around : Fraction
-        Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s]; 0 unless given.
+        Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s], and of both at the start, of
+        either sign (`initial_slip`, `initial_slip_rate`); 0 unless given.
 
     Raises
     ------

@@ -274,7 +274,7 @@ def test_the_spread_is_asked_for_by_hand(monkeypatch):
     task = replace(_task_by_hand(), slope_of_beta=F(5), reference_rate=F(7), beta=(F(1), F(3)), change=None)
     slow, asked = checker.Slow(4, F(1, 11)), []
     monkeypatch.setattr(checker, "slow_gains", lambda *_: "slow")
-    monkeypatch.setattr(checker, "input_gains", lambda _: "jumping")
+    monkeypatch.setattr(checker, "all_gains", lambda _: "jumping")
     monkeypatch.setattr(checker, "of_class", lambda _t, _l, *given: asked.append(given) or ([F(1)] * 3, F(1, 2)))
     for given in ((slow, F(1, 13)), (slow,), ()):
         assert checker.bounds(task, None, *given) == ([1, 1, 1], F(1, 2))

@@ -33,7 +33,10 @@ def guarantee_text(claim: Guarantee | ContinuousPeaks) -> str:
     """Text of the file."""
     task = claim.task
     change = {} if task.change is None else {"change": str(task.change)}
-    slow = claim.slow_gain if isinstance(claim, Guarantee) else None
+    slow, start = None, {}
+    if isinstance(claim, Guarantee):
+        slow, errors = claim.slow_gain, dict(zip(_NOISE, map(str, claim.held.start), strict=True))
+        start = {"start": errors} if any(claim.held.start) else {}
     document = {
         "format": 1,
         "kind": "guarantee",
@@ -54,6 +57,7 @@ def guarantee_text(claim: Guarantee | ContinuousPeaks) -> str:
             "growths": {"slip": str(task.growths[0]), "rate": str(task.growths[1])},
         },
         "loop": _loop(claim),
+        **start,
         **({} if slow is None else {"slow_gain": {"parts": slow.parts, "growth": str(slow.growth)}}),
         "claims": {name: value.exact for name, value in _claims(claim.claims).items()},
     }
@@ -70,6 +74,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         law, times = claim.held.law, {name: str(getattr(claim.held, name)) for name in _TIMES}
         times |= {"diffusion": str(claim.held.diffusion)} if claim.held.diffusion else {}
         own = {"update": [_texts(row) for row in claim.held.law.update]}
+        own |= {"first": [_texts(row) for row in claim.held.law.first]} if claim.held.law.first else {}
         root = claim.held.law.root
         own |= {} if root is None else {"root": _root_document(root)}
         noise = claim.held.noise
@@ -102,18 +107,19 @@ def read_guarantee(raw: Any) -> Guarantee | ContinuousPeaks:
     CertificateError
         When it breaks a rule of FORMAT.md.
     """
-    slow = {"slow_gain"} & set(raw) if isinstance(raw, dict) else set[str]()
-    with_keys(raw, {"format", "kind", "fault", "reference", "disturbance", "loop", "claims"} | slow)
+    more = {"slow_gain", "start"} & set(raw) if isinstance(raw, dict) else set[str]()
+    with_keys(raw, {"format", "kind", "fault", "reference", "disturbance", "loop", "claims"} | more)
     need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
     need(raw["kind"] == "guarantee", "kind must be guarantee")
     try:
         task, claims, loop = _task(raw), _read_claims(raw["claims"]), raw["loop"]
         if isinstance(loop, dict) and "rates" in loop:
-            need(not slow, "slow_gain is for a law of samples")
+            need(not more, f"{min(more, default='')} is for a law of samples")
             claim: Guarantee | ContinuousPeaks = ContinuousPeaks(task=task, law=_continuous(loop), claims=claims)
         else:
-            slow_gain = _slow_gain(raw["slow_gain"], task) if slow else None
-            claim = Guarantee(task=task, held=_held(loop), claims=claims, slow_gain=slow_gain)
+            slow_gain = _slow_gain(raw["slow_gain"], task) if "slow_gain" in more else None
+            held = _held(loop, _start(raw["start"]) if "start" in more else {})
+            claim = Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
         need(len(claim.loop.states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
     except ParameterError as error:
         raise CertificateError(str(error)) from None
@@ -151,16 +157,31 @@ def _slow_gain(raw: Any, task: Task) -> SlowGain:
     return slow_gain
 
 
-def _held(raw: Any) -> Held:
-    given = {"root", "noise", "diffusion"} & set(raw) if isinstance(raw, dict) else set[str]()
+def _start(raw: Any) -> dict[str, Fraction]:
+    with_keys(raw, set(_NOISE))
+    slip, rate = (read_rational(raw[name]) for name in _NOISE)
+    need(min(slip, rate) >= 0 and max(slip, rate) > 0, "bounds of the start must be 0 or more, one of them above")
+    return {"initial_slip": slip, "initial_slip_rate": rate}
+
+
+def _held(raw: Any, start: dict[str, Fraction]) -> Held:
+    given = {"root", "noise", "diffusion", "first"} & set(raw) if isinstance(raw, dict) else set[str]()
     with_keys(raw, {*_TIMES, "update", *_LAW} | given)
     root = _read_root(raw["root"]) if "root" in given else None
-    law = LinearLaw(update=_square(raw, "update"), root=root, **_rest(raw))
+    law = LinearLaw(
+        update=_square(raw, "update"), root=root, first=_first(raw) if "first" in given else (), **_rest(raw)
+    )
     noise = with_keys(raw["noise"], set(_NOISE)) if "noise" in given else {}
     bounds = {f"{name}_noise": read_rational(value) for name, value in noise.items()}
     diffusion = read_rational(raw["diffusion"]) if "diffusion" in given else Fraction(0)
     need(diffusion > 0 or "diffusion" not in given, "diffusion must be positive where it is given")
-    return Held(law=law, diffusion=diffusion, **{name: read_rational(raw[name]) for name in _TIMES}, **bounds)
+    times = {name: read_rational(raw[name]) for name in _TIMES}
+    return Held(law=law, diffusion=diffusion, **times, **bounds, **start)
+
+
+def _first(raw: dict[str, Any]) -> tuple[tuple[Fraction, ...], ...]:
+    rows = listed(raw["first"], "first", length=len(listed(raw["states"], "states", _MOST_STATES)))
+    return tuple(_ends(row, "first") for row in rows)
 
 
 def _continuous(raw: Any) -> ContinuousLaw:

@@ -31,9 +31,9 @@ the trapezoidal sum. Of the flow since the last jump, a piece that has passed ad
 ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache, reduce
+from functools import lru_cache
 from itertools import accumulate
 from operator import mul
 from typing import Any
@@ -48,27 +48,29 @@ from quakedesign.certificates.guarantee.ball_matrices import (
     matrix,
     upper,
 )
+from quakedesign.certificates.guarantee.free_response import START, free_peaks
 from quakedesign.certificates.guarantee.responses import Flow, Response, responses
-from quakedesign.errors import ParameterError
+from quakedesign.certificates.guarantee.slowest_mode import MOST_DOUBLINGS, seen_alone, slowest, unstable
 from quakedesign.loop import PeriodicLoop
 
 _BITS = 128
 _SMALL = Fraction(1, 1 << 10)  # share of the sums that the tail may be, but for the slowest mode
 _ROOM = Fraction((1 << 32) + 1, 1 << 32)  # for sums that are solved for to bound themselves
-_MOST_DOUBLINGS = 12
 
 
 def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     """Gains of every (output, input), rounded up, one for each part of the period; the same parts for all.
 
-    Those of loops that came before are remembered: a proof is found, checked, told and written of one loop.
+    A start that is not 0 is one input more, `free_response.START`, of size 1. Gains of loops that came before are
+    remembered: a proof is found, checked, told and written of one loop.
 
     Raises
     ------
     ParameterError
         When the nominal loop is not found to be stable within 4096 periods.
     """
-    return dict(_norms(loop))
+    found = dict(_norms(replace(loop, start=())))
+    return found | {(output, START): peaks for output, peaks in free_peaks(loop).items()} if loop.start else found
 
 
 @lru_cache(maxsize=128)
@@ -78,9 +80,9 @@ def _norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
         rows = matrix(tuple(loop.outputs.values()))
         bounds: dict[tuple[str, str], tuple[Fraction, ...]] = {}
         flows, earlier = ([Flow.of(flow, part, past=past) for part in loop.segments] for past in (False, True))
-        slowest = _slowest(earlier)
+        slow = slowest(earlier)
         for name in (*loop.inputs, *loop.sampled, *loop.fading):
-            gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name), slowest), rows)
+            gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name), slow), rows)
             bounds |= {
                 (output, name): tuple(map(upper, worst)) for output, worst in zip(loop.outputs, gains, strict=True)
             }
@@ -97,19 +99,19 @@ class _Past:
     bound: Any
 
     @classmethod
-    def of(cls, parts: list[Response], slowest: list[Any]) -> "_Past":
+    def of(cls, parts: list[Response], slow: list[Any]) -> "_Past":
         size = parts[0].of.jump.nrows()
         later, ends, rest = identity(size), list[Any](), arb_mat(size, 1)
         for part in reversed(parts):
             own, remainder = part.columns(later)
             ends, rest, later = [*own, *ends], rest + remainder, later * part.of.whole
-        return cls._summed(parts, later, beside([*ends, _diagonal(rest)]), slowest)
+        return cls._summed(parts, later, beside([*ends, _diagonal(rest)]), slow)
 
     @classmethod
-    def _summed(cls, parts: list[Response], period: Any, columns: Any, slowest: list[Any]) -> "_Past":
-        place, seen, back = _seen_alone(slowest, _row_sums(columns))
+    def _summed(cls, parts: list[Response], period: Any, columns: Any, slow: list[Any]) -> "_Past":
+        place, seen, back = seen_alone(slow, _row_sums(columns))
         sums = _row_sums(seen * columns)
-        for _ in range(_MOST_DOUBLINGS):
+        for _ in range(MOST_DOUBLINGS):
             following = period * columns
             sums = [a + b for a, b in zip(sums, _row_sums(seen * following), strict=True)]
             columns, period = beside([columns, following]), period * period
@@ -119,7 +121,7 @@ class _Past:
             shares = zip((left * quick).entries(), sums, strict=True)
             if all(a == 0 or a / b < ball(_SMALL) for a, b in shares):
                 return cls(parts, columns, far, _whole(left, sums))
-        raise _unstable()
+        raise unstable()
 
     def of_rows(self, rows: Any, segment: int) -> list[Any]:
         """N of every row that acts just before a segment: those before it in this period, and all that is earlier."""
@@ -130,39 +132,6 @@ class _Past:
         ends, rest = before.columns(identity(rows.ncols()))
         own = _row_sums(rows * beside([*ends, _diagonal(rest)]))
         return [a + b for a, b in zip(own, self.of_rows(rows * before.of.whole, segment - 1), strict=True)]
-
-
-def _slowest(flows: list[Flow]) -> list[Any]:
-    """What the slowest mode is seen along, if there is one: a row of what is left of all states after 2^12 periods.
-
-    Raises
-    ------
-    ParameterError
-        When that is more than there was.
-    """
-    period = reduce(lambda now, flow: flow.whole * now, flows[1:], flows[0].whole)
-    growth = before = 0.0
-    for _ in range(_MOST_DOUBLINGS):
-        period = period * period
-        largest = max(v.abs_upper() for v in period.entries())
-        if not largest > 0:
-            return [arb(0)] * period.nrows()
-        before, growth = growth, 2 * growth + float(largest.log())
-        period = arb_mat([[(v / largest).mid() for v in row] for row in period.tolist()])
-    if not growth < before:
-        raise _unstable()
-    return list(max(period.tolist(), key=lambda row: max(map(abs, row))))
-
-
-def _seen_alone(row: list[Any], sums: list[Any]) -> tuple[int, Any, Any]:
-    """W of `norms`, its inverse, and which of its rows, that of the state that counts most, is the given one."""
-    seen, back = identity(len(row)), identity(len(row))
-    place = max(range(len(row)), key=lambda i: (abs(row[i]) * sums[i]).mid())
-    for i, v in enumerate(row):
-        if i != place and row[place] != 0:
-            seen[place, i] = (v / row[place]).mid()
-            back[place, i] = -seen[place, i]
-    return place, seen, back
 
 
 def _whole(left: Any, sums: list[Any]) -> Any:
@@ -177,18 +146,11 @@ def _whole(left: Any, sums: list[Any]) -> Any:
     try:
         found = absolute((identity(size) - left).solve(own) * ball(_ROOM))
     except ZeroDivisionError:
-        raise _unstable() from None
+        raise unstable() from None
     bounded = zip(own.entries(), (left * found).entries(), found.entries(), strict=True)
     if not all(y + far <= x for y, far, x in bounded):
-        raise _unstable()
+        raise unstable()
     return found
-
-
-def _unstable() -> ParameterError:
-    return ParameterError(
-        f"the nominal loop must be stable. Received one that is not seen to be in {2**_MOST_DOUBLINGS} periods. "
-        "Change the gains, or shorten T_s."
-    )
 
 
 def _gains(parts: list[Response], past: _Past, outputs: Any) -> list[list[Any]]:

@@ -85,4 +85,5 @@ def slow_gains(loops: Iterable[PeriodicLoop], growth: Fraction) -> Gains:
 def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:
     """The loop whose responses to the acceleration are e^{ασ} as large."""
     flow = tuple(tuple(v + growth * (i == j) for j, v in enumerate(row)) for i, row in enumerate(loop.flow))
-    return replace(loop, flow=flow, inputs={"aged": loop.inputs["acceleration"]}, sampled={}, fading={})
+    entry = {"aged": loop.inputs["acceleration"]}
+    return replace(loop, flow=flow, inputs=entry, sampled={}, fading={}, start=())

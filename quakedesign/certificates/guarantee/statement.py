@@ -1,6 +1,6 @@
 """A guarantee: a fault, the loop that runs, and what its outputs never exceed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor, log10
 from typing import TYPE_CHECKING, Any, ClassVar, TypedDict
@@ -13,7 +13,7 @@ from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.certificates.guarantee.theorem import Bounds, Gains, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.loop import NOISES, LinearLaw, Model, PeriodicLoop, held_loop
+from quakedesign.loop import NOISES, LinearLaw, Model, PeriodicLoop, held_loop, starts
 from quakedesign.rationals import six_digits
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ class Around(TypedDict, total=False):
     diffusion: Fraction
     slip_noise: Fraction
     rate_noise: Fraction
+    initial_slip: Fraction
+    initial_slip_rate: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +53,8 @@ class Held:
         L²/D of the layer between well and fault [s]; 0 for none.
     slip_noise, rate_noise : Fraction
         Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
+    initial_slip, initial_slip_rate : Fraction
+        Bounds of both at the start, where the reference has none, of either sign [m], [m/s].
 
     Raises
     ------
@@ -65,8 +69,15 @@ class Held:
     diffusion: Fraction = Fraction(0)
     slip_noise: Fraction = Fraction(0)
     rate_noise: Fraction = Fraction(0)
+    initial_slip: Fraction = Fraction(0)
+    initial_slip_rate: Fraction = Fraction(0)
 
     def __post_init__(self) -> None:
+        if min(self.start) < 0:
+            raise ParameterError(
+                "initial slip and slip rate are bounds of both signs, 0 or more. Received "
+                f"{float(self.initial_slip):.4g} m and {float(self.initial_slip_rate):.4g} m/s. Leave out the sign."
+            )
         if min(self.slip_noise, self.rate_noise) < 0:
             raise ParameterError(
                 "a bound of noise must be 0 or more. Received "
@@ -87,7 +98,14 @@ class Held:
             diffusion=self.diffusion,
             slip_noise=self.slip_noise,
             rate_noise=self.rate_noise,
+            initial_slip=self.initial_slip,
+            initial_slip_rate=self.initial_slip_rate,
         )
+
+    @property
+    def start(self) -> tuple[Fraction, Fraction]:
+        """Bounds of the errors at the start [m], [m/s]; 0 and 0 at rest."""
+        return self.initial_slip, self.initial_slip_rate
 
     @property
     def noise(self) -> dict[str, Fraction]:
@@ -110,7 +128,9 @@ class Held:
     def loop(self, task: Task, model: Model | None = None) -> PeriodicLoop:
         """Nominal error loop on a task, of its model or another one."""
         times = {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
-        return held_loop(self.law, model or task.model, task.authority, self.step, **times, noisy=self.noise)
+        loop = held_loop(self.law, model or task.model, task.authority, self.step, **times, noisy=self.noise)
+        box = starts(self.law, len(loop.states), self.start, (self.slip_noise, self.rate_noise))
+        return replace(loop, start=box)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,13 +266,13 @@ class Guarantee:
         when += ", with the slip alone measured" if held.law.of_slip_alone else ""
         for name, bound in held.noise.items():
             when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
-        return sentence_of(self.task, self.claims, when)
+        return sentence_of(self.task, self.claims, when, _start(*held.start))
 
 
-def sentence_of(task: Task, claims: Claims, when: str) -> str:
+def sentence_of(task: Task, claims: Claims, when: str, start: str = "from rest") -> str:
     """What is claimed of a task, for people; `when` says how the pressure follows the law.
 
-    Bounds of what is claimed are rounded up, those of the disturbances for which it is claimed down.
+    Bounds of what is claimed are rounded up, those of the disturbances and starts for which it is claimed down.
     """
     kind = f"for every disturbance of at most {LowerBound(task.amplitude):.3g} m/s^2"
     if task.change is not None:
@@ -261,7 +281,7 @@ def sentence_of(task: Task, claims: Claims, when: str) -> str:
         kind = "without disturbance"
     pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
     return (
-        f"from rest, {when}, {kind}, for all friction and constant parameters of the box: "
+        f"{start}, {when}, {kind}, for all friction and constant parameters of the box: "
         f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
         f"{claims.slip_error:.3g} m of the reference, the pressure between {pressures} "
         "(for a plant continued to negative slip rates)"
@@ -347,6 +367,12 @@ def _above(value: Fraction) -> Fraction:
         return value
     scale = Fraction(10) ** (floor(log10(abs(value))) - _DIGITS + 1)
     return ceil(value / scale) * scale
+
+
+def _start(slip: Fraction, rate: Fraction) -> str:
+    if not (slip or rate):
+        return "from rest"
+    return f"from every start within {LowerBound(slip):.6g} m and {LowerBound(rate):.6g} m/s of rest"
 
 
 def _seconds(value: Fraction) -> str:

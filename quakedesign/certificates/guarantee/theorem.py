@@ -1,6 +1,6 @@
 """The robust small-gain theorem for a loop that runs: bounds for ever, in exact arithmetic.
 
-**Theorem.** Let a loop be linear with inputs w_1 … w_n, from rest, and g_yi,j gains as those of `norms`: |y(τ)| ≤ Σ_i
+**Theorem.** Let a loop be linear with inputs w_1 … w_n, first at 0, and g_yi,j gains as those of `norms`: |y(τ)| ≤ Σ_i
 g_yi,j·W_i(t) for τ ≤ t in part j of the period, W_i(t) the essential supremum of |w_i| on [0, t] (for a sampled input,
 over the samples up to t). Let every input in turn be bounded by the outputs, |w_i| ≤ F_i + Σ_y c_iy·|y| at every time,
 c ≥ 0, and M_ik = max_j Σ_y c_iy·g_yk,j. If the spectral radius of M is below 1, then W(t) ≤ (1 − M)⁻¹F for every t,
@@ -21,6 +21,14 @@ largest slope μ′, so |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b,
 as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0. A disturbance of this
 class is one of the class amplitude too, so the smaller of both bounds holds for every output.
 
+**Start.** Where the loop starts at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of rest, |y(τ)| ≤ h_y,j + Σ_i g_yi,j·W_i(t) by
+superposition, with h_y,j ≥ |y| of the free response in part j, from every such start (`free_response`). So a start is
+one input more, ``start``, with F = 1, no c and the gains h, whose row of M is zero: the spectral radius stays. The s_i
+are bounds of e1(0) and e2(0), of both signs, and what the law makes at first of what it is told then; nothing else
+moves before the first sample: p is 0, and so is p* at r = 0, as r(0) = r′(0) = 0. In the class rate φ(0) = 0, so the
+shift of p* is 0 too. Below, the loop of every β_i starts alike; since t = 0 counts, what bounds e1 and e2 for ever is
+at least their bound at first, so that E and R exceed that as well.
+
 **Noise.** A law that is told e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples has two sampled inputs
 more, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c; nothing else is said of their courses. Readings in
 steps of q are off by at most q/2.
@@ -38,7 +46,7 @@ noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places
 e^{ασ}/(eα) for every α > 0. So (β − β_i)v is at most (δ + 2κE)|v|, as before with a smaller c, and ``aged``, an input
 that enters as a does with c = κr′/(eα) for v, its gains those of the loop with A + α in place of A, whose responses are
 e^{ασ} times as large. All gains are the largest over the parts. E is the claim on the slip error, which has to exceed
-the bound that follows: e1 is continuous and 0 at first, so it never reaches E. ∎
+the bound that follows: e1 is continuous and below E at first, so it never reaches E. ∎
 
 **Layer between well and fault.** Its pressure is that of its modes, v, and what they leave out, R, |R| ≤ sup|y| with
 the output y = ``left_out`` (`quakedesign.loop.layer`), so β(v + R) brings βR into e2′ beside a. Where the well's
@@ -55,6 +63,7 @@ from typing import Any
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee.flow_norms import flow_norms
+from quakedesign.certificates.guarantee.free_response import START
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.loop import ImplicitRoot, PeriodicLoop
@@ -112,7 +121,7 @@ class GainSpread:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """What no course of the uncertain quantities exceeds, from rest, for ever.
+    """What no course of the uncertain quantities exceeds, from its start, for ever.
 
     Attributes
     ----------
@@ -197,7 +206,7 @@ def bounds_from(
     spread: GainSpread | None = None,
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
-    channels = (*channels_of(task, root, step, noise, spread), *_fed_forward(task, {name for _, name in gains}))
+    channels = (*channels_of(task, root, step, noise, spread), *_beside(task, {name for _, name in gains}))
     channels = tuple(_through_layer(task, channels, gains))
     small_gain, found = channel_bounds(channels, gains)
     if found is None:
@@ -257,12 +266,14 @@ def channels_of(
     )
 
 
-def _fed_forward(task: Task, names: Collection[str]) -> Iterator[Channel]:
-    """Inputs of a law in continuous time that uses the reference itself (`continuous_loop`)."""
+def _beside(task: Task, names: Collection[str]) -> Iterator[Channel]:
+    """Inputs of a law in continuous time that uses the reference itself (`continuous_loop`), and a start."""
     if "reference_acceleration" in names:
         yield Channel(name="reference_acceleration", own=task.reference_rates[1], shares={})
     if "reference_jerk" in names:
         yield Channel(name="reference_jerk", own=task.reference_jerk, shares={})
+    if START in names:
+        yield Channel(name=START, own=Fraction(1), shares={})
 
 
 def _through_layer(task: Task, channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:

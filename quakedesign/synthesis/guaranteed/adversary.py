@@ -20,6 +20,7 @@ _PIECES = 6
 _SWEEPS = 8
 _MANY, _FEW = 512, 2  # courses that switch after random times, and their sweeps: where the fault sticks, sweeps stall
 _COURSES, _LEAST_COURSES = 24, 8  # for each of the two outputs; fewer where they are longer
+_SOON = 1, 2, 4, 8, 16  # periods after which errors are looked at as well where a loop does not start at rest
 _SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
 _SEED = 7
 
@@ -47,7 +48,7 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     periods long, as the loop forgets; in continuous time a period is that of the fastest pole, 1/|λ|. With `sticks` the
     fault does not slide backward: friction holds it wherever the loop would, along the reference at its largest rate
     and at a twentieth of that, and courses that switch after random times are tried as well. Noise is at its ends too.
-    An implicit step ends where its equation says, inside its lines or not.
+    An implicit step ends where its equation says, inside its lines or not. A box of starts is left from its corners.
     """
     slip, rate = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     return WorstFound(slip_error=slip, slip_rate_error=rate)
@@ -60,6 +61,9 @@ def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
     if sticks:
         searches.append(_Search(claim, sticks, _MANY))
         searches[1].follow(searches[1].switching(), _FEW)
+    for periods in _SOON if claim.loop.start else ():
+        searches.append(_Search(claim, sticks, 2 * _COURSES, periods))
+        searches[-1].follow(searches[-1].random(), _SWEEPS)
     return [max(search.largest[k] for search in searches) for k in (0, 1)]
 
 
@@ -76,7 +80,9 @@ class _Pieces:
 class _Search:
     """Many courses at once; `largest` holds |e1| and |e2|."""
 
-    def __init__(self, claim: Guarantee | ContinuousPeaks, sticks: bool, courses: int) -> None:
+    def __init__(
+        self, claim: Guarantee | ContinuousPeaks, sticks: bool, courses: int, periods: int | None = None
+    ) -> None:
         task, loop = claim.task, claim.loop
         held = claim.held if isinstance(claim, Guarantee) else None
         root, noise = (held.law.root, held.noise) if held else (None, {})
@@ -86,6 +92,7 @@ class _Search:
         self.sudden = _filled(loop.sampled.get("root", ()), self.size)
         self.noise = np.array([float(noise.get(name, 0)) for name in NOISES])
         self.heard = np.array([_filled(loop.sampled.get(name, ()), self.size) for name in NOISES])
+        self.start = np.array([_filled(column, self.size) for column in loop.start]).reshape(-1, self.size)
         beta = [float(b) for b in task.beta]
         push = np.zeros(self.size)
         push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
@@ -95,8 +102,9 @@ class _Search:
         self.parts = [
             _pieces(vertices, inputs, _widened(s.jump, self.size), float(s.duration) / _PIECES) for s in segments
         ]
-        periods = _periods_to_forget(self.parts, len(loop.states))
-        courses = 2 * max(courses // 2 * _PERIODS // periods, _LEAST_COURSES)
+        if periods is None:
+            periods = _periods_to_forget(self.parts, len(loop.states))
+            courses = 2 * max(courses // 2 * _PERIODS // periods, _LEAST_COURSES)
         paces = np.where(np.arange(courses) // 2 % 2, 1, _SLOW)
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.allowed = np.ones((courses, len(vertices)), dtype=bool)
@@ -130,7 +138,8 @@ class _Search:
         return found
 
     def _forward(self, costates: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        state, chosen, held = np.zeros_like(self.aim), [], []
+        state, chosen, held = self._started(costates[0]), [], []
+        self._seen(state)
         for number, costate in enumerate(costates):
             part = self.parts[number // _PIECES % len(self.parts)]
             if number % _PIECES == 0:
@@ -144,9 +153,20 @@ class _Search:
             chosen.append(best)
             held.append(self._held(state, following, part.length))
             state = following
-            slip, rate = np.abs(state[:, :2]).max(axis=0)
-            self.largest = max(self.largest[0], float(slip)), max(self.largest[1], float(rate))
+            self._seen(state)
         return chosen, held
+
+    def _seen(self, state: np.ndarray) -> None:
+        slip, rate = np.abs(state[:, :2]).max(axis=0)
+        self.largest = max(self.largest[0], float(slip)), max(self.largest[1], float(rate))
+
+    def _started(self, costate: np.ndarray) -> np.ndarray:
+        """Corners of the box of starts, by the costate after the first piece; with stick no slip rate is backward."""
+        part = self.parts[0]
+        state = np.sign(costate @ part.steps[0] @ part.jump @ self.start.T) @ self.start
+        if self.back is not None:
+            state[:, 1] = np.maximum(state[:, 1], -self.back)
+        return np.asarray(state)
 
     def _sampled(self, part: _Pieces, state: np.ndarray, costate: np.ndarray, number: int) -> np.ndarray:
         """After a jump; the first of a period hears noise, for which the costate is that after the first piece."""

@@ -110,6 +110,8 @@ class Answer:
             "measured": MEASURED[self.found.held.law.of_slip_alone],
             "slip_noise": str(self.found.held.slip_noise),
             "rate_noise": str(self.found.held.rate_noise),
+            "initial_slip": str(self.found.held.initial_slip),
+            "initial_slip_rate": str(self.found.held.initial_slip_rate),
             "law": _law(self.found.held.law),
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }

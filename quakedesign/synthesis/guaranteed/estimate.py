@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import reduce
 
 import numpy as np
 from scipy.linalg import expm
 
 from quakedesign.certificates.guarantee import Bounds, Held, NoGuarantee, Task
+from quakedesign.certificates.guarantee.free_response import START
 from quakedesign.certificates.guarantee.theorem import GainSpread, bounds_from
 from quakedesign.loop import PeriodicLoop
 
@@ -75,10 +77,12 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
         return None
     doublings = int(np.ceil(np.log2(max(np.log(_FORGOTTEN) / np.log(max(slowest.others, 0.1)), 2))))
     rows = np.array(list(loop.outputs.values()), dtype=float)
+    gains = {name: _of_input(entry, flows, doublings, rows, enters, slowest) for name, entry, enters in _entries(loop)}
+    gains |= {START: _free(np.array(loop.start, dtype=float).T, flows, doublings, rows)} if loop.start else {}
     return {
         (output, name): tuple(map(float, found))
-        for name, entry, enters in _entries(loop)
-        for output, found in zip(loop.outputs, _of_input(entry, flows, doublings, rows, enters, slowest), strict=True)
+        for name, of in gains.items()
+        for output, found in zip(loop.outputs, of, strict=True)
     }
 
 
@@ -147,6 +151,21 @@ def _of_input(
             found.append(np.abs(row @ flow.jump @ before).sum(axis=1) + since[:, i])
             row = row @ flow.step
         before = np.hstack([flow.whole @ before, part.columns])
+    return np.array(found).T
+
+
+def _free(start: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray) -> np.ndarray:
+    """Largest outputs of the free response from the box of the columns of `start`."""
+    columns, period = start[None], reduce(lambda now, flow: flow.whole @ now, flows, np.eye(len(start)))
+    for _ in range(doublings):
+        columns, period = np.concatenate([columns, period @ columns]), period @ period
+    found = []
+    for flow in flows:
+        now = flow.jump @ columns
+        for _ in range(_PIECES + 1):
+            found.append(np.abs(rows @ now).sum(axis=2).max(axis=0))
+            now = flow.step @ now
+        columns = flow.whole @ columns
     return np.array(found).T
 
 

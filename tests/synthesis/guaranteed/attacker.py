@@ -15,7 +15,7 @@ class Held:
     """Numbers of a loop: matrices of the law, b, ranges of s, w and β, T_s, delay, bounds of φ and noise, all in SI.
 
     For a friction of the slip alone: how much β changes per slip at most, and the reference's rate. The rock's L²/D is
-    zero where the well is at the fault.
+    zero where the well is at the fault. The law's states begin at 0, or at first times the errors that it is told then.
     """
 
     F: np.ndarray
@@ -34,6 +34,7 @@ class Held:
     slope: float = 0.0
     pace: float = 0.0
     rock: float = 0.0
+    first: object = None
 
 
 def spreading(rock, modes=40):
@@ -51,22 +52,25 @@ def middle(ends):
     return (ends[0] + ends[1]) / 2
 
 
-def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None):
+def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None, start=None):
     """Largest |e1| and |e2| of every course and the errors at the end.
 
     choose(k, e, v) gives s, w, β and φ for one small step from its number, the errors (2 × courses) and b·p; kick(k) is
     an amount added to e2 before a step, hear(k) to both errors that the law is told
-    (2 × courses); back is the slip rate of the reference on a plant that never slides backward.
+    (2 × courses); start has the errors at first (2 × courses), 0 unless given; back is the slip rate of the reference
+    on a plant that never slides backward.
     """
     size, h = len(held.C), held.step / pieces
     late = round(held.delay / h)
-    e, z, v = np.zeros((2, courses)), np.zeros((size, courses)), np.zeros(courses)
+    e = np.zeros((2, courses)) if start is None else np.array(start, dtype=float)
+    z, v = np.zeros((size, courses)), np.zeros(courses)
     rates, shares = spreading(held.rock) if held.rock else (np.array([np.inf]), np.ones(1))
     fade, spread = np.exp(-rates * h / 2)[:, None], np.zeros((len(shares), courses))
-    waiting, largest = [], np.zeros((2, courses))
+    waiting, largest = [], np.abs(e)
     for k in range(periods * pieces):
         if k % pieces == 0:
             told = e if hear is None else e + hear(k)
+            z = held.first @ told if k == 0 and held.first is not None else z
             y = told if held.ends is None else np.vstack([told, held.ends(told[0], told[1])])
             waiting.append((k + late, held.b * (held.C @ z + held.D @ y)))
             z = held.F @ z + held.G @ y

@@ -202,4 +202,5 @@ def test_another_objective_is_designed_for_what_a_guarantee_measures(monkeypatch
     monkeypatch.setattr("quakedesign.synthesis.guaranteed.reach.design_held", lambda *a, **k: told.append((a, k)))
     assert design_at(claim.task, claim, "tracking") is claim
     around = {"delay": 0, "lag": 0, "diffusion": 0, "slip_noise": NOISE, "rate_noise": 0}
+    around |= {"initial_slip": 0, "initial_slip_rate": 0}
     assert told == [((claim.task, STEP), {"objective": "tracking", "measured": "slip", **around})]
