@@ -6,12 +6,14 @@ edge by de Casteljau's rule keeps everything in integers.
 """
 
 import heapq
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
-from itertools import combinations, count, pairwise, product
+from itertools import accumulate, combinations, count, pairwise, product
 from math import factorial, lcm, prod
+from operator import add, itemgetter, lshift
+from typing import NamedTuple
 
 from flint import arb, fmpq
 
@@ -35,6 +37,39 @@ def _lines(variables: int, degree: int, edge: Edge) -> tuple[tuple[int, ...], ..
         rest = tuple(v for k, v in enumerate(e) if k not in edge)
         groups.setdefault(rest, []).append((e[edge[1]], place))
     return tuple(tuple(place for _, place in sorted(line)) for line in groups.values())
+
+
+Taken = Callable[[list[int]], tuple[int, ...]]
+
+
+def _taking(places: Sequence[int]) -> Taken:
+    """What takes the entries at some places out of a list."""
+    return itemgetter(*places) if len(places) > 1 else lambda values: tuple(values[i] for i in places)
+
+
+@cache
+def _triangle(
+    variables: int, degree: int, edge: Edge
+) -> tuple[tuple[tuple[Taken, Taken], ...], tuple[tuple[Taken, tuple[int, ...]], ...]]:
+    """De Casteljau's triangles of all lines along an edge, in a list that grows by the sums of neighbours, row by row.
+
+    Then for each half where its coefficients stand, and by how many binary digits they are to be shifted.
+    """
+    lines = _lines(variables, degree, edge)
+    rows, size, sums = [list(line) for line in lines], len(_exponents(variables, degree)), []
+    halves: tuple[dict[int, tuple[int, int]], ...] = ({}, {})
+    for k in range(degree + 1):
+        for line, row in zip(lines, rows, strict=True):
+            if row:
+                halves[0][line[k]], halves[1][line[-1 - k]] = (row[0], degree - k), (row[-1], degree - k)
+        pairs = [pair for row in rows for pair in pairwise(row)]
+        if pairs:
+            before, after = zip(*pairs, strict=True)
+            sums.append((_taking(before), _taking(after)))
+        ends = list(accumulate((max(len(row) - 1, 0) for row in rows), initial=size))
+        rows, size = [list(range(*part)) for part in pairwise(ends)], ends[-1]
+    parts = [tuple(zip(*(half[place] for place in sorted(half)), strict=True)) for half in halves]
+    return tuple(sums), tuple((_taking(places), shifts) for places, shifts in parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,16 +102,13 @@ class Form:
 
     def bisected(self, edge: Edge) -> "tuple[Form, Form]":
         """Forms on the two halves; the first keeps the first end of the edge."""
-        left, right = list(self.coefficients), list(self.coefficients)
-        for line in _lines(self.variables, self.degree, edge):
-            row, n = [self.coefficients[i] for i in line], self.degree
-            for k, place in enumerate(line):
-                left[place] = row[0] << (n - k)
-                right[line[-1 - k]] = row[-1] << (n - k)
-                row = [a + b for a, b in pairwise(row)]
+        sums, halves = _triangle(self.variables, self.degree, edge)
+        values = list(self.coefficients)
+        for before, after in sums:
+            values += map(add, before(values), after(values))
         scale = self.scale / (1 << self.degree)
-        halves = (tuple(left), tuple(right))
-        first, second = (Form(self.variables, self.degree, c, scale) for c in halves)
+        coefficients = (tuple(map(lshift, ends(values), shifts)) for ends, shifts in halves)
+        first, second = (Form(self.variables, self.degree, c, scale) for c in coefficients)
         return first, second
 
     def least(self) -> fmpq:
@@ -85,12 +117,12 @@ class Form:
 
     def largest(self) -> fmpq:
         """Upper bound on the absolute value."""
-        return max(abs(c) for c in self.coefficients) * self.scale
+        return max(map(abs, self.coefficients)) * self.scale
 
     def at_corners(self) -> list[float]:
         """Values at the corners of the simplex, rounded to nearest."""
-        places = _corners(self.variables, self.degree)
-        return [float(self.coefficients[i] * self.scale) for i in places]
+        p, q = int(self.scale.p), int(self.scale.q)
+        return [self.coefficients[i] * p / q for i in _corners(self.variables, self.degree)]
 
 
 Problem = tuple[tuple[Form, ...], tuple[Fraction, ...]]
@@ -131,44 +163,53 @@ def largest_ratio(
 def _largest(problems: tuple[Problem, ...], tolerance: Fraction, pieces: int) -> Fraction | None:
     order, heap, attained = count(), [], 0.0
     for forms, exponents in problems:
-        corners = _identity(forms[0].variables)
-        heap.append((-_bound(forms, exponents), next(order), forms, exponents, corners))
+        corners, powers = _identity(forms[0].variables), tuple(map(_Power.of, exponents))
+        heap.append((-_bound(forms, powers), next(order), forms, powers, corners))
     heapq.heapify(heap)
     for _ in range(pieces):
-        top, _, forms, exponents, corners = heap[0]
-        attained = max(attained, _attained(forms, exponents))
+        top, _, forms, powers, corners = heap[0]
+        attained = max(attained, _attained(forms, powers))
         if -top <= attained * (1 + float(tolerance)):
             break
         heapq.heappop(heap)
         edge = _longest(corners)
         for side, part in enumerate(zip(*(f.bisected(edge) for f in forms), strict=True)):
             cut = _cut(corners, edge, side)
-            heapq.heappush(heap, (-_bound(part, exponents), next(order), part, exponents, cut))
+            heapq.heappush(heap, (-_bound(part, powers), next(order), part, powers, cut))
     result = -heap[0][0]
     return None if result == float("inf") else Fraction(result)
 
 
-def _bound(forms: Sequence[Form], exponents: Sequence[Fraction]) -> float:
+class _Power(NamedTuple):
+    """An exponent in all forms in which it is needed again and again."""
+
+    ball: arb
+    near: float
+    divides: bool
+
+    @classmethod
+    def of(cls, exponent: Fraction) -> "_Power":
+        return cls(arb(fmpq(exponent.numerator, exponent.denominator)), float(exponent), exponent < 0)
+
+
+def _bound(forms: Sequence[Form], powers: Sequence[_Power]) -> float:
     """Float not below the largest ratio on a piece; infinite when a divisor may vanish."""
     total = arb(1)
-    for form, a in zip(forms, exponents, strict=True):
-        value = form.largest() if a > 0 else form.least()
-        if a < 0 and value <= 0:
+    for form, power in zip(forms, powers, strict=True):
+        value = form.least() if power.divides else form.largest()
+        if power.divides and value <= 0:
             return float("inf")
-        total *= arb(value) ** _power(a)
-    return float_above(fraction_of(total.upper().fmpq()))
+        total *= arb(value) ** power.ball
+    upper = total.upper()
+    near = float(upper)  # has the digits of a float, unless it is out of range
+    return near if upper <= near else float_above(fraction_of(upper.fmpq()))
 
 
-@cache
-def _power(value: Fraction) -> arb:
-    return arb(fmpq(value.numerator, value.denominator))
-
-
-def _attained(forms: Sequence[Form], exponents: Sequence[Fraction]) -> float:
+def _attained(forms: Sequence[Form], powers: Sequence[_Power]) -> float:
     """Largest value at the corners of a piece; only decides when to stop."""
     values = [[abs(v) for v in f.at_corners()] for f in forms]
     return max(
-        prod(v[i] ** float(a) if v[i] else 0.0 for v, a in zip(values, exponents, strict=True))
+        prod(v[i] ** power.near if v[i] else 0.0 for v, power in zip(values, powers, strict=True))
         for i in range(forms[0].variables)
     )
 

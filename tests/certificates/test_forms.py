@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -127,3 +128,18 @@ def test_halves_agree_with_the_whole(edge):
         inside = values(polynomial, (weights @ cut).T)
         assert float(half.least()) <= inside.min()
         assert np.abs(inside).max() <= float(half.largest())
+
+
+@pytest.mark.parametrize("edge", [(0, 1), (0, 2), (1, 2)])
+def test_halves_have_the_coefficients_of_what_is_substituted(edge):
+    """Corners of a half put into the polynomial by SymPy."""
+    t = sp.symbols("t0:3")
+    places = [e for e in product(range(4), repeat=3) if sum(e) == 3]
+    polynomial = {e: F((-1) ** n * (n + 2), n + 1) for n, e in enumerate(places)}
+    middle = [F(i in edge, 2) for i in range(3)]
+    for half, moved in zip(form(polynomial, 3, 3).bisected(edge), reversed(edge), strict=True):
+        corners = [middle if i == moved else [F(i == j) for j in range(3)] for i in range(3)]
+        at = [sum(sp.Rational(c[i]) * v for c, v in zip(corners, t, strict=True)) for i in range(3)]
+        inside = sum(sp.Rational(c) * sp.prod(x**k for x, k in zip(at, e, strict=True)) for e, c in polynomial.items())
+        whole = form({e: F(int(c.p), int(c.q)) for e, c in sp.Poly(inside, *t).terms()}, 3, 3)
+        assert [c * half.scale for c in half.coefficients] == [c * whole.scale for c in whole.coefficients]
