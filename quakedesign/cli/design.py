@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Formats, Output
+from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Formats, Output, Shaking
 from quakedesign.cli.shared import (
     ExactMetres,
     ExactMetresPerSecond,
@@ -102,6 +102,7 @@ def design(
     *,
     controller: str = "all",
     box: Box = None,
+    disturbance: Shaking = None,
     options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     out: Path | None = None,
@@ -128,7 +129,7 @@ def design(
     from quakedesign.report.folder import prepare
 
     controllers(controller)
-    found = load_fault(fault, box=box)
+    found = load_fault(fault, box=box, disturbance=disturbance)
     names = controllers(controller, found)
     told = options.told(names)
     folder = out or Path(f"quakedesign-{found.name}")

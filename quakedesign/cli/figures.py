@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from quakedesign.cli.design import DesignOptions, controllers, positive
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
 from quakedesign.cli.shared import app, command_line, console, print_json, print_lines, progress
 
 _AS_USUAL = DesignOptions()
@@ -16,6 +16,7 @@ def compare(
     *,
     controller: str = "all",
     box: Box = None,
+    disturbance: Shaking = None,
     options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     output: Output = PLAIN,
@@ -38,7 +39,7 @@ def compare(
     from quakedesign.studies.paper_numbers import printed, table
 
     controllers(controller)
-    found = load_fault(fault, box=box)
+    found = load_fault(fault, box=box, disturbance=disturbance)
     names = controllers(controller, found)
     told = options.told(names)
     with progress() as tell:
@@ -61,6 +62,7 @@ def figures(
     *,
     controller: str = "all",
     box: Box = None,
+    disturbance: Shaking = None,
     options: DesignOptions = _AS_USUAL,
     published_scheme: str = "continuous",
     out: Path | None = None,
@@ -85,7 +87,7 @@ def figures(
     from quakedesign.report.folder import prepare, write_folder
 
     controllers(controller)
-    found = load_fault(fault, box=box)
+    found = load_fault(fault, box=box, disturbance=disturbance)
     names = controllers(controller, found)
     told = options.told(names)
     folder = out or Path(f"quakedesign-{found.name}-figures")

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any, Literal
 
-from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output
+from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Shaking
 from quakedesign.cli.shared import (
     ExactMetres,
     ExactMetresPerSecond,
@@ -40,6 +40,7 @@ def guarantee(
     stress: ExactPascals | None = None,
     spread: str = "0",
     box: Box = None,
+    disturbance: Shaking = None,
     out: Path | None = None,
     force: Force = False,
     output: Output = PLAIN,
@@ -99,7 +100,7 @@ def guarantee(
     from quakedesign.synthesis import answer, answer_sliding
 
     new_file(out, "certificate file", force=force)
-    began, chosen = perf_counter(), load_fault(fault, box=box)
+    began, chosen = perf_counter(), load_fault(fault, box=box, disturbance=disturbance)
     held_over = None if step is None else rational(step, "step")
     times = {
         "delay": rational(delay, "delay"),

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
 from quakedesign.cli.shared import Pascals, SquareMetresPerSecond, app
 
 
@@ -14,6 +14,7 @@ def limits(
     pressure: Pascals | None = None,
     diffusivity: SquareMetresPerSecond = 1.0,
     box: Box = None,
+    disturbance: Shaking = None,
     out: Path | None = None,
     format: Formats = ("png",),
     force: Force = False,
@@ -35,7 +36,7 @@ def limits(
     """
     from quakedesign.fault import load_fault
 
-    loaded = load_fault(fault, box=box)
+    loaded = load_fault(fault, box=box, disturbance=disturbance)
     if out is not None:
         from quakedesign.report.folder import prepare
 

@@ -29,6 +29,13 @@ FaultName = Annotated[
     ),
 ]
 DisturbanceClass = Annotated[Literal["amplitude", "rate"], Parameter(name="--class")]
+Shaking = Annotated[
+    str | None,
+    Parameter(
+        name="--disturbance",
+        help="Amplitude in place of the fault's, such as '1e-4 m/s^2', or '35 kPa' of shear stress on the fault.",
+    ),
+]
 Box = Annotated[str | None, Parameter(help="Uncertainty box: paper or ten-percent.")]
 Formats = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],

@@ -2,13 +2,50 @@
 
 from dataclasses import dataclass, fields
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from math import inf, nextafter
+from typing import TYPE_CHECKING, Any
 
+from quakedesign.errors import UnitError
 from quakedesign.fault.checks import require_finite, require_nonnegative, require_ordinary
+from quakedesign.fault.units import si_value
 from quakedesign.rationals import rational
 
 if TYPE_CHECKING:
     import sympy as sp
+
+
+def acceleration(quantity: Any, authority: Fraction, name: str) -> float:
+    """Value [m/s²] of a text such as ``"1e-4 m/s^2"``, or of a shear stress on a fault such as ``"35 kPa"``.
+
+    A stress τ accelerates a fault by τA/m: rounded up in size, so that what is proved of the float is so of the stress.
+
+    Parameters
+    ----------
+    quantity : str
+    authority : Fraction
+        A/m [m²/kg] of the fault, the nominal one.
+    name : str
+        What the quantity is, for the message.
+
+    Raises
+    ------
+    UnitError
+        For another unit.
+    """
+    try:
+        return si_value(quantity, "m/s^2", name)
+    except UnitError as error:
+        try:
+            stress = rational(si_value(quantity, "Pa", name), name)
+        except UnitError as other:
+            if "Did you mean" in str(other):
+                raise
+            raise UnitError(f"{error} A shear stress in Pa will do as well.") from None
+    exact = abs(stress) * authority
+    size = float(exact)
+    while rational(size) < exact:  # the decimal that proofs read
+        size = nextafter(size, inf)
+    return size if stress >= 0 else -size
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,9 +55,9 @@ class Disturbance:
     Attributes
     ----------
     constant : float
-        [m/s²].
+        [m/s²], in a file also as a shear stress on the fault, such as "35 kPa".
     amplitude : float
-        [m/s²], not negative.
+        [m/s²], not negative, in a file also as a shear stress on the fault, such as "35 kPa".
     frequency : float
         Angular frequency [rad/s], not negative.
     slip_growth : float

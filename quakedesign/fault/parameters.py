@@ -146,6 +146,11 @@ class Fault:
         return self.area / self.mass
 
     @property
+    def exact_authority(self) -> Fraction:
+        """A/m = 1/(ρh) [m²/kg] of the decimals given."""
+        return 1 / (rational(self.density) * rational(self.side))
+
+    @property
     def authority_range(self) -> tuple[float, float]:
         """Smallest and largest input gain μN̂ [m²/kg] over the uncertainty box."""
         low, high = self.friction.bounds

@@ -1,19 +1,22 @@
 """Fault descriptions: TOML files with unit strings, checked at the boundary and turned into `Fault`."""
 
 import tomllib
-from dataclasses import MISSING, fields
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from quakedesign.errors import ScenarioError
+from quakedesign.errors import ParameterError, ScenarioError
 from quakedesign.fault.checks import Problems, require_name, require_positive
 from quakedesign.fault.defaults import completed
-from quakedesign.fault.disturbance import Disturbance
+from quakedesign.fault.disturbance import Disturbance, acceleration
 from quakedesign.fault.friction import friction_law
 from quakedesign.fault.parameters import Fault, require_plant
 from quakedesign.fault.sources import LARGEST_FILE, source_text
 from quakedesign.fault.tables import Table
 from quakedesign.fault.uncertainty import UncertaintyBox, uncertainty_box
+from quakedesign.fault.units import si_value
 from quakedesign.rationals import rational
 
 PLANT = {
@@ -38,7 +41,7 @@ _NO_SOURCE = "no source given"
 _UNDISTURBED = "no disturbance, so that no guarantee covers one"
 
 
-def load_fault(source: str | Path, *, box: str | None = None) -> Fault:
+def load_fault(source: str | Path, *, box: str | None = None, disturbance: str | None = None) -> Fault:
     """Fault from a preset's name or the path of a TOML file.
 
     Parameters
@@ -47,6 +50,9 @@ def load_fault(source: str | Path, *, box: str | None = None) -> Fault:
         ``"real-fault"``, ``"lab-fault"``, or a path that ends in ``.toml``.
     box : str, optional
         Name of an uncertainty box that replaces the one in the file.
+    disturbance : str, optional
+        Amplitude in place of the file's: an acceleration, or a shear stress on the fault, such as ``"35 kPa"``, that
+        its own area and mass make one.
 
     Returns
     -------
@@ -63,7 +69,15 @@ def load_fault(source: str | Path, *, box: str | None = None) -> Fault:
         For a wrong unit or an unphysical value.
     """
     fault = parse_fault(source_text(source), str(source))
-    return fault.with_box(box) if box else fault
+    fault = fault.with_box(box) if box else fault
+    if disturbance is None:
+        return fault
+    if fault.friction.state_names:
+        raise ParameterError(
+            f"a disturbance of friction with a state is a stress of its own. Received {disturbance!r}. Give --stress."
+        )
+    amplitude = acceleration(disturbance, fault.exact_authority, "disturbance")
+    return fault.with_disturbance(replace(fault.disturbance, amplitude=amplitude))
 
 
 def parse_fault(text: str, name: str) -> Fault:
@@ -89,7 +103,7 @@ def _fault(table: Table, problems: Problems) -> Any:
         parts |= table.quantities({key: unit}, optional=key in OPTIONAL)
     parts["friction"] = _friction(table.table("friction"), problems)
     task = _task(table.table("task", optional=True), problems)
-    parts["disturbance"] = _disturbance(table.table("disturbance", optional=True), problems)
+    parts["disturbance"] = _disturbance(table.table("disturbance", optional=True), problems, _authority(parts))
     parts["box"] = _box(table, problems)
     table.close()
     given = {key: value for key, value in parts.items() if value is not None}
@@ -140,8 +154,18 @@ def _task(table: Table | None, problems: Problems) -> dict[str, float] | None:
     return None
 
 
-def _disturbance(table: Table | None, problems: Problems) -> Disturbance | None:
-    read: dict[str, Any] = {**table.quantities(DISTURBANCE, optional=True)} if table else {}
+def _authority(parts: Mapping[str, Any]) -> Fraction:
+    """A/m [m²/kg]; of a plant that is wrong, and refused for it, any."""
+    sides = [side for side in (parts.get("length"), parts.get("width")) if side]
+    density = parts.get("density")
+    return 1 / (rational(density) * rational(min(sides))) if density and sides else Fraction(1)
+
+
+def _disturbance(table: Table | None, problems: Problems, authority: Fraction) -> Disturbance | None:
+    def value(quantity: Any, unit: str, name: str) -> float:
+        return acceleration(quantity, authority, name) if unit == "m/s^2" else si_value(quantity, unit, name)
+
+    read: dict[str, Any] = {**table.quantities(DISTURBANCE, optional=True, read=value)} if table else {}
     if table:
         table.close()
     with problems.collected():

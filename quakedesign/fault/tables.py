@@ -1,13 +1,16 @@
 """Tables of a file with quantities, read entry by entry; whatever is wrong with them is collected."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from quakedesign.errors import ScenarioError
 from quakedesign.fault.checks import Problems
 from quakedesign.fault.units import si_value
 from quakedesign.text import nearest_name, shown
+
+Reader = Callable[[Any, str, str], float]
+"""Value in an SI unit of an entry, with the entry's name for messages."""
 
 
 class Table:
@@ -28,14 +31,16 @@ class Table:
         self._known: list[str] = []
         self._missing: list[str] = []
 
-    def quantities(self, units: Mapping[str, str], *, optional: bool = False) -> dict[str, float | None]:
+    def quantities(
+        self, units: Mapping[str, str], *, optional: bool = False, read: Reader = si_value
+    ) -> dict[str, float | None]:
         """Values in SI units by name; None for one that is wrong, nothing for an optional one that is not given."""
         found: dict[str, float | None] = {}
         for key, unit in units.items():
             if self._given(key, optional):
                 found[key] = None
                 with self.problems.collected():
-                    found[key] = si_value(self.entries[key], unit, self._name(key))
+                    found[key] = read(self.entries[key], unit, self._name(key))
             elif not optional:
                 found[key] = None
         return found

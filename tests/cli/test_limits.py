@@ -55,3 +55,13 @@ def test_friction_with_a_state_has_no_limits_and_the_line_names_what_it_has(caps
     assert said.count("\n") == 1
     assert "a limit of all controllers needs a friction law of slip and slip rate alone" in said
     assert "Use fault, derive, simulate, guarantee or design for it." in said
+
+
+def test_a_disturbance_may_be_a_shear_stress(capsys):
+    """10 Pa on 1385 kg/m³ times 10 cm."""
+    assert run("lab-fault", "--disturbance", "10 Pa", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["disturbance"] == pytest.approx(10 / 138.5, rel=1e-15)
+    assert run("lab-fault", "--disturbance", "10 kPaa") == 2
+    assert capsys.readouterr().err.endswith("whose unit is unknown. Did you mean kPa?\n")
+    assert run("crustal-patch", "--disturbance", "10 kPa") == 2
+    assert "Give --stress" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import pytest
 
 from quakedesign.errors import ParameterError, ScenarioError, UnitError, UnknownNameError
 from quakedesign.fault import load_fault, parse_fault, presets
+from quakedesign.rationals import rational
 
 REAL = (files("quakedesign.fault") / "presets" / "real-fault.toml").read_text(encoding="utf-8")
 LENGTH, BOX, DROP = 'length = "5 km"', 'uncertainty = "paper"', "drop = 0.1"
@@ -240,3 +241,62 @@ def test_a_target_beyond_the_rest_slip_is_said(target, said):
     assert "next rest slip 0.7846 m" in told
     assert ("times the rest slip" in told) is bool(said)
     assert said in told
+
+
+AMPLITUDE = 'amplitude = "3.2e-4 m/s^2"'
+
+
+@pytest.mark.parametrize(
+    ("told", "amplitude"),
+    [
+        ('amplitude = "35 kPa"', 0.0028),  # τA/m = 35 kPa/(2500 kg/m³ · 5 km)
+        ('amplitude = "4000 Pa"', 3.2e-4),
+        ('amplitude = "0 Pa"', 0.0),
+        ('amplitude = "0.35 bar"', 0.0028),
+        ('amplitude = "0.32 mm/s^2"', 3.2e-4),
+    ],
+)
+def test_a_disturbance_is_an_acceleration_or_a_shear_stress_on_the_fault(told, amplitude):
+    fault = parse_fault(edited(AMPLITUDE, told), "own.toml")
+    assert fault.disturbance.amplitude == amplitude
+    assert amplitude == pytest.approx(amplitude * fault.mass / fault.area * fault.authority)
+    again = load_fault("real-fault", disturbance=told.split('"')[1])
+    assert again == parse_fault(REAL, "x").with_disturbance(fault.disturbance)
+
+
+def test_a_constant_stress_keeps_its_sign_and_a_wider_patch_its_shorter_side():
+    text = edited(AMPLITUDE, 'constant = "-35 kPa"').replace(LENGTH, 'length = "50 km"\nwidth = "5 km"')
+    assert parse_fault(text, "own.toml").disturbance.constant == -0.0028
+
+
+def test_a_stress_is_never_made_a_smaller_acceleration():
+    """So that what is proved of the float is proved of the stress: 1 Pa/(3 kg/m³ · 7 m) is no float."""
+    text = edited(LENGTH, 'length = "7 m"').replace("2500 kg/m^3", "3 kg/m^3")
+    for stress in range(1, 60):
+        fault = parse_fault(text.replace(AMPLITUDE, f'amplitude = "{stress} Pa"'), "own.toml")
+        told, exact = rational(fault.disturbance.amplitude), F(stress, 21)
+        assert exact <= told <= exact * (1 + F(1, 2**51))
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ("3 m", "amplitude must be a quantity in m/s.2.* another dimension. A shear stress in Pa will do as well"),
+        ("35 kPaa", "whose unit is unknown. Did you mean kPa?"),
+        ("35", "without a unit. Add the unit. A shear stress"),
+    ],
+)
+def test_a_disturbance_of_another_kind_is_refused(told, said):
+    with pytest.raises(UnitError, match=said):
+        parse_fault(edited(AMPLITUDE, f'amplitude = "{told}"'), "own.toml")
+    with pytest.raises(UnitError, match=said.replace("amplitude", "disturbance")):
+        load_fault("real-fault", disturbance=told)
+
+
+def test_a_push_is_not_negative_and_friction_with_a_state_has_a_stress_of_its_own():
+    with pytest.raises(ParameterError, match="amplitude must be zero or positive"):
+        load_fault("real-fault", disturbance="-35 kPa")
+    with pytest.raises(ParameterError, match="Give --stress"):
+        load_fault("crustal-patch", disturbance="35 kPa")
+    with pytest.raises(ParameterError, match="density must be positive"):
+        parse_fault(edited(AMPLITUDE, 'amplitude = "35 kPa"').replace("2500 kg/m^3", "0 kg/m^3"), "own.toml")
