@@ -18,8 +18,6 @@ from quakedesign.certificates.loop_expressions import error_units
 from quakedesign.certificates.obligations import Obligations, degree
 from quakedesign.controllers import LoopField
 from quakedesign.errors import CertificateError, KinkError
-from quakedesign.rationals import fraction_of
-from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.term_expressions import from_terms, lie_derivative, to_terms
 from quakedesign.symbolic.terms import Term, cell_polynomial
 
@@ -45,21 +43,6 @@ class Robustness:
     rate: Fraction
     slip_power: Fraction
     rate_power: Fraction
-    source: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Decay:
-    """κ of V' ≤ −κV^{(m+d)/m}, a rational lower bound.
-
-    Attributes
-    ----------
-    rate : Fraction
-    source : str
-        ``"claimed"``, ``"bisection of the cells"`` or ``"chain of norms"``.
-    """
-
-    rate: Fraction
     source: str
 
 
@@ -174,47 +157,6 @@ def _against_function(cells: _Cells, slope: tuple[Term, ...], index: int) -> lis
         for signs, function in cells.functions()
         for push in (cells.push(slope, index, signs, beta),)
     ]
-
-
-def decay(certificate: Certificate) -> Decay:
-    """κ of V' ≤ −κV^{(m+d)/m}: the certificate's own claim, else by bisection of its cells, else by a chain of norms.
-
-    Raises
-    ------
-    CertificateError
-        When the certificate claims no κ and its cells are not polynomial.
-    """
-    claimed = _claimed(certificate)
-    if claimed is not None:
-        return Decay(rate=claimed, source="claimed")
-    cells = _Cells(certificate)
-    powers = (Fraction(cells.fallen, cells.m), Fraction(-1))
-    ratio = largest_ratio(
-        [
-            ((function, decrease), powers)
-            for signs, function in cells.functions()
-            for _, decrease in cells.decreases(signs)
-        ]
-    )
-    if ratio is not None:
-        return Decay(rate=1 / ratio, source="bisection of the cells")
-    return Decay(rate=decay_by_norms(certificate), source="chain of norms")
-
-
-def decay_by_norms(certificate: Certificate) -> Fraction:
-    """κ = ε·C^{−(m+d)/m} from the claim −V' ≥ ε·Σu_i^{m+d} and V ≤ C·Σu_i^m: exact, simple and weak.
-
-    It uses Σu_i^m ≤ (Σu_i^{m+d})^{m/(m+d)}; C bounds every monomial by weighted means.
-    """
-    cells = _Cells(certificate)
-    largest = max(
-        sum((c * e[i] / cells.m for e, c in polynomial.items() if c > 0), Fraction(0))
-        for _, polynomial in cells.obligations.function()
-        for i in range(len(cells.weights))
-    )
-    x = sp.Symbol("x", positive=True)
-    power = enclose(x ** sp.Rational(cells.fallen, cells.m), {x: (largest, largest)}).upper().fmpq()
-    return certificate.claims["decrease"] / fraction_of(power)
 
 
 def _claimed(certificate: Certificate) -> Fraction | None:

@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
-from operator import mul
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop.laws import LinearLaw, Matrix, Row
+from quakedesign.loop.laws import LinearLaw, Matrix, Row, combined
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,20 +79,20 @@ def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: 
     size = 4 + count  # rows act on (π, d, q) and then on (e1, e2)
     unit = [tuple(Fraction(i == j) for j in range(size)) for i in range(size)]
     share = weight / model.of_constant
-    level = _sum((Fraction(1), unit[1]), (share, unit[-1]), (-share, unit[0]))
+    level = combined((Fraction(1), unit[1]), (share, unit[-1]), (-share, unit[0]))
     path = unit[2 : 2 + count]
-    away = [_sum((1 / gain, q), (1 / gain, level)) for q in path]
+    away = [combined((1 / gain, q), (1 / gain, level)) for q in path]
     seen = zip(gains, (*unit[-2:], *away), strict=True)
-    asked = _sum(*((-k, row) for k, row in seen), (-1 / gain, level))
+    asked = combined(*((-k, row) for k, row in seen), (-1 / gain, level))
     pushed = zip(model.of_pressures, path, strict=True)
-    predicted = _sum(
+    predicted = combined(
         (model.of_slip, unit[-2]),
         (model.of_rate, unit[-1]),
         *pushed,
         (gain * model.of_asked, asked),
         (model.of_constant, level),
     )
-    kept = [_sum(*zip(row, path, strict=True), (gain * (1 - sum(row)), asked)) for row in model.kept]
+    kept = [combined(*zip(row, path, strict=True), (gain * (1 - sum(row)), asked)) for row in model.kept]
     rows = [predicted, level, *kept]
     return LinearLaw(
         states=("predicted_rate", "disturbance", *(f"path{i}" for i in range(count))),
@@ -102,9 +101,3 @@ def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: 
         output=asked[:-2],
         feedback=asked[-2:],
     )
-
-
-def _sum(*parts: tuple[Fraction, Row]) -> Row:
-    """Combination of rows."""
-    factors, rows = zip(*parts, strict=True)
-    return tuple(sum(map(mul, factors, column), Fraction(0)) for column in zip(*rows, strict=True))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from quakedesign.loop.held import held_loop
-from quakedesign.loop.laws import LinearLaw, Model, Row
+from quakedesign.loop.laws import LinearLaw, Model, unit_row
 from quakedesign.loop.periodic import PeriodicLoop
 
 _ONE = Fraction(1)
@@ -81,11 +81,11 @@ def sliding_loop(
     y = [model.coefficient * v / model.strength for v in push]
     y[0] -= model.stiffness / model.strength
     y[1] -= model.weakening / model.strength
-    z = _row(size, {1: _ONE})
+    z = unit_row(size, {1: _ONE})
     ageing = tuple(model.slope * a + model.state_slope * b for a, b in zip(y, z, strict=True))
     moving = model.rate * model.slope
     flow = (tuple(moving * v for v in y), tuple(-model.state_rate * v for v in ageing), *loop.flow[2:])
-    by_stress = _row(size, {0: moving / model.strength, 1: -model.state_rate * model.slope / model.strength})
+    by_stress = unit_row(size, {0: moving / model.strength, 1: -model.state_rate * model.slope / model.strength})
     by_pressure = tuple(model.coefficient * v for v in by_stress)
     left_out = {"left_out": row} if (row := loop.outputs.get("left_out")) else {}
     return replace(
@@ -93,18 +93,18 @@ def sliding_loop(
         flow=flow,
         inputs={
             "stress": by_stress,
-            "rate": _row(size, {0: model.rate, 1: -model.state_rate}),
-            "state": _row(size, {1: -model.state_rate}),
+            "rate": unit_row(size, {0: model.rate, 1: -model.state_rate}),
+            "state": unit_row(size, {1: -model.state_rate}),
             "drift": loop.inputs["drift"],
         },
         outputs={
-            "slip_error": _row(size, {0: _ONE}),
+            "slip_error": unit_row(size, {0: _ONE}),
             "log_rate": tuple(y),
             "log_state": z,
             "ageing": ageing,
             "strength": tuple(model.direct * a + model.evolution * b for a, b in zip(y, z, strict=True)),
             "push": push,
-            "asked": _row(size, {loop.states.index("valve"): _ONE}),
+            "asked": unit_row(size, {loop.states.index("valve"): _ONE}),
             **left_out,
         },
         fading={name: replace(fading, entry=by_pressure) for name, fading in loop.fading.items()},
@@ -116,7 +116,3 @@ def at_once(model: SlidingModel) -> dict[tuple[str, str], Fraction]:
     heard = {"log_rate": _ONE, "ageing": model.slope, "strength": model.direct}
     sizes = {"stress": 1 / model.strength, "left_out": model.coefficient / model.strength}
     return {(output, name): share * size for output, share in heard.items() for name, size in sizes.items()}
-
-
-def _row(size: int, entries: dict[int, Fraction]) -> Row:
-    return tuple(entries.get(i, Fraction(0)) for i in range(size))

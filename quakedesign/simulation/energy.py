@@ -35,8 +35,6 @@ class EnergyBudget:
         Work of the drifting far end on spring and dashpot [J]; 0 without drift.
     disturbance : float
         Work of φ_e, ∫mφ̂_e·x2 dt [J].
-    residual : float
-        What is missing [J]: the error of the integration, since works are integrated along with the motion.
     """
 
     kinetic: float
@@ -46,31 +44,11 @@ class EnergyBudget:
     viscous: float
     far_field: float
     disturbance: float
-    residual: float
 
-    @classmethod
-    def of(
-        cls,
-        *,
-        kinetic: float,
-        elastic: float,
-        frictional: float,
-        injection: float,
-        viscous: float,
-        far_field: float,
-        disturbance: float,
-    ) -> "EnergyBudget":
-        """Budget with the residual that its parts leave."""
-        return cls(
-            kinetic=kinetic,
-            elastic=elastic,
-            frictional=frictional,
-            injection=injection,
-            viscous=viscous,
-            far_field=far_field,
-            disturbance=disturbance,
-            residual=kinetic + elastic + frictional + viscous - far_field - disturbance,
-        )
+    @property
+    def residual(self) -> float:
+        """What is missing [J]: the error of the integration, since works are integrated along with the motion."""
+        return self.kinetic + self.elastic + self.frictional + self.viscous - self.far_field - self.disturbance
 
     @property
     def relative_residual(self) -> float:
@@ -80,7 +58,7 @@ class EnergyBudget:
 
     def to_dict(self) -> dict[str, float]:
         """Return the energies [J] by name."""
-        return asdict(self)
+        return asdict(self) | {"residual": self.residual}
 
     @staticmethod
     def unit(name: str) -> str:
@@ -179,7 +157,7 @@ class Metered(Stepped):
         static = normal * stress * float(self.static_friction)
         tension, opened = static - damping * drift, drift * time - slip
         pull = tension * time + stiffness * (drift * time**2 / 2 - integrals["sum_slip"]) + damping * opened
-        return EnergyBudget.of(
+        return EnergyBudget(
             kinetic=mass * rate**2 / 2,
             elastic=mass * (tension + stiffness * opened / 2) * opened,
             frictional=mass * (integrals["work_weakening"] + static * slip - integrals["work_injection"]),

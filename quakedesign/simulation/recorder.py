@@ -142,7 +142,7 @@ class Recorder:
         if self.initial == (0.0, 0.0):
             return whole
         now, before = whole.to_dict(), self.loop.budget(dict.fromkeys(WORKS, 0.0), 0.0, *self.initial).to_dict()
-        return EnergyBudget.of(**{name: now[name] - before[name] for name in now if name != "residual"})
+        return EnergyBudget(**{name: now[name] - before[name] for name in now if name != "residual"})
 
     def advance(self, vector: Any, method: type[Integrator]) -> Any:
         """Vector (SX) after its own instant has been watched and one step has been taken."""

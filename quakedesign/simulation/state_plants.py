@@ -61,7 +61,7 @@ class SpringSlider:
     def of(cls, fault: Fault, *, inertia: bool = True) -> "SpringSlider":
         """Spring-slider of a fault, with its damping.
 
-        For radiation damping replace the fault's damping by `quakedesign.symbolic.state_plant.radiation_damping`.
+        For radiation damping replace the fault's damping by `quakedesign.fault.defaults.radiation_damping`.
         """
         return cls(
             law=fault.friction,

@@ -303,7 +303,7 @@ def _energy(
     def work(force: "np.ndarray", path: "np.ndarray") -> float:
         return float(area * np.trapezoid(force, path))
 
-    return EnergyBudget.of(
+    return EnergyBudget(
         kinetic=gained(0.5 * slider.mass * rate**2),
         elastic=gained(0.5 * slider.stiffness * stretch**2),
         frictional=work((slider.normal_stress - pressure) * friction, slip),

@@ -245,15 +245,6 @@ def error_dynamics(names: tuple[str, ...] = ()) -> plant.ErrorDynamics:
     return plant.ErrorDynamics(beta=beta, h=h)
 
 
-@cache
-def radiation_damping() -> sp.Expr:
-    """η_rad [kg/s] = A·G/(2c_s) with c_s = √(G/ρ): the impedance of waves that leave both sides (Rice 1993).
-
-    J. R. Rice, J. Geophys. Res. 98(B6), 9885. Put it in place of a fault's ``damping`` (`dataclasses.replace`).
-    """
-    return plant.A * shear_modulus / (2 * sp.sqrt(shear_modulus / density))
-
-
 def is_steady(law: FrictionLaw) -> bool:
     """Whether sliding at a constant rate leaves a law steady: its state rests, and nothing depends on slip."""
     variables = (plant.x1, rate, *state_symbols(law.state_names))

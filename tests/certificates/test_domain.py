@@ -17,7 +17,7 @@ from quakedesign.certificates.matched import (
     least_authority,
 )
 from quakedesign.certificates.premises import feedforward_variants, sliding_mode_premises
-from quakedesign.certificates.robustness import decay, decay_by_norms, robustness
+from quakedesign.certificates.robustness import robustness
 from quakedesign.controllers import control_law
 from quakedesign.controllers.feed_forward import FEED_FORWARDS, feed_forward
 from quakedesign.errors import CertificateError, ParameterError
@@ -148,24 +148,15 @@ def test_the_bounds_on_what_the_decrease_withstands_are_rigorous_and_not_loose(f
     e = on_level(certificate, np.random.default_rng(2), 300_000, 1.0)
     nu, integral = law(e, found.controller.gains.values())
     slopes = gradient(certificate, e)
-    least, slip, rate = np.inf, 0.0, 0.0
+    slip, rate = 0.0, 0.0
     for beta in (1.0, 3353 / 2353):
         for d in (-1, 1):
             fall = -(slopes[0] * e[1] + slopes[1] * beta * (nu + e[2]) + slopes[2] * (integral + d))
-            least = min(least, fall.min())
             slip = max(slip, np.max(beta * np.abs(slopes[1] * e[0]) / fall))
             rate = max(rate, np.max(beta * np.abs(slopes[1] * e[1]) / fall))
     assert slip <= float(known.slip) <= 1.12 * slip
     assert rate <= float(known.rate) <= 1.12 * rate
     assert (known.slip_power, known.rate_power) == (F(2, 5), F(1, 5))
-    assert least >= float(decay(certificate).rate) >= least / 1.12
-    # the chain of norms is rigorous too, and orders of magnitude weaker
-    assert 0 < decay_by_norms(certificate) < decay(certificate).rate / 100
-
-
-def test_a_claimed_decay_is_taken_as_it_is(found):
-    claiming = replace(found.certificate, claims={**found.certificate.claims, "decay": F(1, 77)})
-    assert (decay(claiming).rate, decay(claiming).source) == (F(1, 77), "claimed")
 
 
 def test_feed_forward_enlarges_the_domain(variants):

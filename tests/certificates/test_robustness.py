@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 
 from quakedesign.certificates import Certificate, Loop
-from quakedesign.certificates.robustness import _Cells, decay, decay_by_norms, robustness
+from quakedesign.certificates.robustness import _Cells, robustness
 from quakedesign.controllers import LoopField
 from quakedesign.symbolic.terms import Term
 
@@ -103,30 +103,6 @@ def test_powers_of_v_follow_the_weights():
     assert (cells.power(0), cells.power(1)) == (F(1, 2), F(1, 4))
 
 
-def test_the_decay_of_a_decoupled_loop():
-    """(2u^2 + 2 beta w^2) / (u^2 + w^2) is 2 at least, at beta = 1."""
-    found = decay(certificate())
-    assert found.source == "bisection of the cells"
-    assert 2 / 1.051 <= float(found.rate) <= 2
-    assert decay(certificate(decay="1/7")).rate == F(1, 7)
-
-
-def test_the_chain_of_norms_by_hand():
-    """V = e1^2 + e2^2 + 4 e1 e2 is at most (1 + 2)(u^2 + w^2)."""
-    assert decay_by_norms(certificate(decrease="1/2")) <= F(1, 2)
-    assert float(decay_by_norms(certificate(decrease="1/2"))) == pytest.approx(0.5, rel=1e-8)
-    assert float(decay_by_norms(certificate(product(4), decrease="1/2"))) == pytest.approx(1 / 6, rel=1e-8)
-    heavy = replace(weighted(), lyapunov=(power(16, "e1", "4/3"), power(1, "e2", 2)), claims={"decrease": F(3)})
-    assert float(decay_by_norms(heavy)) == pytest.approx(3 / 8, rel=1e-8)  # 16^(3/4) = 8
-
-
-def test_without_any_bound_the_chain_of_norms_serves():
-    """V' is zero at u2 = 0, so that no piece bounds the quotient."""
-    found = decay(replace(weighted(), claims={"decrease": F(2)}))
-    assert found.source == "chain of norms"
-    assert float(found.rate) == pytest.approx(2, rel=1e-8)
-
-
 def decoupled():
     """e1' = -[e1]^(2/3), e2' = -beta [e2]^(1/2), V = |e1|^(4/3) + |e2|^2: u^4 + w^4 and -V' = 4/3 u^3 + 2 beta w^3."""
     base = certificate()
@@ -144,16 +120,15 @@ def sampled():
     falls = {beta: 4 / 3 * u**3 + 2 * beta * w**3 for beta in (1, 4)}
     slip = max((beta * 2 * w**2 * u**3 / (fall * value**0.5)).max() for beta, fall in falls.items())
     rate = max((beta * 2 * w**2 * w**2 / (fall * value**0.25)).max() for beta, fall in falls.items())
-    return slip, rate, min((fall / value**0.75).min() for fall in falls.values())
+    return slip, rate
 
 
 def test_weights_enter_the_powers_of_v():
-    slip, rate, least = sampled()
+    slip, rate = sampled()
     found = robustness(decoupled())
     assert covers(found.slip, slip)
     assert covers(found.rate, rate)
     assert (found.slip_power, found.rate_power) == (F(1, 2), F(1, 4))
-    assert least / 1.051 <= float(decay(decoupled()).rate) <= least * (1 + 1e-9)
 
 
 def test_both_ends_of_uncertain_units_count():
@@ -170,11 +145,6 @@ def test_both_ends_of_uncertain_units_count():
     assert covers(found.rate, 15 / 14)
 
 
-def test_the_chain_of_norms_takes_positive_terms_alone():
-    """e1^2 + e2^2 - e1 e2 on the cells of one sign, + e1 e2 on the others: at most 3/2 (u^2 + w^2)."""
-    assert float(decay_by_norms(certificate(product(-1), decrease="3"))) == pytest.approx(2, rel=1e-8)
-
-
 def test_sizes_of_the_states_change_nothing_but_the_time():
     found = robustness(certificate(bound_e1=F(1, 16), bound_e2=F(9)))
     assert covers(found.slip, 1)
@@ -188,12 +158,6 @@ def test_without_one_of_both_bounds_nothing_is_said(missing, monkeypatch):
     found = iter([None, F(1)] if missing == 0 else [F(1), None])
     monkeypatch.setattr("quakedesign.certificates.robustness.largest_ratio", lambda _: next(found))
     assert robustness(certificate()) is None
-
-
-def test_what_lowers_a_function_is_not_counted_in_its_size():
-    """V = e1^2 + e2^2 - |e1||e2| is at most 1 (u^2 + w^2); with its negative term counted it would be 1/2."""
-    less = replace(certificate(decrease=3), lyapunov=(*certificate().lyapunov, product(-1, "a")))
-    assert float(decay_by_norms(less)) == pytest.approx(3, rel=1e-9)
 
 
 def test_where_no_largest_ratio_is_found_nothing_is_said(monkeypatch):

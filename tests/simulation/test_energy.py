@@ -141,9 +141,9 @@ def test_a_smooth_controlled_run_closes_and_a_chattering_one_tells_on_itself():
 
 def test_a_budget_counts_its_own_residual():
     parts = {"kinetic": 1.0, "elastic": -5.0, "frictional": 3.0, "viscous": 1.5, "far_field": 0.25, "disturbance": 0.5}
-    found = EnergyBudget.of(injection=7.0, **parts)
+    found = EnergyBudget(injection=7.0, **parts)
     assert found.residual == -0.25
     assert found.relative_residual == 0.25 / 7
     assert EnergyBudget.unit("viscous") == "J"
-    assert EnergyBudget.of(injection=0.0, **dict.fromkeys(parts, 0.0)).relative_residual == 0
+    assert EnergyBudget(injection=0.0, **dict.fromkeys(parts, 0.0)).relative_residual == 0
     assert np.isfinite(list(found.to_dict().values())).all()

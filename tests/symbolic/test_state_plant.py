@@ -248,14 +248,6 @@ def test_the_third_order_plant_rests_in_steady_sliding():
         assert [sp.simplify(r.subs(at)) for r in quiet] == [0, 0, 0]
 
 
-def test_radiation_damping_is_half_the_impedance():
-    A, G, rho = plant.A, state_plant.shear_modulus, state_plant.density
-    assert sp.simplify(state_plant.radiation_damping() - A * sp.sqrt(G * rho) / 2) == 0
-    # 30 GPa and 3464 m/s give 4.33 MPa·s/m, a common number
-    value = state_plant.radiation_damping().subs({A: 1, G: 30 * 10**9, rho: 2500})
-    assert float(value) == pytest.approx(30e9 / (2 * 3464.1016), rel=1e-7)
-
-
 def test_with_state_the_error_dynamics_carry_it():
     derived = state_plant.error_dynamics(("theta",))
     friction = plant.mu(

@@ -59,11 +59,6 @@ class Law:
         )
         return cls(sp.sympify(controller.pressure(signals)), tuple(controller.integral_rates(signals)), integrals)
 
-    @property
-    def feed_forward(self) -> sp.Expr:
-        """What the law asks for without errors and integral states [Pa]."""
-        return self.pressure.subs(dict.fromkeys((slip_error, rate_error, *self.integrals), 0))
-
 
 @dataclass(frozen=True)
 class Lifted:

@@ -72,8 +72,8 @@ def prove(
         When the input cannot be read, or the multiplier is not shown to be positive.
     """
     start = perf_counter()
-    names, exact, inequalities, equalities, factor = _read(polynomial, on, multiplier, variables)
-    exact = _with_margin(exact, margin, len(names))
+    names, given, inequalities, equalities, factor = read(polynomial, on, multiplier, variables)
+    exact = _with_margin(given, margin, len(names))
     growth = _GROWTH if (inequalities or equalities) and degree_bound is None else (0,)
     answer: Answer | None = None
     for chosen in _multipliers(exact, factor, inequalities, equalities, len(names)):
@@ -135,10 +135,6 @@ def _decides(answer: Answer) -> bool:
 def versions() -> dict[str, str]:
     """Versions of what an answer rests on."""
     return {name: version(name) for name in ("quakedesign", "clarabel", "python-flint")}
-
-
-def _read(polynomial: Any, on: Sequence[Any], multiplier: Any, variables: Sequence[Any] | None) -> Any:
-    return read(polynomial, on, multiplier, variables)
 
 
 def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:

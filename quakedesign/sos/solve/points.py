@@ -57,10 +57,6 @@ def _on_sphere(statement: Statement, hints: Any, starts: int) -> Iterator[list[f
     signed = [any(g.keys() == {_unit(size, i)} for g in statement.inequalities) for i in range(size)]
     lift = {(*(2 * x if s else x for x, s in zip(e, signed, strict=True)), 2 * (top - sum(e))): c for e, c in p.items()}
     form = Arrays(lift, size + 1)
-    weights = np.array([2.0 if s else 1.0 for s in signed])
-
-    def spread(v: Any) -> Any:
-        return np.append(v, 0.0 if homogeneous else 1.0) if homogeneous else v
 
     def value(v: Any) -> Any:
         full = np.append(v, 1.0) if homogeneous else v
@@ -75,7 +71,6 @@ def _on_sphere(statement: Statement, hints: Any, starts: int) -> Iterator[list[f
         scale = level ** (top / 2)
         return number / scale, gradient / scale - number / scale * (top / 2) * grown / level
 
-    del spread, weights
     random = np.random.default_rng(_SEED)
     begin = [*(_lifted(h, signed, homogeneous) for h in hints)]
     count = size if homogeneous else size + 1

@@ -184,7 +184,7 @@ class Program:
         answers = []
         for parts, template in self._required:
             polynomial = combination(zip((Fraction(1), *values), parts, strict=True))
-            answer = decide(_with_polynomial(template, polynomial))
+            answer = decide(replace(template, polynomial=polynomial))
             if answer.verdict is not Positivity.SOS:
                 return None
             answers.append(answer)
@@ -258,10 +258,6 @@ def _grid(width: Fraction) -> int:
     while Fraction(8, grid) > width:
         grid *= 10
     return grid
-
-
-def _with_polynomial(template: Statement, polynomial: Mapping[Exponents, Fraction]) -> Statement:
-    return replace(template, polynomial=polynomial)
 
 
 def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fraction:

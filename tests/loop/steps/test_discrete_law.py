@@ -38,7 +38,8 @@ class Told:
 def test_a_law_is_told_the_signals_of_a_sample():
     law = Law.of(Told(), 0.0)
     assert (law.rates, law.integrals) == ((slip_error,), (ONE,))
-    assert law.feed_forward == 7 * discrete_law.slip + 11 * discrete_law.acceleration
+    told = 2 * slip_error + 3 * rate_error + 5 * ONE
+    assert law.pressure == told + 7 * discrete_law.slip + 11 * discrete_law.acceleration
     assert Law.of(None, 5.5) == Law(sp.Float(5.5), (), ())
 
 

@@ -6,19 +6,16 @@ from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import published
-from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.analysis.common_quadratic import (
     CommonQuadratic,
     robust_stability,
     sector_loop,
-    synthesise,
 )
 from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
 from quakedesign.synthesis.linear.design.riccati import riccati_design
@@ -73,40 +70,6 @@ def test_the_decay_rate_of_a_known_pair():
     second = ((F(-1), F(0)), (F(-1), F(-1)))
     found = CommonQuadratic(Polytope(states=("x", "y"), vertices={"a": first, "b": second})).fastest(1e-5)
     assert found.rate == pytest.approx(0.5, abs=2e-3)
-
-
-@pytest.mark.parametrize("fault_name", ["real-fault", "lab-fault"])
-def test_designed_gains_have_the_rate_and_respect_their_limits(fault_name):
-    fault = qd.load_fault(fault_name)
-    needed, rate = sectors(fault), F(str(round(0.3 * fault.natural_frequency, 6)))
-    limits = [2 * k for k in riccati_design(fault).controller.gains.values()]
-    found = synthesise(needed, rate=rate, largest_gains=limits)
-    assert found.certificate.check() is Verdict.PROVED
-    assert found.certificate.claims["rate"] >= rate
-    assert all(abs(k) <= limit for k, limit in zip(found.controller.gains.values(), limits, strict=True))
-    poles = vertex_poles(needed, list(found.controller.gains.values()))
-    assert max(z.real for z in poles) < -float(rate)
-
-
-def test_gains_do_not_depend_on_the_scale_of_the_fault():
-    # the two faults are similar (ERRATA 3 and METHODS): the same nondimensional gains for the same nondimensional task
-    scaled = []
-    for name in ("real-fault", "lab-fault"):
-        fault = qd.load_fault(name)
-        pace, b = fault.natural_frequency, float(sectors(fault).authority)
-        powers = np.array([2, 1, 3, 4])
-        limits = [F(c * pace**n / b) for c, n in zip((200, 30, 300, 200), powers, strict=True)]
-        found = synthesise(sectors(fault), rate=F(0.3 * pace), largest_gains=limits)
-        scaled.append(np.array([float(k) for k in found.controller.gains.values()]) * b / pace**powers)
-    np.testing.assert_allclose(scaled[0], scaled[1], rtol=5e-3)
-
-
-def test_impossible_wishes_have_no_answer(real):
-    gains = list(riccati_design(real).controller.gains.values())
-    assert synthesise(sectors(real), rate=F(1000), largest_gains=gains) is None
-    assert synthesise(sectors(real), rate=F(1, 10), largest_gains=[k / 10**6 for k in gains]) is None
-    with pytest.raises(ParameterError, match="must be positive"):
-        synthesise(sectors(real), rate=F(0), largest_gains=gains)
 
 
 def test_one_vertex_is_one_vertex(real):

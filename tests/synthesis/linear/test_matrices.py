@@ -18,11 +18,10 @@ def floats(a):
     return np.array(a, dtype=float)
 
 
-def test_products_sums_and_inverses_agree_with_floating_point():
+def test_products_and_sums_agree_with_floating_point():
     a, b, c = random(4), random(4), random(4)
     assert floats(m.product(a, b, c)) == pytest.approx(floats(a) @ floats(b) @ floats(c))
     assert floats(m.total(a, b, m.times(-2, c))) == pytest.approx(floats(a) + floats(b) - 2 * floats(c))
-    assert m.product(a, m.inverse(a)) == m.diagonal((F(1),) * 4)
     assert floats(m.lyapunov(a, m.diagonal((F(1), F(2), F(3), F(4))))) == pytest.approx(
         floats(a).T @ np.diag([1, 2, 3, 4]) + np.diag([1, 2, 3, 4]) @ floats(a)
     )

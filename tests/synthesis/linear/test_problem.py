@@ -117,17 +117,6 @@ def test_a_loop_and_its_twin_have_the_same_poles():
     )
 
 
-def test_the_middle_of_the_ranges_needs_a_smaller_bound():
-    # ERRATA 10: friction that weakens with slip rate is one-sided
-    problem = LinearProblem.of(qd.load_fault("real-fault"))
-    middle = problem.centred()
-    assert middle.bounds[0] < problem.bounds[0]
-    low, high = problem.sectors.slip
-    assert middle.bounds[0] == (high - low) / 2 / problem.sectors.authority
-    for s in (low, high):
-        assert abs(s + middle.stiffness) <= middle.bounds[0] * problem.sectors.authority
-
-
 def test_an_authority_that_is_not_the_least_is_refused():
     problem = LinearProblem.of(qd.load_fault("real-fault"))
     with pytest.raises(ParameterError, match="the least: beta from 1"):

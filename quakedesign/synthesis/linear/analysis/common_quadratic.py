@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,7 @@ from scipy.linalg import eigh
 from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
 from quakedesign.certificates.obligations import Obligation, claimed, different
 from quakedesign.certificates.sectors import Sectors
-from quakedesign.controllers.elqr import ExtendedLQR
-from quakedesign.errors import CertificateError, ParameterError, WorkError
+from quakedesign.errors import CertificateError, WorkError
 from quakedesign.rationals import rational
 from quakedesign.sos.exact.polynomial import constant
 from quakedesign.sos.exact.proofs import Square
@@ -175,66 +173,6 @@ def _decimal_terms(states: Sequence[str], form: Any) -> tuple[Term, ...]:
     return quadratic_terms(states, lambda i, j: rational(float(both[i, j] / size)))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MatrixDesign:
-    """Gains from a matrix inequality, with the exact proof of their decay rate over the box.
-
-    Attributes
-    ----------
-    controller : ExtendedLQR
-    certificate : Certificate
-        Its claim ``rate`` is at least the rate asked for.
-    gain_use : float
-        √Σ(k_i/limit_i)² [-]; below 1.
-    """
-
-    controller: ExtendedLQR
-    certificate: Certificate
-    gain_use: float
-
-
-def synthesise(sectors: Sectors, *, rate: Fraction, largest_gains: Sequence[Fraction]) -> MatrixDesign | None:
-    """Smallest gains that make the loop decay at a rate over the whole box, within bounds on the gains.
-
-    With Q = P⁻¹ ⪰ diag(1/limit_i²) and Y = KQ the inequality AQ + QAᵀ − βB(Y) + … + 2aQ ≺ 0 is linear at every vertex,
-    and KQKᵀ ≤ t gives Σ(k_i/limit_i)² ≤ t (Bernussou, Peres, Geromel 1989, Systems & Control Letters 13). Sufficient,
-    not necessary: another V might allow smaller gains.
-
-    Parameters
-    ----------
-    sectors : Sectors
-    rate : Fraction
-        Decay rate a [1/s], positive.
-    largest_gains : sequence of 4 Fraction
-        Limits of |k1| … |k4| in SI, positive.
-
-    Returns
-    -------
-    MatrixDesign or None
-        None when no gains within the limits are found.
-
-    Raises
-    ------
-    ParameterError
-        For a rate or limits that are not positive.
-    """
-    limits = tuple(rational(v, "limit of a gain") for v in largest_gains)
-    if rate <= 0 or len(limits) != 4 or min(limits) <= 0:
-        raise ParameterError(f"rate and four limits of gains must be positive. Received {rate}, {limits}.")
-    for headroom in (1.02, 1.1, 1.3):
-        gains, use = _feedback(sectors, float(rate) * headroom, [float(v) for v in limits])
-        if gains is None:
-            return None
-        exact = tuple(Fraction(f"{g:.9e}") for g in gains)
-        if any(abs(g) > limit for g, limit in zip(exact, limits, strict=True)):
-            continue
-        controller = ExtendedLQR.from_values(exact, feedback="error")
-        certificate = robust_stability(sector_loop(controller, sectors), fastest=True)
-        if certificate is not None and certificate.claims["rate"] >= rate:
-            return MatrixDesign(controller=controller, certificate=certificate, gain_use=use)
-    return None
-
-
 def sector_loop(controller: Any, sectors: Sectors) -> Loop:
     """Loop of a linear feedback over sectors."""
     return loop_of(
@@ -244,27 +182,3 @@ def sector_loop(controller: Any, sectors: Sectors) -> Loop:
         constants={"b": sectors.authority},
         uncertain=sectors.ranges(),
     )
-
-
-def _feedback(sectors: Sectors, rate: float, limits: Sequence[float]) -> tuple[list[float] | None, float]:
-    """Gains of the program in the limits' own units: x_i counted in 1/limit_i, time in 1/pace, p in its own."""
-    import cvxpy as cp
-
-    units = 1 / np.array(limits)
-    chain = np.zeros((4, 4))
-    chain[0, 1] = chain[2, 0] = chain[3, 2] = 1
-    pace = limits[2] / limits[0] + limits[3] / limits[2]
-    B = np.zeros((4, 1))
-    B[1, 0] = float(sectors.authority) / units[1] / pace
-    Q, Y, cost = cp.Variable((4, 4), symmetric=True), cp.Variable((1, 4)), cp.Variable((1, 1))
-    bounds = [Q >> np.eye(4), cp.bmat([[cost, Y], [Y.T, Q]]) >> 0, cost <= 1]
-    for beta, s, w in product(*(sorted(set(r)) for r in (sectors.beta, sectors.slip, sectors.rate))):
-        A = chain.copy()
-        A[1, :2] = float(s), -float(w)
-        A = A * units / units[:, None] / pace
-        flow = A @ Q - float(beta) * B @ Y
-        bounds.append(flow + flow.T + 2 * rate / pace * Q << 0)
-    if not solve(cp.Problem(cp.Minimize(cost[0, 0]), bounds)) or Y.value is None or Q.value is None:
-        return None, 0.0
-    scaled = np.linalg.solve(np.asarray(Q.value), np.asarray(Y.value)[0])
-    return [float(k / u) for k, u in zip(scaled, units, strict=True)], float(np.linalg.norm(scaled))

@@ -36,20 +36,12 @@ class FeedbackComparison:
         Largest of the terms of Kx [Pa] at rest at the target slip.
     pressure : float
         Largest |p*| [Pa] that they add up to.
-    integral : float
-        Largest |ξ2| [m s²] at rest at a constant reference up to the target slip.
     """
 
     feedback: str
     lag: float
     largest_term: float
     pressure: float
-    integral: float
-
-    @property
-    def cancellation(self) -> float:
-        """Largest term over the pressure that is left of the sum [-]."""
-        return self.largest_term / self.pressure if self.pressure else float("inf")
 
 
 def compare_feedback(fault: Fault, gains: Sequence[Fraction]) -> tuple[FeedbackComparison, ...]:
@@ -62,12 +54,11 @@ def compare_feedback(fault: Fault, gains: Sequence[Fraction]) -> tuple[FeedbackC
         K in SI, k4 not 0.
     """
     problem, target = LinearProblem.of(fault), rational(fault.reference.target_slip)
-    k1, _, _, k4 = (float(k) for k in gains)
     rest = max(abs(float(p)) for p in rest_pressure(fault, (Fraction(0), target), nominal=True, pieces=200))
     bend = largest_reference_acceleration(fault)
     comparisons = []
     for feedback in FEEDBACKS:
-        offset = k1 * float(target) if feedback == "state" else 0.0
+        offset = float(gains[0]) * float(target) if feedback == "state" else 0.0
         lag = max(abs(lag_coefficient(problem, gains, vertex, feedback)) for vertex in problem.vertices()) * bend
         comparisons.append(
             FeedbackComparison(
@@ -75,7 +66,6 @@ def compare_feedback(fault: Fault, gains: Sequence[Fraction]) -> tuple[FeedbackC
                 lag=lag,
                 largest_term=rest + abs(offset),
                 pressure=rest,
-                integral=(rest + abs(offset)) / abs(k4),
             )
         )
     return tuple(comparisons)

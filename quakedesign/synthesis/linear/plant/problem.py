@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
@@ -121,18 +121,6 @@ class LinearProblem:
                 row_bounds=(g1 * scales.slip / scales.pressure, g2 * scales.slip / t / scales.pressure),
                 largest_effective_stress=old.largest_effective_stress / scales.pressure,
             ),
-        )
-
-    def centred(self) -> "LinearProblem":
-        """Return the same ranges about the middle of both: g1 and g2 are then half as wide as one-sided ranges ask for.
-
-        Theorem 2 needs some nominal plant, not the fault's own (ERRATA 10).
-        """
-        old = self.sectors
-        middles = [(low + high) / 2 for low, high in (old.slip, old.rate)]
-        widths = [(high - low) / 2 / old.authority for low, high in (old.slip, old.rate)]
-        return LinearProblem(
-            stiffness=-middles[0], damping=middles[1], sectors=replace(old, row_bounds=(widths[0], widths[1]))
         )
 
     def vertices(self) -> list[Vertex]:

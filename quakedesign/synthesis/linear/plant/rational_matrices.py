@@ -83,12 +83,6 @@ def diagonal(values: Sequence[Fraction]) -> Matrix:
     return tuple(tuple(v if i == j else Fraction(0) for j in range(len(values))) for i, v in enumerate(values))
 
 
-def inverse(a: Rows) -> Matrix:
-    """A⁻¹; ZeroDivisionError for a singular matrix."""
-    inverted = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in a]).inv()
-    return tuple(tuple(fraction_of(v) for v in row) for row in inverted.tolist())
-
-
 def trace_of_product(a: Rows, b: Rows) -> Fraction:
     """Trace of AB for symmetric matrices."""
     return sum((x * y for p, q in zip(a, b, strict=True) for x, y in zip(p, q, strict=True)), Fraction(0))
