@@ -1,7 +1,9 @@
 """``guarantee`` of faults with rate-and-state friction: the sentence first, and one line for what does not apply."""
 
 import json
+from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 
@@ -13,10 +15,12 @@ from quakedesign.cli import main
 from quakedesign.fault import load_fault
 from quakedesign.loop import LinearLaw
 from quakedesign.synthesis.guaranteed import sliding_answer
+from quakedesign.synthesis.guaranteed.slow_sliding import proved_sliding
 
 LAW = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(Fraction(1), Fraction(0)))
 HELD = Held(law=LAW, step=Fraction(300))
 CLAIMS = SlidingClaims(**{name: UpperBound(Fraction(1)) for name in SlidingClaims.__dataclass_fields__})
+PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
 NONE = NoGuarantee(reason="too much", small_gain=None)
 LAGGED = ("guarantee", "creeping-patch", "--lag", "200 s", "--step", "4000 s")
 
@@ -60,6 +64,12 @@ def test_an_estimate_of_the_largest_stress_that_is_too_large_is_lowered_until_it
     found = sliding_answer.answer_sliding(load_fault("crustal-patch"), diffusion=Fraction(800))
     assert found.proved
     assert tried == [41_000, 36_000, 30_000]
+
+
+def test_a_stress_far_beyond_what_a_law_stands_has_no_guarantee():
+    known = parse_sliding((PROOFS / "sliding_crustal-patch.json").read_text())
+    found = proved_sliding(replace(known.task, stress=20 * known.task.stress), known.held)
+    assert found.reason.startswith("a stress of 5e+05 Pa is not shown to leave |ln(v/V)| below 0.5")
 
 
 @pytest.mark.parametrize(

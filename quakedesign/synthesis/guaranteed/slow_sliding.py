@@ -207,7 +207,10 @@ def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims 
         wider = {k: float(found[k]) * _ROOM / _NEAR for k in SlidingClaims.__dataclass_fields__}
         if min(float(getattr(claims, k)) / v for k, v in wider.items() if k != "log_rate") >= 1 / _ROOM:
             break
-        claims = _as_claims({**wider, "log_rate": log_rate})
+        try:
+            claims = _as_claims({**wider, "log_rate": log_rate})
+        except ParameterError:  # larger than claims may be
+            return None
     else:
         return None
     return claims if float(found["log_rate"]) < float(log_rate) else None
