@@ -41,7 +41,7 @@ grows to H(e^{λT} − 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 for ev
 z ≥ ζ > 0 keeps x1 positive, so the premise x1 ≥ 0 lasts, and takes x1 beyond E. ∎
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
@@ -53,6 +53,7 @@ from flint import arb, arb_mat, ctx
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Task
 from quakedesign.certificates.guarantee.ball_matrices import ball, upper
+from quakedesign.certificates.slow_sliding.push import SlidingPush
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import fraction_of
 
@@ -132,22 +133,22 @@ def smallest_peak(task: Task, step: Fraction, delay: Fraction = _ZERO) -> Smalle
     return best if best.slip_rate_error > 0 else None
 
 
-def longest_reaction(task: Task, withdrawal: Fraction) -> UpperBound | None:
+def longest_reaction(task: Task | SlidingPush, withdrawal: Fraction) -> UpperBound | None:
     """T + θ [s] beyond which no controller holds the fault, without a diffusive path; None where none is proved."""
     _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
 
-    def longest(plant: _Pushed) -> Any:
+    def longest(plant: _Pushed | SlidingPush) -> Any:
         ratio = ball(plant.authority * withdrawal / task.amplitude)
         return _at_least_one(ratio).log() / plant.pole
 
     return _least(task, longest)
 
 
-def longest_diffusion(task: Task, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
+def longest_diffusion(task: Task | SlidingPush, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
     """L²/D [s] beyond which no controller holds the fault with samples T apart; None where none is proved."""
     _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
 
-    def longest(plant: _Pushed) -> Any:
+    def longest(plant: _Pushed | SlidingPush) -> Any:
         pole = plant.pole
         ratio = ball(plant.authority * withdrawal / task.amplitude) * (-pole * ball(step)).exp()
         return _at_least_one(ratio).acosh() ** 2 / pole
@@ -162,7 +163,7 @@ def farthest_well(diffusion_time: UpperBound, diffusivity: Fraction) -> UpperBou
         return UpperBound(upper(ball(diffusion_time * diffusivity).sqrt()))
 
 
-def smallest_withdrawal(task: Task, step: Fraction) -> LowerBound | None:
+def smallest_withdrawal(task: Task | SlidingPush, step: Fraction) -> LowerBound | None:
     """P [Pa] below which no controller holds the fault with samples T apart; None where none is proved."""
     _require(step >= 0, "a step of at least 0", step)
     with ctx.workprec(_BITS):
@@ -172,7 +173,7 @@ def smallest_withdrawal(task: Task, step: Fraction) -> LowerBound | None:
     return LowerBound(max(withdrawals)) if withdrawals else None
 
 
-def _least(task: Task, value: Callable[[_Pushed], Any]) -> UpperBound | None:
+def _least(task: Task | SlidingPush, value: Callable[[_Pushed | SlidingPush], Any]) -> UpperBound | None:
     with ctx.workprec(_BITS):
         bounds = [upper(value(plant)) for plant in _pushed(task)]
     return UpperBound(min(bounds)) if bounds else None
@@ -184,7 +185,10 @@ def _corners(task: Task) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
         yield k - task.growths[0], eta - task.growths[1], area
 
 
-def _pushed(task: Task) -> list[_Pushed]:
+def _pushed(task: Task | SlidingPush) -> Sequence[_Pushed | SlidingPush]:
+    """Plants of theorem 2, which is that of `SlidingPush` too."""
+    if isinstance(task, SlidingPush):
+        return [task] if task.grows else []
     law = task.friction
     plants = [
         _Pushed(area * law.weakening * task.normal_stress - kappa, w, area * law.static)

@@ -13,6 +13,7 @@ def limits(
     *,
     pressure: Pascals | None = None,
     diffusivity: SquareMetresPerSecond = 1.0,
+    stress: Pascals | None = None,
     box: Box = None,
     disturbance: Shaking = None,
     out: Path | None = None,
@@ -31,6 +32,9 @@ def limits(
         Largest withdrawal, such as '20 MPa'; the effective normal stress unless given.
     diffusivity
         Of the rock between well and fault, such as '1 m^2/s'.
+    stress
+        Of a fault with rate-and-state friction, whose limits are those of its linearisation about slow sliding: bound
+        of the shear stress disturbance, such as '25 kPa'; the largest that a design stands unless given.
     out
         Folder for a figure and results.json; nothing is written unless given.
     """
@@ -45,7 +49,7 @@ def limits(
     from quakedesign.report.limits import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits
 
-    answer = all_limits(loaded, pressure=pressure, diffusivity=diffusivity)
+    answer = all_limits(loaded, pressure=pressure, diffusivity=diffusivity, stress=stress)
     if out is not None:
         write_limits(answer, out, format)
     written = [] if out is None else [f"written: {out}/ ({file_names('limits', format)}, results.json)"]

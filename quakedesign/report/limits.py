@@ -14,6 +14,7 @@ from quakedesign.rationals import rational
 from quakedesign.report.drawing import NATURAL, figure, finish
 from quakedesign.report.figure_files import write_figures
 from quakedesign.studies import Limits
+from quakedesign.studies.fault_limits import SlidingLimits
 
 _FORBIDDEN, _PROVED = "#F3C6B2", "#0072B2"
 
@@ -23,8 +24,7 @@ def limits_lines(limits: Limits) -> list[str]:
     task = limits.fault
     head = [
         f"{task.name}: what no controller can do, beside what is proved of designs",
-        f"(box {task.box.name}, any disturbance of at most {task.disturbance.largest_explicit:.6g} m/s^2, "
-        f"T_s = {task.sampling_time:g} s)",
+        f"(box {task.box.name}, {limits.against}, T_s = {task.sampling_time:g} s)",
         "",
         f"{'':24}{'impossible':>20}{'proved':>16}",
     ]
@@ -38,6 +38,8 @@ def limits_lines(limits: Limits) -> list[str]:
 
 
 def _meaning(limits: Limits) -> list[str]:
+    if isinstance(limits, SlidingLimits):
+        return _meaning_of_sliding(limits)
     if limits.peak_slip_rate_error.impossible_beyond is None:
         return ["without a disturbance no limit is known"]
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
@@ -54,6 +56,23 @@ def _meaning(limits: Limits) -> list[str]:
         f"the others: withdrawal of at most {UpperBound(limits.withdrawal).quantity('Pa', 4)}, "
         f"D = {float(limits.diffusivity):g} m^2/s; a constant push that begins after a sample makes the fault slip "
         "until its friction is lost, even if the controller knows everything from the next sample on",
+    ]
+
+
+def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
+    told = [
+        "impossible for every controller, linear or not, with the nominal fault linearised about slow sliding along "
+        "its task, without inertia; of the fault itself it is true as far as that is",
+        "slip-rate error: even with slip, slip rate, state and stress known up to the sample; the stress may jump",
+    ]
+    if limits.largest_step.impossible_beyond is None:
+        return [*told, "the others: none is known, since no error of this fault grows by itself"]
+    return [
+        *told,
+        f"the others: pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference needs, "
+        f"D = {float(limits.diffusivity):g} m^2/s; a constant stress that begins after a sample makes errors grow "
+        "without bound, even if the controller knows everything from the next sample on",
+        "proved: one design with the well near the fault, of the fault itself with inertia; pressure at the fault",
     ]
 
 
@@ -94,13 +113,13 @@ def limits_figure(limits: Limits) -> Any:
         if last is not None:
             axis.axvspan(float(last), 2 * steps[-1], color=_FORBIDDEN, lw=0)
         axis.set(xlim=(steps[0], (1 if last is None else 2) * steps[-1]), ylim=(peaks[0] / 3, top))
-    if limits.proved:
-        proved = sorted((float(g.held.step), float(g.claims.slip_rate_error)) for g in limits.proved)
+    if limits.achieved:
+        proved = [(float(step), float(error)) for step, error in limits.achieved]
         axis.plot(*zip(*proved, strict=True), "o", color=_PROVED, label="proved of a designed controller")
     if natural:
         axis.axhline(natural, color=NATURAL, linestyle="--", linewidth=1, label="natural earthquake (slip rate)")
     axis.axvline(limits.fault.sampling_time, color="#777777", linewidth=0.8, linestyle=":", label="T_s of the fault")
-    note = f"disturbance of at most {limits.fault.disturbance.largest_explicit:.4g} m/s², box {limits.fault.box.name}"
+    note = f"{limits.against.replace('^2', '²')}, box {limits.fault.box.name}"
     return finish(drawing, f"{limits.fault.name}: what a held pressure can do", [], note, legend=axis)
 
 

@@ -1,6 +1,6 @@
 """What no controller can do with a fault, beside what a designed one is proved to do."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -13,11 +13,15 @@ from quakedesign.certificates.impossibility import (
     smallest_peak,
     smallest_withdrawal,
 )
+from quakedesign.certificates.slow_sliding import SlidingGuarantee
+from quakedesign.certificates.slow_sliding.push import SlidingPush
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.synthesis.guaranteed import design_held, longest_delay, reached
+from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
+from quakedesign.synthesis.linear.plant.sliding_model import near_path, sliding_model
 
 _ATTEMPTS = 6  # designs for one time
 _POINTS = 24  # of the curve of smallest peaks
@@ -93,6 +97,16 @@ class Limits:
     def __repr__(self) -> str:
         return f"Limits({self.fault.name}: {', '.join(self.named())})"
 
+    @property
+    def against(self) -> str:
+        """The disturbances that are meant."""
+        return f"any disturbance of at most {self.fault.disturbance.largest_explicit:.6g} m/s^2"
+
+    @property
+    def achieved(self) -> list[tuple[Fraction, UpperBound]]:
+        """T_s [s] and proved slip-rate error [m/s] of the designs that were found on the way, by T_s."""
+        return sorted((g.held.step, g.claims.slip_rate_error) for g in self.proved)
+
     def named(self) -> dict[str, Limit]:
         """All limits by name."""
         names = (
@@ -126,16 +140,66 @@ class Limits:
 
     def smallest_peaks(self) -> list[tuple[Fraction, LowerBound]]:
         """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below."""
-        task, first = task_of(self.fault), rational(self.fault.sampling_time) / 10
-        last = float(self.largest_step.impossible_beyond or 10_000 * first)
-        ratio = max(last / float(first), 100.0) ** (1 / _POINTS)
-        steps = [Fraction(f"{float(first) * ratio**i:.4g}") for i in range(_POINTS + 1)]
-        peaks = [(step, smallest_peak(task, step)) for step in steps]
+        task = task_of(self.fault)
+        peaks = [(step, smallest_peak(task, step)) for step in self._steps()]
         return [(step, peak.slip_rate_error) for step, peak in peaks if peak is not None]
 
+    def _steps(self) -> list[Fraction]:
+        first = rational(self.fault.sampling_time) / 10
+        last = float(self.largest_step.impossible_beyond or 10_000 * first)
+        ratio = max(last / float(first), 100.0) ** (1 / _POINTS)
+        return [Fraction(f"{float(first) * ratio**i:.4g}") for i in range(_POINTS + 1)]
 
-def limits(fault: Fault, *, pressure: float | None = None, diffusivity: float = 1.0, prove: bool = True) -> Limits:
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingLimits(Limits):
+    """Limits of a fault in slow sliding along its task, of its nominal plant linearised there.
+
+    Attributes
+    ----------
+    push : SlidingPush
+    guarantee : SlidingGuarantee or None
+    """
+
+    push: SlidingPush
+    guarantee: SlidingGuarantee | None
+
+    @property
+    def against(self) -> str:
+        """The disturbances that are meant."""
+        return f"any shear stress of at most {UpperBound(self.push.amplitude).quantity('Pa')}"
+
+    @property
+    def achieved(self) -> list[tuple[Fraction, UpperBound]]:
+        """T_s [s] and proved slip-rate error [m/s] of the guarantee."""
+        found = self.guarantee
+        return [] if found is None else [(found.held.step, _above_the_reference(found))]
+
+    @property
+    def natural_peak(self) -> float | None:
+        """None: it takes a cycle to know."""
+        return None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; what is proved as decimal texts, rounded outwards."""
+        return Limits.to_dict(self) | {"disturbance": None, "stress": float(self.push.amplitude)}
+
+    def smallest_peaks(self) -> list[tuple[Fraction, LowerBound]]:
+        """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below."""
+        return [(step, self.push.smallest_rate_error(step)) for step in self._steps()]
+
+
+def limits(
+    fault: Fault,
+    *,
+    pressure: float | None = None,
+    diffusivity: float = 1.0,
+    stress: float | None = None,
+    prove: bool = True,
+) -> Limits:
     """What no controller can do with a fault whose disturbance is of the class ``amplitude``.
+
+    With friction that has a state: in slow sliding along its task, of the nominal plant linearised there.
 
     There are none of the class ``rate``: every proof pushes the fault with a disturbance that jumps.
 
@@ -143,9 +207,13 @@ def limits(fault: Fault, *, pressure: float | None = None, diffusivity: float = 
     ----------
     fault : Fault
     pressure : float, optional
-        Largest withdrawal [Pa]; the effective normal stress unless given.
+        Largest withdrawal [Pa]; the effective normal stress unless given. In slow sliding: largest pressure beside what
+        the reference needs, in both directions.
     diffusivity : float
         Of the rock between well and fault [m²/s].
+    stress : float, optional
+        Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that a design stands unless
+        given.
     prove : bool
         Whether to look for designs with a guarantee, which takes a minute.
 
@@ -156,17 +224,18 @@ def limits(fault: Fault, *, pressure: float | None = None, diffusivity: float = 
     Raises
     ------
     ParameterError
-        For a negative pressure, a diffusivity that is not positive, or friction with a state.
+        For a negative pressure, a diffusivity that is not positive, a stress without friction that has a state, or none
+        where no design stands any.
     """
-    fault.require_memoryless("a limit of all controllers")
-    task, step = task_of(fault), rational(fault.sampling_time)
-    withdrawal = task.normal_stress if pressure is None else rational(pressure, "pressure")
-    spread = rational(diffusivity, "diffusivity")
-    if withdrawal <= 0 or spread <= 0:
+    if fault.friction.state_names:
+        return _sliding_limits(fault, pressure, diffusivity, stress, prove)
+    if stress is not None:
         raise ParameterError(
-            f"pressure and diffusivity must be positive. Received {float(withdrawal):.4g} Pa and {float(spread):.4g} "
-            "m^2/s. Give the size of the largest withdrawal."
+            f"stress needs friction with a state. Received {fault.friction.name}. Leave it out: the disturbance of the "
+            "fault is meant."
         )
+    task, step = task_of(fault), rational(fault.sampling_time)
+    withdrawal, spread = _given(fault, pressure, diffusivity)
     held = _proved_steps(task, step) if prove else ()
     own = next((g for g in held if g.held.step == step), None)
     delay = _proved_delay(task, step) if own is not None else None
@@ -198,6 +267,67 @@ def limits(fault: Fault, *, pressure: float | None = None, diffusivity: float = 
         ),
         proved=held,
     )
+
+
+def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fraction, Fraction]:
+    withdrawal = rational(fault.effective_normal_stress if pressure is None else pressure, "pressure")
+    spread = rational(diffusivity, "diffusivity")
+    if withdrawal <= 0 or spread <= 0:
+        raise ParameterError(
+            f"pressure and diffusivity must be positive. Received {float(withdrawal):.4g} Pa and {float(spread):.4g} "
+            "m^2/s. Give the size of the largest withdrawal."
+        )
+    return withdrawal, spread
+
+
+def _sliding_limits(
+    fault: Fault, pressure: float | None, diffusivity: float, stress: float | None, prove: bool
+) -> SlidingLimits:
+    withdrawal, spread = _given(fault, pressure, diffusivity)
+    model, step = sliding_model(fault), rational(fault.sampling_time)
+    asked = None if stress is None else rational(stress, "stress")
+    answer = answer_sliding(fault, diffusion=near_path(model), stress=asked) if prove else None
+    found = answer.found if answer is not None and isinstance(answer.found, SlidingGuarantee) else None
+    amplitude = asked if asked is not None or found is None else found.task.stress
+    if amplitude is None or amplitude <= 0:
+        raise ParameterError(
+            "limits of slow sliding need a shear stress above 0 that pushes the fault. Received none, and no design "
+            "was found that stands any. Give --stress, such as '25 kPa'."
+        )
+    push = SlidingPush(model=model, amplitude=amplitude)
+    reaction, path = longest_reaction(push, withdrawal), longest_diffusion(push, withdrawal, step)
+    near = None if found is None else LowerBound(found.held.diffusion)
+    return SlidingLimits(
+        fault=fault,
+        withdrawal=withdrawal,
+        diffusivity=spread,
+        slip_error=None,
+        peak_slip_rate_error=Limit(
+            title="slip-rate error",
+            unit="m/s",
+            impossible_beyond=push.smallest_rate_error(step),
+            proved_up_to=None if found is None else _above_the_reference(found),
+            holds_for=f"{KNOWING}, of the linearised plant",
+        ),
+        largest_step=_linear("T_s", "s", reaction, None if found is None else LowerBound(step)),
+        largest_delay=_linear("delay", "s", reaction and UpperBound(max(reaction - step, Fraction(0))), None),
+        largest_diffusion_time=_linear("diffusion time L^2/D", "s", path, near),
+        farthest_well=_linear("distance of the well", "m", path and farthest_well(path, spread), None),
+        smallest_pressure=_linear(
+            "pressure", "Pa", smallest_withdrawal(push, step), None if found is None else found.claims.push
+        ),
+        proved=(),
+        push=push,
+        guarantee=found,
+    )
+
+
+def _linear(title: str, unit: str, beyond: Bound | None, proved: Bound | None) -> Limit:
+    return replace(_limit(title, unit, beyond, proved), holds_for=f"{WAITING}, of the linearised plant")
+
+
+def _above_the_reference(found: SlidingGuarantee) -> UpperBound:
+    return UpperBound(found.peak_slip_rate - found.task.rate)
 
 
 def _limit(title: str, unit: str, beyond: Bound | None, proved: Bound | None) -> Limit:

@@ -1,12 +1,17 @@
 """The command that says what no controller can do."""
 
 import json
+from pathlib import Path
 
 import pytest
 
 from quakedesign.certificates.guarantee import NoGuarantee
+from quakedesign.certificates.slow_sliding import parse_sliding
 from quakedesign.cli import main
+from quakedesign.studies import fault_limits
+from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
 
+PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
 KEYS = ("peak_slip_rate_error", "largest_step", "largest_delay", "largest_diffusion_time", "farthest_well")
 
 
@@ -49,14 +54,6 @@ def test_nonsense_is_refused_in_one_line(given, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_friction_with_a_state_has_no_limits_and_the_line_names_what_it_has(capsys):
-    assert run("crustal-patch") == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "a limit of all controllers needs a friction law of slip and slip rate alone" in said
-    assert "Use fault, derive, simulate, guarantee or design for it." in said
-
-
 def test_a_disturbance_may_be_a_shear_stress(capsys):
     """10 Pa on 1385 kg/m³ times 10 cm."""
     assert run("lab-fault", "--disturbance", "10 Pa", "--json") == 0
@@ -65,3 +62,31 @@ def test_a_disturbance_may_be_a_shear_stress(capsys):
     assert capsys.readouterr().err.endswith("whose unit is unknown. Did you mean kPa?\n")
     assert run("crustal-patch", "--disturbance", "10 kPa") == 2
     assert "Give --stress" in capsys.readouterr().err
+
+
+def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(capsys, monkeypatch, tmp_path):
+    known = parse_sliding((PROOFS / "sliding_crustal-patch.json").read_text())
+    answer = SlidingAnswer(found=known, task=known.task, held=known.held)
+    monkeypatch.setattr(fault_limits, "answer_sliding", lambda fault, **asked: answer)
+    assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0
+    said = capsys.readouterr().out
+    assert said.splitlines()[1] == "(box paper, any shear stress of at most 25 kPa, T_s = 300 s)"
+    assert "linearised about slow sliding" in said
+    found = json.loads((tmp_path / "limits" / "results.json").read_text())
+    assert found["stress"] == 25000.0
+    assert "linearised" in found["farthest_well"]["holds_for"]
+    for name in ("peak_slip_rate_error", "smallest_pressure"):
+        assert float(found[name]["impossible_beyond"]) < float(found[name]["proved_up_to"])
+    assert float(found["largest_diffusion_time"]["proved_up_to"]) == 833
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("crustal-patch", "--stress", "0 Pa"), "a stress above 0"),
+        (("real-fault", "--stress", "1 kPa"), "stress needs friction with a state"),
+    ],
+)
+def test_a_stress_that_does_not_apply_is_refused(given, said, capsys):
+    assert run(*given) == 2
+    assert said in capsys.readouterr().err
