@@ -27,6 +27,16 @@ os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
 """
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Ten thousand tests are made, none of which is garbage; what they leave is searched at the end of each file."""
+    gc.disable()
+    yield
+    gc.freeze()
+    gc.set_threshold(20_000)
+    gc.enable()
+
+
 def pytest_collection_modifyitems(items):
     """The longest files first, so that no worker is left alone with one of them at the end."""
     items.sort(key=lambda item: (item.path.suffix != ".ipynb", item.path.name != "test_cli.py"))
