@@ -13,10 +13,12 @@ class Arrays:
     def __init__(self, polynomial: Polynomial, variables: int) -> None:
         self.exponents = np.array(list(polynomial), dtype=np.int64).reshape(-1, variables)
         self.coefficients = np.array([float(c) for c in polynomial.values()])
+        self._slopes = self.exponents.T * self.coefficients
+        self._lower = np.maximum(self.exponents - np.eye(variables, dtype=np.int64)[:, None], 0)
 
     def __call__(self, x: Any) -> float:
         """Value at a point."""
-        return float(self.coefficients @ np.prod(np.asarray(x)[None, :] ** self.exponents, axis=1))
+        return float(self.coefficients @ np.multiply.reduce(np.asarray(x) ** self.exponents, axis=1))
 
     def at(self, points: Any) -> Any:
         """Values at points, one a row."""
@@ -24,14 +26,7 @@ class Arrays:
 
     def gradient(self, x: Any) -> Any:
         """Gradient at a point."""
-        x = np.asarray(x)
-        result = np.zeros(len(x))
-        for i in range(len(x)):
-            lower = self.exponents.copy()
-            factor = lower[:, i] * self.coefficients
-            lower[:, i] = np.maximum(lower[:, i] - 1, 0)
-            result[i] = factor @ np.prod(x[None, :] ** lower, axis=1)
-        return result
+        return (self._slopes * np.multiply.reduce(np.asarray(x) ** self._lower, axis=2)).sum(axis=1)
 
     def hessian(self, x: Any) -> Any:
         """Matrix of second derivatives at a point."""
