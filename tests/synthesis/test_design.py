@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction as F
+from functools import cache
 
 import numpy as np
 import pytest
@@ -53,6 +54,12 @@ def variants(real):
     }
 
 
+@pytest.fixture(scope="module")
+def continuous(variants):
+    """Designs in continuous time, each made once."""
+    return cache(lambda law, variant="real": qd.design(variants[variant], law, continuous=True))
+
+
 VARIANTS = (
     "real", "lab", "ten percent", "stable", "no stress drop", "strong weakening", "undamped", "overdamped",
     "slow sampling", "quiet", "small",
@@ -64,8 +71,8 @@ SLIDING = [pytest.param(law, v, marks=() if v in SHORT[law] else pytest.mark.slo
 
 
 @pytest.mark.parametrize(("law", "variant"), SLIDING)
-def test_a_sliding_mode_in_continuous_time_is_proved_with_its_premise_along_the_reference(variants, law, variant):
-    design = qd.design(variants[variant], law, continuous=True)
+def test_a_sliding_mode_in_continuous_time_is_proved_with_its_premise_along_the_reference(continuous, law, variant):
+    design = continuous(law, variant)
     assert design.verdict is Verdict.PROVED
     assert design.certificate.check() is Verdict.PROVED
     premises = {p.name: p for p in design.premises}
@@ -75,8 +82,8 @@ def test_a_sliding_mode_in_continuous_time_is_proved_with_its_premise_along_the_
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_the_elqr_in_continuous_time_is_proved_about_constant_references(variants, variant):
-    design = qd.design(variants[variant], "elqr", continuous=True)
+def test_the_elqr_in_continuous_time_is_proved_about_constant_references(continuous, variant):
+    design = continuous("elqr", variant)
     assert design.verdict is Verdict.PROVED
     assert {p.name: p for p in design.premises}["friction_slope"].holds
 
@@ -94,8 +101,8 @@ def test_riccati_residual_and_gain_by_independent_algebra(name):
     assert np.linalg.eigvalsh(found.S).min() > 0
 
 
-def test_every_vertex_is_stable_and_the_step_is_short_enough(real):
-    design = qd.design(real, "elqr", continuous=True)
+def test_every_vertex_is_stable_and_the_step_is_short_enough(real, continuous):
+    design = continuous("elqr")
     poles = vertex_poles(sectors(real), list(design.controller.gains.values()))
     assert max(z.real for z in poles) < 0
     assert max(abs(z) for z in poles) * real.sampling_time == pytest.approx(1.5, rel=1e-3)
@@ -126,14 +133,14 @@ def test_the_root_is_rational_and_just_large_enough(scale):
     assert float(root**6 / F(scale)) < 1.07
 
 
-def test_the_same_input_gives_the_same_digits(real, sampled):
+def test_the_same_input_gives_the_same_digits(real, sampled, continuous):
     again = qd.design(real, "elqr")
     assert again.controller == sampled.controller
     assert again.premises == sampled.premises
-    first, second = (qd.design(real, "elqr", continuous=True) for _ in range(2))
+    first, second = continuous("elqr"), qd.design(real, "elqr", continuous=True)
     assert first.gains == second.gains
     assert first.certificate == second.certificate
-    first, second = (qd.design(real, "cta", continuous=True) for _ in range(2))
+    first, second = continuous("cta"), qd.design(real, "cta", continuous=True)
     assert first.certificate == second.certificate
 
 
