@@ -37,6 +37,29 @@ class Held:
     first: object = None
 
 
+def numbers(claim, force=None):
+    """What a guarantee says of its loop; a bound of φ of its own in place of amplitude and reference."""
+    held, law, task = claim.held, claim.held.law, claim.task
+    floats = lambda m: np.array(m, dtype=float)  # noqa: E731
+    return Held(
+        F=floats(law.update),
+        G=floats(law.measured),
+        C=floats(law.output),
+        D=floats(law.feedback),
+        b=float(task.authority),
+        s=tuple(map(float, task.slip_chord)),
+        w=tuple(map(float, task.rate_chord)),
+        beta=tuple(map(float, task.beta)),
+        step=float(held.step),
+        delay=float(held.delay),
+        force=float(task.amplitude + task.reference_force if force is None else force),
+        noise=(float(held.slip_noise), float(held.rate_noise)),
+        slope=float(task.friction.weakening * task.area_per_mass[1] / task.authority),
+        pace=float(task.reference_rates[0]),
+        rock=float(held.diffusion),
+    )
+
+
 def spreading(rock, modes=40):
     """Rates and shares of the modes of ∂p/∂t = D ∂²p/∂x² with p held at x = 0 and a fault at x = L that nothing passes.
 

@@ -27,28 +27,6 @@ def through(rock):
     return design_held(task_of(REAL), STEP, objective="peak", diffusion=F(rock))
 
 
-def numbers(claim, force):
-    """A guarantee as the attacker reads it."""
-    law, task = claim.held.law, claim.task
-    floats = lambda m: np.array(m, dtype=float)  # noqa: E731
-    return attacker.Held(
-        F=floats(law.update),
-        G=floats(law.measured),
-        C=floats(law.output),
-        D=floats(law.feedback),
-        b=float(task.authority),
-        s=tuple(map(float, task.slip_chord)),
-        w=tuple(map(float, task.rate_chord)),
-        beta=tuple(map(float, task.beta)),
-        step=float(claim.held.step),
-        delay=0.0,
-        force=float(force),
-        slope=float(task.friction.weakening * task.area_per_mass[1] / task.authority),
-        pace=float(task.reference_rates[0]),
-        rock=float(claim.held.diffusion),
-    )
-
-
 def worst(held, periods, pieces, *chosen):
     """Largest slip error and slip-rate error of several choices."""
     return np.max(
@@ -81,7 +59,7 @@ def test_no_course_of_ten_thousand_violates_a_guarantee_through_rock(rock):
     claim, (most, ratio) = through(rock), WELLS[rock]
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= most
-    held, periods, pieces = numbers(claim, claim.task.amplitude + claim.task.reference_force), 40 * rock + 80, 4
+    held, periods, pieces = attacker.numbers(claim), 40 * rock + 80, 4
     random = attacker.slowly(held, pieces, attacker.switching(held, 10_000, periods * pieces, seed=3))
     slip, rate = worst(held, periods, pieces, (random, 10_000), *along(held, periods, pieces))
     assert slip <= claim.claims.slip_error
@@ -94,7 +72,7 @@ def test_no_course_of_ten_thousand_violates_a_guarantee_of_the_class_rate(object
     task = task_of(REAL, rate_limited=True)
     claim = design_held(task, F("0.184"), objective=objective)
     assert claim.check() is Verdict.PROVED
-    held, periods, pieces = numbers(claim, task.amplitude), 60, 6
+    held, periods, pieces = attacker.numbers(claim, task.amplitude), 60, 6
     drifts = lambda choose: attacker.drifting(held, float(task.change), pieces, choose)  # noqa: E731
     random = attacker.slowly(held, pieces, attacker.switching(held, 10_000, periods * pieces, seed=3))
     slip, rate = worst(held, periods, pieces, (drifts(random), 10_000), *along(held, periods, pieces, drifts))

@@ -7,7 +7,6 @@ from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 import quakedesign as qd
@@ -104,23 +103,7 @@ def test_sampled_faster_that_fault_is_guaranteed(step):
 
 def test_an_independent_simulator_does_not_leave_the_guarantee_of_the_shorter_step():
     claim = designed("slow").guarantee
-    law, task = claim.held.law, claim.task
-    numbers = lambda m: np.array(m, dtype=float)  # noqa: E731
-    held = attacker.Held(
-        F=numbers(law.update),
-        G=numbers(law.measured),
-        C=numbers(law.output),
-        D=numbers(law.feedback),
-        b=float(task.authority),
-        s=tuple(map(float, task.slip_chord)),
-        w=tuple(map(float, task.rate_chord)),
-        beta=tuple(map(float, task.beta)),
-        step=float(claim.held.step),
-        delay=0.0,
-        force=float(task.amplitude + task.reference_force),
-        slope=float(task.friction.weakening * task.area_per_mass[1] / task.authority),
-        pace=float(task.reference_rates[0]),
-    )
+    held = attacker.numbers(claim)
     choose = attacker.slowly(held, 6, attacker.switching(held, 2_000, 240, seed=8))
     largest, _ = attacker.run(held, 40, 6, choose, 2_000)
     assert 0 < largest[0].max() <= claim.claims.slip_error

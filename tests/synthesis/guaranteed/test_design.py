@@ -40,28 +40,6 @@ def designed(row):
     return design_held(task_of(load_fault(name)), step, objective=objective, delay=DELAYS.get(row, F(0)))
 
 
-def numbers(claim, force=None):
-    """A guarantee as the attacker reads it."""
-    law, task = claim.held.law, claim.task
-    as_floats = lambda m: np.array([[float(v) for v in row] for row in m])  # noqa: E731
-    total = task.amplitude + task.reference_force if force is None else force
-    return attacker.Held(
-        F=as_floats(law.update),
-        G=as_floats(law.measured),
-        C=np.array([float(v) for v in law.output]),
-        D=np.array([float(v) for v in law.feedback]),
-        b=float(task.authority),
-        s=tuple(map(float, task.slip_chord)),
-        w=tuple(map(float, task.rate_chord)),
-        beta=tuple(map(float, task.beta)),
-        step=float(claim.held.step),
-        delay=float(claim.held.delay),
-        force=float(total),
-        slope=float(task.friction.weakening * task.area_per_mass[1] / task.authority),
-        pace=float(task.reference_rates[0]),
-    )
-
-
 def courses(held, pieces, count, seed, periods):
     """Courses of all that may switch; friction depends on the slip alone."""
     return attacker.slowly(held, pieces, attacker.switching(held, count, periods * pieces, seed=seed))
@@ -102,7 +80,7 @@ def test_a_law_for_the_class_rate_is_chosen_for_that_class(objective):
 @pytest.mark.parametrize("row", ROWS)
 def test_no_course_of_ten_thousand_violates_a_guarantee(row):
     claim = designed(row)
-    held = numbers(claim)
+    held = attacker.numbers(claim)
     largest, _ = attacker.run(held, 40, 6, courses(held, 6, 10_000, 3, 40), 10_000)
     assert largest[0].max() <= claim.claims.slip_error
     assert largest[1].max() <= claim.claims.slip_rate_error
@@ -112,7 +90,7 @@ def test_no_course_of_ten_thousand_violates_a_guarantee(row):
 def test_the_worst_found_is_no_less_than_what_a_disturbance_does_to_the_plant_that_forgets_last():
     """Friction that falls as fast as it may, at its least: a linear loop, and a disturbance along its own response."""
     claim = designed("real peak")
-    held, periods, pieces = numbers(claim), 350, 2
+    held, periods, pieces = attacker.numbers(claim), 350, 2
     plant = replace(held, s=2 * held.s[1:], w=2 * held.w[1:], beta=2 * held.beta[:1])
     response = attacker.responses(plant, periods, pieces)[0]
     largest, _ = attacker.run(plant, periods, pieces, attacker.aligned(plant, response), 1)
@@ -123,7 +101,7 @@ def test_the_worst_found_is_no_less_than_what_a_disturbance_does_to_the_plant_th
 @pytest.mark.parametrize("row", ROWS)
 def test_courses_along_the_nominal_response_come_close_and_stay_below(row):
     claim = designed(row)
-    seen = [aligned(numbers(claim), 60, 8, k) for k in (0, 1)]
+    seen = [aligned(attacker.numbers(claim), 60, 8, k) for k in (0, 1)]
     assert seen[0] <= claim.claims.slip_error
     assert seen[1] <= claim.claims.slip_rate_error <= 2 * seen[1]
     if row == "real peak":
@@ -143,7 +121,7 @@ def test_where_stick_leaves_the_bounds_the_answer_says_so():
 def test_with_stick_no_course_leaves_the_bounds(row):
     """The reference moves at its largest rate; the fault never slides backward."""
     claim = designed(row)
-    held, back = numbers(claim), float(claim.task.reference_rates[0])
+    held, back = attacker.numbers(claim), float(claim.task.reference_rates[0])
     largest, _ = attacker.run(held, 60, 6, courses(held, 6, 4_000, 5, 60), 4_000, back=back)
     assert largest[0].max() <= claim.claims.slip_error
     assert largest[1].max() <= claim.claims.slip_rate_error
@@ -155,7 +133,7 @@ def test_with_stick_no_course_leaves_the_bounds(row):
 @pytest.mark.parametrize("row", ROWS)
 def test_the_worst_found_is_below_the_bound_and_no_less_than_the_attacker_s(row):
     claim = designed(row)
-    found, held = worst_found(claim), numbers(claim)
+    found, held = worst_found(claim), attacker.numbers(claim)
     largest, _ = attacker.run(held, 40, 6, courses(held, 6, 1_000, 4, 40), 1_000)
     assert largest[1].max() <= found.slip_rate_error <= claim.claims.slip_rate_error
     assert found.slip_error <= claim.claims.slip_error
@@ -171,7 +149,7 @@ def test_a_delay_is_attacked_too(delay):
         assert "small gain" in claim.reason
         assert claim.small_gain >= 1
         return
-    held = numbers(claim)
+    held = attacker.numbers(claim)
     ends = attacker.responses(held, 60, 46)
     largest, _ = attacker.run(held, 60, 46, attacker.aligned(held, ends[1]), 1)
     assert largest[1].max() <= claim.claims.slip_rate_error <= 2 * largest[1].max()
@@ -233,7 +211,7 @@ def test_designs_say_what_is_guaranteed_of_them_as_they_run():
 @pytest.mark.parametrize("row", ["real peak", "real tracking"])
 def test_the_worst_found_with_stick_is_no_less_than_the_attacker_s(row):
     claim = designed(row)
-    found, held, back = worst_found(claim, sticks=True), numbers(claim), float(claim.task.reference_rates[0])
+    found, held, back = worst_found(claim, sticks=True), attacker.numbers(claim), float(claim.task.reference_rates[0])
     largest, _ = attacker.run(held, 40, 24, courses(held, 24, 500, 6, 40), 500, back=back)
     assert largest[1].max() <= found.slip_rate_error <= claim.claims.slip_rate_error
     assert largest[0].max() <= found.slip_error <= claim.claims.slip_error

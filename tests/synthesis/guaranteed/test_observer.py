@@ -38,28 +38,6 @@ def designed(name):
     return design_held(task_of(REAL), STEP, objective="peak", **around)
 
 
-def numbers(claim):
-    """A guarantee as the attacker reads it."""
-    law, task, held = claim.held.law, claim.task, claim.held
-    as_floats = lambda m: np.array([[float(v) for v in row] for row in m])  # noqa: E731
-    return attacker.Held(
-        F=as_floats(law.update),
-        G=as_floats(law.measured),
-        C=np.array([float(v) for v in law.output]),
-        D=np.array([float(v) for v in law.feedback]),
-        b=float(task.authority),
-        s=tuple(map(float, task.slip_chord)),
-        w=tuple(map(float, task.rate_chord)),
-        beta=tuple(map(float, task.beta)),
-        step=float(held.step),
-        delay=float(held.delay),
-        force=float(task.amplitude + task.reference_force),
-        noise=(float(held.slip_noise), float(held.rate_noise)),
-        slope=float(task.friction.weakening * task.area_per_mass[1] / task.authority),
-        pace=float(task.reference_rates[0]),
-    )
-
-
 def within(largest, claim):
     return largest[0].max() <= claim.claims.slip_error and largest[1].max() <= claim.claims.slip_rate_error
 
@@ -77,7 +55,7 @@ def test_the_slip_alone_is_enough_for_the_target():
 @pytest.mark.parametrize("sticks", [False, True])
 def test_no_course_of_ten_thousand_with_noise_violates_a_guarantee(name, sticks):
     claim, courses = designed(name), 4_000 if sticks else 10_000
-    held, back = numbers(claim), float(claim.task.reference_rates[0]) if sticks else None
+    held, back = attacker.numbers(claim), float(claim.task.reference_rates[0]) if sticks else None
     hear = attacker.noisy(held, courses, PERIODS * PIECES, seed=8)
     choose = attacker.slowly(held, PIECES, attacker.switching(held, courses, PERIODS * PIECES, seed=3))
     largest, _ = attacker.run(held, PERIODS, PIECES, choose, courses, back=back, hear=hear)
@@ -100,7 +78,7 @@ def nominal_response(held, k):
 @pytest.mark.parametrize("name", ["slip alone", "both"])
 def test_noise_along_the_nominal_response_comes_close_and_the_worst_found_is_no_less(name):
     claim, seen = designed(name), []
-    held = numbers(claim)
+    held = attacker.numbers(claim)
     for k in (0, 1):
         ends, off = nominal_response(held, k)
         choose = attacker.slowly(held, PIECES, attacker.aligned(held, ends))
