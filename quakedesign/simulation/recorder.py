@@ -139,8 +139,6 @@ class Recorder:
         last = self.parts(end)
         slip, rate = (float(v) for v in last.state[:2])
         whole = self.loop.budget(self.watched(end), float(last.counter) * self.step, slip, rate)
-        if self.initial == (0.0, 0.0):
-            return whole
         now, before = whole.to_dict(), self.loop.budget(dict.fromkeys(WORKS, 0.0), 0.0, *self.initial).to_dict()
         return EnergyBudget(**{name: now[name] - before[name] for name in now if name != "residual"})
 
