@@ -1,11 +1,13 @@
 """What the public names of a room are called with: every argument is of the type that its annotation says."""
 
+import ast
 import sys
 import types
 from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import Enum
 from functools import cache, wraps
 from importlib import import_module
+from importlib.util import find_spec
 from inspect import Parameter, Signature, isclass, isfunction, signature
 from itertools import islice
 from numbers import Integral, Rational, Real
@@ -118,36 +120,43 @@ def _hint(function: Callable[..., Any], name: str) -> Any:
     parameter = _signature(function).parameters[name]
     if parameter.annotation is Parameter.empty:
         return Any
-    return _resolved(parameter.annotation, getattr(function, "__globals__", {}), _home(function))
+    home = function.__module__  # the `__init__` of a dataclass has names of its own besides
+    return _resolved(parameter.annotation, home, getattr(function, "__globals__", {}) | vars(sys.modules[home]))
 
 
-def _resolved(hint: Any, *places: Mapping[str, Any]) -> Any:
+def _resolved(hint: Any, home: str, known: Mapping[str, Any]) -> Any:
     if not isinstance(hint, str):
         return hint
-    names: dict[str, Any] = {k: v for place in places for k, v in place.items()}
+    names = dict(known)
     names |= {short: import_module(long) for short, long in _ABBREVIATIONS.items() if f"{short}." in hint}
     while True:
         try:
             return eval(hint, names)
         except NameError as error:
             missing = str(error.name)
-            known = _classes(missing)
-            if len(known) != 1:
+            if missing not in imported_for_types(home):
                 return Any
-            names[missing] = known.pop()
+            names[missing] = getattr(import_module(imported_for_types(home)[missing]), missing)
         except TypeError:
             return Any
 
 
-def _classes(name: str) -> set[type]:
-    """Classes of a name that the package has loaded; a type that only type checkers import is one of them."""
-    modules = [module for key, module in list(sys.modules.items()) if key.startswith("quakedesign.")]
-    return {vars(module)[name] for module in modules if isclass(vars(module).get(name))}
+@cache
+def imported_for_types(module: str) -> dict[str, str]:
+    """Where the names are defined that a module imports for type checkers alone.
 
-
-def _home(function: Callable[..., Any]) -> Mapping[str, Any]:
-    """Names of the module that defines it; the ``__init__`` of a dataclass has others of its own."""
-    return vars(sys.modules[function.__module__])
+    Parameters
+    ----------
+    module : str
+        Its whole name.
+    """
+    spec = find_spec(module)
+    loader: Any = spec.loader if spec else None
+    blocks = (node for node in ast.parse(loader.get_source(module)).body if isinstance(node, ast.If))
+    imports = (node for block in blocks if ast.unparse(block.test) == "TYPE_CHECKING" for node in block.body)
+    return {
+        alias.name: str(node.module) for node in imports if isinstance(node, ast.ImportFrom) for alias in node.names
+    }
 
 
 def _require(function: Callable[..., Any], name: str, value: Any) -> None:

@@ -4,14 +4,12 @@ A room imports its public names under ``TYPE_CHECKING``, each as itself, where t
 ``face``, which makes them its ``__all__``.
 """
 
-import ast
 import sys
 from importlib import import_module
-from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
 
-from quakedesign.arguments import check_arguments, checked
+from quakedesign.arguments import check_arguments, checked, imported_for_types
 
 _CLASSES: dict[str, list[str]] = {}
 """Public names by the module that defines them: its classes check their arguments as soon as it is loaded."""
@@ -54,20 +52,9 @@ def face(room: str, **elsewhere: str) -> None:
         Where those names are defined that it does not import for type checkers.
     """
     module = sys.modules[room]
-    homes = _homes(room) | elsewhere
+    homes = imported_for_types(room) | elsewhere
     for name, home in homes.items():
         _CLASSES.setdefault(home, []).append(name)
     module.__dict__.update(_homes=homes, __all__=sorted(homes, key=lambda name: (name.islower(), name)))
     module.__class__ = _Face
     check_arguments(room)
-
-
-def _homes(room: str) -> dict[str, str]:
-    """Where the names are defined that a room imports for type checkers alone."""
-    spec = find_spec(room)
-    loader: Any = spec.loader if spec else None
-    blocks = (node for node in ast.parse(loader.get_source(room)).body if isinstance(node, ast.If))
-    imports = (node for block in blocks if ast.unparse(block.test) == "TYPE_CHECKING" for node in block.body)
-    return {
-        alias.name: str(node.module) for node in imports if isinstance(node, ast.ImportFrom) for alias in node.names
-    }
