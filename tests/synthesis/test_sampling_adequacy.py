@@ -8,6 +8,7 @@ import pytest
 
 from quakedesign.fault import Disturbance, load_fault
 from quakedesign.fault.friction import friction_law
+from quakedesign.studies.facts import sampling_sentence
 from quakedesign.synthesis.analysis.sampling_adequacy import sampling_adequacy
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
@@ -33,6 +34,8 @@ def test_the_pole_is_that_of_the_steepest_friction_at_the_largest_effective_stre
     exact = growing(slope, REAL.specific_damping)
     assert exact * (1 - 1e-9) <= found.pole <= exact * 1.01
     assert found.adequate
+    assert "T_s = 0.184 s is adequate: " in sampling_sentence(found)
+    assert "guarantee" not in sampling_sentence(found)
 
 
 def test_the_fault_that_is_sampled_too_slowly_is_told_which_step_would_do():
@@ -43,6 +46,10 @@ def test_the_fault_that_is_sampled_too_slowly_is_told_which_step_would_do():
     assert nominal < found.pole < 1.3 * nominal
     assert found.pole_times_step == found.pole * 0.1 > 1
     assert not found.adequate
+    assert "is LONGER than" in sampling_sentence(found)
+    assert sampling_sentence(found).endswith(
+        "is adequate; guarantee says whether something is proved at this T_s all the same"
+    )
     finer = sampling_adequacy(replace(UNDERSAMPLED, sampling_time=found.adequate_step * 0.999))
     assert finer.adequate
     assert not sampling_adequacy(replace(UNDERSAMPLED, sampling_time=found.adequate_step * 1.001)).adequate
