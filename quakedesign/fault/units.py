@@ -162,9 +162,13 @@ def _is_plural_of_a_symbol(word: str) -> bool:
 def _example(unit: str) -> str:
     return {
         "Pa": "30 GPa",
-        "m": "276.35 mm",
-        "s": "184 ms",
-        "kg/m^3": "2500 kg/m^3",
+        "m": "1.5 m",
+        "s": "20 ms",
+        "kg/m^3": "2700 kg/m^3",
         "kg/s": "5e14 kg/s",
-        "": "0.4",
+        "m/s": "3 mm/s",
+        "m/s^2": "0.2 mm/s^2",
+        "m^2/s": "7 cm^2/s",
+        "rad/s": "0.5 rad/s",
+        "Pa/s": "2 kPa/s",
     }.get(unit, f"1 {unit}")

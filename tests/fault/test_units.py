@@ -1,6 +1,7 @@
 """Quantities with units, each wrong one with its own message."""
 
 import math
+import re
 import subprocess
 import sys
 
@@ -96,6 +97,15 @@ def test_wrong_quantities(quantity, unit, reason):
     assert reason in message
     assert "Received" in message
     assert "\n" not in message
+
+
+@pytest.mark.parametrize("unit", ["Pa", "m", "s", "kg/m^3", "kg/s", "m/s", "m/s^2", "m^2/s", "rad/s", "Pa/s", "1/s"])
+def test_the_example_of_a_message_is_a_short_quantity_of_the_unit(unit):
+    with pytest.raises(UnitError) as raised:
+        si_value(None, unit, "it")
+    example = re.search(r"such as '(.*)'\. Received", str(raised.value)).group(1)
+    assert 0 < si_value(example, unit, "it") < 1e15
+    assert len(example.split()[0]) <= 4
 
 
 @pytest.mark.parametrize("quantity", ["0.11 Hz", "1 kHz"])
