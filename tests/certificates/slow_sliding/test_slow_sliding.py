@@ -529,7 +529,7 @@ def test_a_claim_that_is_only_reached_on_one_cell_does_not_follow(name, monkeypa
 def test_a_law_of_the_slip_rate_or_a_pressure_that_jumps_is_refused():
     fed = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(F(-1), F(-1)))
     for held in (Held(law=fed, step=F(50), lag=F(10)), Held(law=LAW, step=F(50))):
-        with pytest.raises(ParameterError):
+        with pytest.raises(ParameterError, match="a law of the slip alone whose pressure reaches"):
             cell_bounds(task(), held, claims())
 
 
