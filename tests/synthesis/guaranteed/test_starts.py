@@ -41,25 +41,9 @@ def deadbeat(e1, e2):
 
 
 def numbers(claim):
-    law, task = claim.held.law, claim.task
-    floats = lambda table: np.array(table, dtype=float)  # noqa: E731
-    return attacker.Held(
-        F=floats(law.update),
-        G=floats(law.measured),
-        C=floats(law.output),
-        D=floats(law.feedback),
-        b=float(task.authority),
-        s=tuple(map(float, task.slip_chord)),
-        w=tuple(map(float, task.rate_chord)),
-        beta=tuple(map(float, task.beta)),
-        step=float(claim.held.step),
-        delay=float(claim.held.delay),
-        force=float(task.amplitude + task.reference_force),
-        slope=float(task.friction.weakening * task.area_per_mass[1] / task.authority),
-        pace=float(task.reference_rates[0]),
-        ends=deadbeat if law.root else None,
-        first=floats(law.first) if law.first else None,
-    )
+    law = claim.held.law
+    first = np.array(law.first, dtype=float) if law.first else None
+    return replace(attacker.numbers(claim), ends=deadbeat if law.root else None, first=first)
 
 
 def corners(claim, courses):
