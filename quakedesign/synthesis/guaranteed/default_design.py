@@ -15,6 +15,7 @@ from quakedesign.synthesis.guaranteed.reach import (
     design_at,
     longest_delay,
     longest_step,
+    reached_again,
     reached_delay,
     reached_step,
 )
@@ -116,7 +117,10 @@ def sampled_sliding_mode(
 
     made = design_compensated(task, law, step, objective=objective)
     reason = made.found.reason if isinstance(made.found, NoGuarantee) else ""
-    longest = reached_step(task, step, lambda time: careful(time).found, step if reason else None)
+    most = step if reason else None
+    longest = reached_again(
+        lambda time: careful(time).found, lambda attempt: reached_step(task, step, attempt, most), task, law, step, most
+    )
     if reason and longest is not None:
         made = design_compensated(task, law, longest.held.step, objective=objective)
         made = careful(longest.held.step) if isinstance(made.found, NoGuarantee) else made
@@ -124,7 +128,11 @@ def sampled_sliding_mode(
         return made, SampledDesign(step=step, runs=None, reason=reason)
     runs = tightened(made.found)
     held = runs.held
-    delayed = reached_delay(held.step, lambda delay: careful(held.step, delay).found, held.step / 8)
+    delayed = reached_again(
+        lambda delay: careful(held.step, delay).found,
+        lambda attempt: reached_delay(held.step, attempt, held.step / 8),
+        *(task, law, held.step, "delay"),
+    )
     return replace(made, found=runs), SampledDesign(
         step=step,
         runs=runs,

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from fractions import Fraction
 from math import sqrt
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
+from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.synthesis.guaranteed.design import MOST_DELAY, design_held, first_held
@@ -80,6 +81,35 @@ def longest_delay(
 def reached_delay(step: Fraction, attempt: Attempt, first: Fraction) -> Guarantee | None:
     """The same for any kind of design, an attempt at a delay [s], and the one to try first."""
     return _last(reached(attempt, first, most=MOST_DELAY * step))
+
+
+def reached_again(attempt: Attempt, search: Callable[[Attempt], Guarantee | None], *question: Any) -> Guarantee | None:
+    """What a search for the longest time ends with, tried at once where it ended before; each attempt is for itself.
+
+    Parameters
+    ----------
+    attempt : callable
+        What it answers depends on the time [s] and the question alone.
+    search : callable
+        Of an attempt.
+    *question
+        Values that say everything, see `quakedesign.cache`.
+    """
+    made: dict[Fraction, Guarantee | NoGuarantee] = {}
+
+    def once(time: Fraction) -> Guarantee | NoGuarantee:
+        if time not in made:
+            made[time] = attempt(time)
+        return made[time]
+
+    def ended() -> list[str]:
+        last = search(once)
+        return [str(time) for time, found in made.items() if found is last]
+
+    for time in search_once(ended, "reach", *question):
+        if isinstance(found := once(Fraction(time)), Guarantee):
+            return found
+    return search(once)
 
 
 def _attempt(search: Search, near: np.ndarray | None = None) -> Attempt:
