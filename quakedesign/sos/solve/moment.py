@@ -18,7 +18,6 @@ from scipy import sparse
 
 from quakedesign.sos.exact.polynomial import Exponents
 
-SOLVER = "Clarabel"
 _LARGEST_MARGINS = (4.0, 1e-2, 1e-5)  # keep the programme bounded where every polynomial is in the cone
 
 

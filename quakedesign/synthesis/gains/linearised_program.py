@@ -13,13 +13,13 @@ from typing import Any
 from quakedesign.certificates import Loop
 from quakedesign.certificates.obligations import Obligation, power_sum
 from quakedesign.certificates.witnesses import statement_of
-from quakedesign.rationals import nearest
 from quakedesign.sos.solve.joint import Demand, JointProgram
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov.balancing import exponents_of, lifted_scale, normal
 from quakedesign.synthesis.lyapunov.gain_forms import Kin, float_rows
 from quakedesign.synthesis.lyapunov.parametric_forms import Row, values_of
+from quakedesign.synthesis.lyapunov.search import sum_of
 
 Form = dict[tuple[int, ...], Any]
 """Polynomial with floats."""
@@ -72,12 +72,7 @@ class Neighbourhood:
 
     def function(self, decision: Sequence[float]) -> tuple[Term, ...]:
         """V of a decision, to 2^−40 in the scaled variables."""
-        chosen = [nearest(a, _GRID) for a in decision[: len(self.monomials)]]
-        return tuple(
-            Term(a / size, t.parameters, t.factors)
-            for a, size, t in zip(chosen, self.sizes, self.monomials, strict=True)
-            if a
-        )
+        return sum_of(self.monomials, self.sizes, decision[: len(self.monomials)], _GRID)
 
 
 def neighbourhood(

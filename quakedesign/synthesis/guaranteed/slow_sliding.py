@@ -49,27 +49,6 @@ _DIGITS, _SHORT = 6, 3
 _AXES = ("direct_effect", "evolution_effect", "critical_slip")
 
 
-def guaranteed_sliding(
-    task: SlidingTask, step: Fraction, *, log_rate: Fraction = LOG_RATE, **around: Unpack[Around]
-) -> SlidingGuarantee | NoGuarantee:
-    """A law that keeps |ln(v/V)| below a bound under the stress of a task, for all constants of its box.
-
-    Parameters
-    ----------
-    task : SlidingTask
-    step : Fraction
-        T_s [s].
-    log_rate : Fraction
-        Y [-].
-    **around : Fraction
-        As in `design_held`; a lag or a diffusion is needed.
-    """
-    held = designed_sliding(task, step, log_rate=log_rate, **around)
-    if isinstance(held, NoGuarantee):
-        return held
-    return proved_sliding(task, held, log_rate)
-
-
 def proved_sliding(task: SlidingTask, held: Held, log_rate: Fraction = LOG_RATE) -> SlidingGuarantee | NoGuarantee:
     """Cells and claims for a law, or why there are none."""
     claims = _claims(worst_corner(task), held, log_rate)

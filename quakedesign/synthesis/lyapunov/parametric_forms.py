@@ -12,8 +12,6 @@ from quakedesign.certificates.obligations import Obligations, power_sum
 from quakedesign.sos import Polynomial
 from quakedesign.symbolic.terms import Term, cell_polynomial
 
-Ends = Mapping[str, tuple[tuple[str, int], ...]]
-"""For every uncertain parameter its ends, each a name times ±1."""
 Part = tuple[int, tuple[int, ...], tuple[str, ...], Fraction | float]
 """j, exponents, names multiplied, coefficient."""
 

@@ -117,12 +117,17 @@ class Family:
 
     def function(self, decision: Sequence[float], digits: int) -> tuple[Term, ...]:
         """V with coefficients rounded to multiples of 1/digits in the scaled variables."""
-        chosen = [nearest(a, digits) for a in decision]
-        return tuple(
-            Term(a / size, t.parameters, t.factors)
-            for a, size, t in zip(chosen, self.sizes, self.monomials, strict=True)
-            if a
-        )
+        return sum_of(self.monomials, self.sizes, decision, digits)
+
+
+def sum_of(
+    monomials: Sequence[Term], sizes: Sequence[Fraction], decision: Sequence[float], digits: int
+) -> tuple[Term, ...]:
+    """Σ a_j·monomial_j/size_j with every a_j rounded to a multiple of 1/digits."""
+    chosen = [nearest(a, digits) for a in decision]
+    return tuple(
+        Term(a / size, t.parameters, t.factors) for a, size, t in zip(chosen, sizes, monomials, strict=True) if a
+    )
 
 
 def family_of(loop: Loop, degree: int, scale: Sequence[Fraction]) -> Family | None:
