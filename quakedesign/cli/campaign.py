@@ -1,10 +1,11 @@
 """The command that runs many samples of one closed loop."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.cli.hardware import ActuatorOptions, SensorOptions
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, LawOptions, Output, RunOptions
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, LawOptions, Output, RunOptions
 from quakedesign.cli.shared import Metres, MetresPerSecond, Whole, app, console, progress
 from quakedesign.errors import ParameterError
 from quakedesign.interruption import remedy
@@ -37,6 +38,7 @@ def campaign(
     workers: Whole | None = None,
     scheduler: str | None = None,
     out: Path | None = None,
+    format: Formats = ("png",),
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
@@ -76,6 +78,7 @@ def campaign(
     """
     from quakedesign.fault import load_fault
     from quakedesign.loop.schemes import own_way
+    from quakedesign.report.figure_files import figure_bytes
     from quakedesign.simulation.campaign import campaign_problem, run_campaign
     from quakedesign.simulation.run import sampled_scheme
 
@@ -104,9 +107,10 @@ def campaign(
     remedy(f"the same command goes on from {folder}")
     with progress() as tell:
         done = run_campaign(problem, samples, folder, tell=tell, **options)
-        done.save(folder)
+        drawn = done.plot()
+        done.save(folder, {f"distribution.{kind}": figure_bytes(drawn, kind, "distribution") for kind in format})
         answer = done.to_dict() | _again(done, rerun, folder)
-    output.show(answer, lambda: _print(problem, done, answer, folder))
+    output.show(answer, lambda: _print(problem, done, answer, f"{folder}/ ({_written(answer, format)})"))
     return 1 if done.failures else 0
 
 
@@ -120,7 +124,7 @@ def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
     return {"rerun": {"index": index, "file": str(path), **told}}
 
 
-def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], folder: Path) -> None:
+def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], written: str) -> None:
     from rich.table import Table
 
     from quakedesign.simulation.metrics import StickMetrics
@@ -147,5 +151,12 @@ def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], folder:
     for failure in answer["failures"]:
         span = f"{failure['samples'][0]} … {failure['samples'][-1]}"
         out.print(f"failed: samples {span}: {failure['reason']}")
-    more = f", {Path(answer['rerun']['file']).name}" if "rerun" in answer else ""
-    out.print(f"written: {folder}/ (results.json, samples.csv, distribution.png{more})")
+    out.print(f"written: {written}")
+
+
+def _written(answer: dict[str, Any], formats: Sequence[str]) -> str:
+    """Names of the files in the folder."""
+    from quakedesign.report.figure_files import file_names
+
+    again = [Path(answer["rerun"]["file"]).name] if "rerun" in answer else []
+    return ", ".join(["results.json", "samples.csv", file_names("distribution", formats), *again])

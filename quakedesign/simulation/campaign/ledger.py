@@ -17,7 +17,7 @@ from quakedesign.output import write_whole
 from quakedesign.temporary import FAMILY, sweep
 
 MANIFEST, BATCHES = "campaign.json", "batches"
-_RESULTS = ("results.json", "samples.csv", "distribution.png", "sample-*.nc")
+_RESULTS = ("results.json", "samples.csv", "distribution.*", "sample-*.nc")
 _NAMED = 5
 
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO
@@ -193,24 +193,33 @@ class Campaign:
         columns |= {f"{m} [{StickMetrics.unit(m) or '-'}]": self.values(m) for m in self.metrics}
         return pd.DataFrame(columns, index=pd.Index(range(len(numbers)), name="sample"))
 
-    def save(self, folder: str | Path) -> None:
-        """Write ``results.json``, ``samples.csv`` and ``distribution.png`` into a folder, each whole.
+    def save(self, folder: str | Path, figures: Mapping[str, bytes] | None = None) -> None:
+        """Write ``results.json``, ``samples.csv`` and figures into a folder, each whole.
+
+        Parameters
+        ----------
+        folder : str or Path
+        figures : mapping of str to bytes, optional
+            Contents of files by name; ``distribution.png`` unless given.
 
         Raises
         ------
         OutputError
             When a file cannot be written.
         """
-        drawn = BytesIO()
-        self.plot().savefig(drawn, format="png", dpi=150, metadata={"Software": None})
         text = json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n"
         contents = {
             "results.json": text,
             "samples.csv": self.to_pandas().to_csv(),
-            "distribution.png": drawn.getvalue(),
+            **({"distribution.png": self._drawn()} if figures is None else figures),
         }
         for name, content in contents.items():
             write_whole(Path(folder) / name, content)
+
+    def _drawn(self) -> bytes:
+        drawn = BytesIO()
+        self.plot().savefig(drawn, format="png", dpi=150, metadata={"Software": None})
+        return drawn.getvalue()
 
     def plot(self) -> Any:
         """Return a matplotlib Figure of the distribution of the metrics."""
