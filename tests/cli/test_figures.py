@@ -33,7 +33,9 @@ def test_compare_prints_the_keys_of_design_and_writes_nothing(short, capsys, tmp
     code, out, _ = run(capsys, "compare", str(short), "--controller", "elqr", "--json")
     found = json.loads(out)
     assert code == 0
-    assert {"fault", "controllers", "published", "uncontrolled", "versions", "numbers", "printed"} == set(found)
+    told = {"fault", "controllers", "published", "uncontrolled", "not_applicable", "versions", "numbers", "printed"}
+    assert told == set(found)
+    assert found["not_applicable"] == {}
     assert found["controllers"]["elqr"]["certificate"] is None
     assert found["controllers"]["elqr"]["verdict"] == "proved"
     assert [p.name for p in tmp_path.iterdir()] == ["short.toml"]
