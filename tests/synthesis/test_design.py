@@ -151,7 +151,7 @@ def test_an_unknown_controller_is_one_clear_message(real):
 
 @pytest.mark.parametrize("law", ["cta", "elqr"])
 def test_options_that_do_not_go_together_are_one_message(real, law):
-    with pytest.raises(ParameterError, match=r"designs that are not continuous\. Received 'peak' with continuous"):
+    with pytest.raises(ParameterError, match=r"in continuous time must be tracking\. Received 'peak'"):
         qd.design(real, law, continuous=True, objective="peak")
     with pytest.raises(ParameterError, match="one of tracking, peak"):
         qd.design(real, law, objective="speed")
