@@ -14,11 +14,13 @@ from scipy.linalg import expm
 from standalone_guarantee import checker
 
 from quakedesign.certificates.claim import Verdict
-from quakedesign.certificates.guarantee import guarantee
+from quakedesign.certificates.guarantee import Guarantee, Held, guarantee
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.guarantee.free_response import free_peaks
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.loop import ImplicitRoot, PeriodicLoop, Power, Segment, compensated
+from quakedesign.synthesis.guaranteed.path_design import STARTS, path_laws
 
 PROOFS = Path(__file__).parents[3] / "proofs" / "certificates"
 
@@ -249,3 +251,32 @@ def test_an_implicit_step_begins_with_the_slip_rate_that_it_is_told_noise_includ
 def test_a_bound_has_no_sign(bound):
     with pytest.raises(ParameterError, match="initial slip and slip rate are bounds of both signs, 0 or more"):
         replace(stored().held, **{bound: F(-1)})
+
+
+def followed(loop, periods):
+    """Largest outputs from the corners of a box, at 24 times in every flow, by matrix exponentials in floats."""
+    flow, rows = np.array(loop.flow, dtype=float), np.array([*loop.outputs.values()], dtype=float)
+    first, second = np.array(loop.start, dtype=float)
+    now, largest = np.array([first + second, first - second]).T, np.zeros(len(rows))
+    parts = [(np.array(part.jump, dtype=float), expm(flow * float(part.duration) / 24)) for part in loop.segments]
+    for jump, step in parts * periods:
+        now = jump @ now
+        for _ in range(24):
+            largest = np.maximum(largest, abs(rows @ now).max(axis=1))
+            now = step @ now
+    return largest
+
+
+@pytest.mark.parametrize("around", [{"lag": F("0.1")}, {"delay": F("0.02")}])
+def test_through_rock_and_late_both_bound_what_is_seen_of_the_free_response(around):
+    task, step, around = stored().task, F("0.05"), {"diffusion": F(1), **around}
+    law = path_laws(task.model, step, around)(np.array(STARTS[0]))
+    held = Held(law=law, step=step, initial_slip=F("1e-5"), initial_slip_rate=F("4e-5"), **around)
+    loop = held.loop(task)
+    raw = json.loads(guarantee_text(Guarantee(task=task, held=held, claims=stored().claims)))
+    theirs = checker.start_gains(checker.read_loop(raw["loop"], checker.read_task(raw), held.start))
+    ours = [max(peaks) for peaks in free_peaks(loop).values()]
+    assert np.allclose(np.array(ours, float), [float(max(peaks)) for peaks in theirs], rtol=1e-9)
+    seen = followed(loop, 160)
+    assert np.all(seen * (1 - 1e-12) <= np.array(ours, float))
+    assert np.all(np.array(ours, float) <= 1.02 * seen)
