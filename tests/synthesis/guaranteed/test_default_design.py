@@ -83,9 +83,9 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     said = f"NOT for the fault's T_s = 0.1 s: it runs once every {float(step):.4g} s"
     assert said in repr(design)
     assert said.replace("'", "&#x27;") in design._repr_html_()
-    entry = SimpleNamespace(design=design, guarantee=design.guarantee)
+    entry = SimpleNamespace(design=design, guaranteed=design.guarantee)
     monkeypatch.setattr(page, "_natural", lambda _: "an earthquake")
-    told = page.answer(SimpleNamespace(of=lambda _: (entry,)))
+    told = page.answer(SimpleNamespace(of=lambda _: (entry,), left_out={}))
     assert told[:2] == ["an earthquake", f"e-LQR: {said}"]
     assert designed("real").other_step == ""
     said = headlines.limit_lines(SimpleNamespace(design=design, answer=SimpleNamespace(limit_lines=list)))[0]
