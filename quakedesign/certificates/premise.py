@@ -56,7 +56,7 @@ class Premise:
     def sides(self) -> tuple[str, str]:
         """Texts of what is required, rounded up, and certified, rounded down, with the unit; of one number, said so."""
         unit = "" if self.unit == "-" else f" {self.unit}"
-        if self.required == self.certified:
+        if self.required == self.certified != 0:
             return f"at most {self.required:.4g}{unit}", "the same number"
         return f"{self.required:.4g}{unit}", f"{self.certified:.4g}{unit}"
 

@@ -22,6 +22,7 @@ from quakedesign.rationals import rational
 
 _DIGITS = 6
 _WEAKENING = {"residual", "drop", "critical_slip"}
+_RATE_AND_STATE = ("direct_effect", "evolution_effect", "critical_slip")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,9 +72,9 @@ def cover(law: FrictionLaw, ranges: Mapping[str, tuple[float, float]], box: Unce
     return Cover(law=held, box=replace(box, name="own", authority=authority))
 
 
-def _decimal(value: Fraction, *, up: bool) -> Fraction:
+def _decimal(value: Fraction, *, up: bool, digits: int = _DIGITS) -> Fraction:
     """Decimal of a few digits that is not below (`up`) or not above a rational."""
-    context = Context(prec=_DIGITS, rounding=ROUND_CEILING if up else ROUND_FLOOR)
+    context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return Fraction(context.divide(Decimal(value.numerator), Decimal(value.denominator)))
 
 
@@ -148,7 +149,8 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
     said = (
         "friction and uncertainty below hold every law of the boxes"
         if covers(identification.law)
-        else "friction below is the best fit: a fault file holds no ranges of this law"
+        else "friction below is the best fit: a fault file holds no ranges of this law; "
+        f"--spread {_spread(identification)} of design and guarantee holds those of a, b and D_c"
     )
     return [
         f"Friction identified from {identification.record.name!r} as {identification.law.name}; "
@@ -156,6 +158,13 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
         f"Best fit (95 % alone; box of all together); {said}.",
         *(_remark(estimate) for estimate in identification.estimates.values()),
     ]
+
+
+def _spread(identification: Identification) -> str:
+    """By how much of their best values a, b and D_c leave them in the box, rounded up to two digits."""
+    found = [identification.estimates[name] for name in _RATE_AND_STATE]
+    shares = [abs(rational(end) / rational(e.value) - 1) for e in found for end in (e.least, e.most)]
+    return f"{float(_decimal(max(shares), up=True, digits=2)):g}"
 
 
 def _remark(estimate: Estimate) -> str:

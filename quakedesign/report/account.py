@@ -83,7 +83,7 @@ def _account(entry: "Entry") -> Account:
     domain = [domain_sentence(design.domain)] if design.domain else []
     return Account(
         label=entry.label,
-        badge=_badge(entry),
+        badge=badge(entry),
         good=entry.guaranteed is not None or grade(entry) == "proved for this loop and task",
         guarantee=[line for line in said if line not in (*limits, *compensated)],
         run=run,
@@ -119,10 +119,11 @@ def _slowly(entry: "Entry") -> list[str]:
     ]
 
 
-def _badge(entry: "Entry") -> str:
+def badge(entry: "Entry") -> str:
     """Verdict in two or three words."""
     if entry.guaranteed is not None:
-        return "guaranteed as it runs"
+        step = entry.design.controller.sampling_time if entry.design.other_step and entry.design.controller else None
+        return f"guaranteed at {step:.4g} s only" if step else "guaranteed as it runs"
     found = entry.design.verdict
     return "proved in continuous time only" if found is Verdict.PROVED else str(found)
 

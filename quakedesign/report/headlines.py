@@ -32,14 +32,15 @@ def limit_lines(entry: "Entry") -> list[str]:
 
 
 def _reach(entry: "Entry") -> list[str]:
-    """How long T_s and a delay may be for designs of the same kind."""
+    """How long T_s and a delay may be for designs of the same kind, as far as the search of a design goes."""
     certified = {p.name: p.certified for p in entry.design.premises if p.name in ("sampling_time", "delay")}
     if not certified:
         return []
-    step, delay = (f"{LowerBound(Fraction(certified[name])):.3g} s" for name in ("sampling_time", "delay"))
+    step, delay = (LowerBound(Fraction(certified[name])) for name in ("sampling_time", "delay"))
     law = entry.design.controller
     own = f"at T_s = {law.sampling_time:.6g} s" if law and law.sampling_time else "at the fault's own T_s"
-    return [f"designs with a guarantee were found for T_s up to {step}, and {own} for delays up to {delay}"]
+    late = f"for delays up to at least {delay:.3g} s" if delay else "no delay was found with one"
+    return [f"designs have a guarantee for T_s up to at least {step:.3g} s, and {own} {late}"]
 
 
 def said(entry: "Entry") -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from quakedesign.errors import ParameterError, RecordError
 from quakedesign.fault import friction_law, load_fault
-from quakedesign.identification import Record, cover, identified_fault, identify, save_fault
+from quakedesign.identification import Estimate, Record, cover, identified_fault, identify, save_fault
 from quakedesign.identification.setup import set_up
 from quakedesign.rationals import rational
 
@@ -161,6 +161,25 @@ def test_the_file_is_a_fault_that_covers_the_truth(weak, tmp_path):
     assert fault.friction.slip_slope > 0.17 / 2.5e-3
     assert 0 < fault.box.authority < Fraction(1, 20)
     assert "drop = 0.17" in path.read_text()
+
+
+def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, tmp_path):
+    """The remark names the worst end of three; the other numbers do not count."""
+    law = load_fault("crustal-patch").friction
+    values = {
+        name: getattr(law, name)
+        for name in ("direct_effect", "evolution_effect", "critical_slip", "reference_coefficient")
+    }
+    estimates = {
+        name: Estimate(name=name, unit="", value=v, low=v, high=v, least=0.99 * v, most=1.01 * v)
+        for name, v in values.items()
+    }
+    b = estimates["evolution_effect"]
+    estimates["evolution_effect"] = replace(b, least=b.value * 0.9377)
+    estimates["reference_coefficient"] = replace(estimates["reference_coefficient"], most=2.0)
+    path = tmp_path / "state.toml"
+    save_fault(replace(weak, law=law, estimates=estimates), load_fault("crustal-patch"), path)
+    assert "--spread 0.063 of design and guarantee" in path.read_text()
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from quakedesign.controllers import control_law
@@ -40,7 +41,10 @@ def test_a_study_is_a_table_and_a_figure(orders):
 def test_the_orders_hold_over_three_decades():
     steps = [0.184 * 10 ** (-k / 2) for k in range(7)]
     study = accuracy(REAL, LAW, steps=steps, duration=120.0, settled_from=60.0)
-    assert list(study.orders()["explicit"].values()) == pytest.approx((3, 2, 1), abs=0.1)
+    # at coarse steps the cycle of the explicit scheme is irregular and hangs on last digits
+    explicit = [np.polyfit(np.log(steps[3:]), np.log(e[3:]), 1)[0] for e in study.errors["explicit"].values()]
+    assert explicit == pytest.approx((3, 2, 1), abs=0.05)
+    assert list(study.orders()["explicit"].values()) == pytest.approx((3, 2, 1), abs=0.17)
     assert list(study.orders()["implicit"].values()) == pytest.approx((2, 2, 0.5), abs=0.05)
     assert list(study.orders()["compensated"].values()) == pytest.approx((3, 2.15, 1), abs=0.05)
 

@@ -221,7 +221,10 @@ class Guarantee:
     held: Held
     claims: Claims
     slow_gain: SlowGain | None = None
-    covers: ClassVar[str] = "every friction law of the box and every disturbance up to the stated size"
+    covers: ClassVar[str] = (
+        "every friction law of the box and every disturbance up to the stated size, for a plant continued to negative "
+        "slip rates"
+    )
 
     def __repr__(self) -> str:
         held, claims = self.held, self.claims

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
+from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
@@ -54,7 +55,7 @@ class Answer:
                 said.append(
                     f"{name}: slip error {seen.slip_error:.3g} m, slip-rate error {seen.slip_rate_error:.3g} m/s"
                 )
-        said += self.limit_lines()
+        said += self.limit_lines() + self._narrower_class()
         if self.leaves_with_stick:
             said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
         return said if self.compensation is None else [*said, self.compensation.sentence()]
@@ -68,6 +69,18 @@ class Answer:
         both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
         rate = f"{limit.slip_rate_error:.3g} m/s"
         return [f"no controller held over T_s = {step} keeps the slip-rate error below {rate}{both}"]
+
+    def _narrower_class(self) -> list[str]:
+        """That the fault's own disturbance belongs to the class ``rate`` as well, for people."""
+        given = self.fault.disturbance
+        own = isinstance(self.found, Guarantee) and self.found.task.change is None
+        if not own or given.constant or not given.largest_rate:
+            return []
+        change = UpperBound(given.exact_bounds[1])
+        return [
+            f"this covers disturbances that jump; the fault's own changes by at most {change:.3g} m/s^3, for which the "
+            "class rate may prove much less"
+        ]
 
     @property
     def limit(self) -> SmallestPeak | None:

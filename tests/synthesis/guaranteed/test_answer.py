@@ -1,5 +1,6 @@
 """A guarantee beside what was seen: claims that a course with stick leaves make way, one by one."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 from importlib import import_module
 from pathlib import Path
@@ -50,6 +51,19 @@ def test_a_claim_that_a_course_with_stick_leaves_is_that_of_any_gain(monkeypatch
     assert (found.found.check(), found.found.slow_gain) == (Verdict.PROVED, SLOW.slow_gain)
     for name in ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure"):
         assert getattr(found.found.claims, name) == getattr(ANYHOW if name in left else SLOW.claims, name)
+
+
+def test_a_disturbance_that_is_slow_has_a_class_of_its_own(monkeypatch):
+    found = stuck(monkeypatch, 0.0, 0.0)
+    given = found.fault.disturbance
+    said = [line for line in found.lines() if "class rate may prove much less" in line]
+    assert len(said) == 1
+    assert f"changes by at most {given.amplitude * given.frequency:.3g}"[:-1] in said[0]
+    for other in (replace(given, constant=1e-6), replace(given, frequency=0.0)):
+        asked = replace(found, fault=replace(found.fault, disturbance=other))
+        assert "class rate" not in " ".join(asked.lines())
+    of_rate = replace(found.found, task=replace(found.found.task, change=F(1)))
+    assert "may prove much less" not in " ".join(replace(found, found=of_rate).lines())
 
 
 def test_a_course_beyond_both_is_said_and_the_narrow_claims_stay(monkeypatch):

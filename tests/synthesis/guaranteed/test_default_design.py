@@ -15,7 +15,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.report import headlines, page
+from quakedesign.report import account, headlines, page
 from quakedesign.synthesis import answer, assess
 from quakedesign.synthesis.guaranteed import design_held, reached
 
@@ -89,7 +89,14 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert told[:2] == ["an earthquake", f"e-LQR: {said}"]
     assert designed("real").other_step == ""
     said = headlines.limit_lines(SimpleNamespace(design=design, answer=SimpleNamespace(limit_lines=list)))[0]
-    assert f"T_s up to {float(step):.3g} s, and at T_s = {float(step):.6g} s for delays up to " in said
+    assert f"T_s up to at least {float(step):.3g} s, and at T_s = {float(step):.6g} s for delays up to at least" in said
+    late = replace(premises(design)["delay"], certified=F(0))
+    without = SimpleNamespace(design=design.with_premise(late), answer=SimpleNamespace(limit_lines=list))
+    assert headlines.limit_lines(without)[0].endswith(" s no delay was found with one")
+    assert late.sides == ("0 s", "0 s")
+    assert account.badge(entry) == f"guaranteed at {float(step):.4g} s only"
+    real = SimpleNamespace(design=designed("real"), guaranteed=designed("real").guarantee)
+    assert account.badge(real) == "guaranteed as it runs"
     # the same law held over the fault's own T_s has none
     assert guarantee(task_of(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
 
