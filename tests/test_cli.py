@@ -358,7 +358,7 @@ fastest_rate = "1 m/s"
     found = json.loads(run(capsys, "fault", str(path), "--json")[1])
     assert [found[name] for name in ("seismic_moment", "magnitude", "rest_slip")] == [None] * 3
     refused = {
-        ("design", str(path), "--out", str(tmp_path / "out")): "Use fault, derive, simulate or guarantee",
+        ("campaign", str(path), "--samples", "2"): "Use fault, derive, simulate, guarantee or design",
         ("guarantee", str(path)): "Give --diffusion, such as '833 s', or --lag",
     }
     for command, remedy in refused.items():

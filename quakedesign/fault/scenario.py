@@ -1,5 +1,6 @@
 """Fault descriptions: TOML files with unit strings, checked at the boundary and turned into `Fault`."""
 
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, replace
@@ -156,9 +157,11 @@ def _task(table: Table | None, problems: Problems) -> dict[str, float] | None:
 
 def _authority(parts: Mapping[str, Any]) -> Fraction:
     """A/m [m²/kg]; of a plant that is wrong, and refused for it, any."""
-    sides = [side for side in (parts.get("length"), parts.get("width")) if side]
-    density = parts.get("density")
-    return 1 / (rational(density) * rational(min(sides))) if density and sides else Fraction(1)
+    density, *sides = (parts.get(name) for name in ("density", "length", "width"))
+    told = [value for value in (density, *sides) if value is not None]
+    if density is None or len(told) == 1 or not all(0 < value < math.inf for value in told):
+        return Fraction(1)
+    return 1 / (rational(density) * rational(min(told[1:])))
 
 
 def _disturbance(table: Table | None, problems: Problems, authority: Fraction) -> Disturbance | None:

@@ -11,7 +11,7 @@ from mpmath import mp
 from scipy.linalg import expm
 from standalone_guarantee import checker
 
-from quakedesign.certificates.guarantee import ball_matrices, sector
+from quakedesign.certificates.guarantee import ball_matrices, sector, slowest_mode
 from quakedesign.certificates.guarantee import norms as package
 from quakedesign.certificates.guarantee.flow_norms import flow_norms
 from quakedesign.certificates.guarantee.norms import norms
@@ -583,7 +583,8 @@ def test_a_loop_that_grows_or_stays_is_refused_before_anything_is_summed(mode, m
 
 def test_a_loop_of_two_slow_modes_is_refused(monkeypatch):
     """9/10 and 8/10 after 2³ periods: one alone can be seen as it is."""
-    monkeypatch.setattr(package, "_MOST_DOUBLINGS", 3)
+    for module in (package, slowest_mode):
+        monkeypatch.setattr(module, "MOST_DOUBLINGS", 3)
     monkeypatch.setattr(checker, "DOUBLINGS", 3)
     jump = [[F(9, 10), F(0)], [F(0), F(8, 10)]]
     with pytest.raises(ParameterError, match="not seen to be in 8 periods"):

@@ -154,11 +154,12 @@ def _sliding(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
 
 
 def _continuous(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
+    bounds = sectors(problem.fault)
     try:
         found = riccati_design(problem.fault)
     except ParameterError as error:
         return problem.undecided(law.name, str(error))
-    loop = sector_loop(found.controller, sectors(problem.fault))
+    loop = sector_loop(found.controller, bounds)
     certificate = _of_riccati(loop, found) or quadratic_certificate(loop, theta=found.theta)
     details = {
         "R": found.R,
