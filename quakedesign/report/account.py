@@ -115,7 +115,7 @@ def _slowly(entry: "Entry") -> list[str]:
         "about slow sliding at V, with v = V e^y and θ = (D_c/V) e^z, the loop is linear but for the exponentials, "
         "which stand in sectors on |y| ≤ Y, for inertia, whose fast mode is bounded, and for modes of the rock that "
         "the loop leaves out, bounded too; peaks of the responses of the linear loop bound all errors, and claims that "
-        f"follow from themselves hold for ever; the box of constants falls into {cells}",
+        f"follow from themselves hold {found.lasts}; the box of constants falls into {cells}",
     ]
 
 

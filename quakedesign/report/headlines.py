@@ -7,6 +7,7 @@ from typing import Any
 
 from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
+from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.certificates.premises import Domain, Variant
 from quakedesign.report.linear import held_sentences, peaks_sentence
 from quakedesign.report.outcomes import run_sentences
@@ -84,7 +85,8 @@ def sentences(entry: "Entry") -> list[str]:
 def _verdict(design: Design) -> list[str]:
     """Of the loop that ran or in continuous time, with the reason where it is not positive."""
     if design.verdict is Verdict.PROVED:
-        return ["proved for the loop that ran, for ever" if _sampled(design) else "proved in continuous time"]
+        lasts = "for ever" if design.runs is None or isinstance(design.runs, NoGuarantee) else design.runs.lasts
+        return [f"proved for the loop that ran, {lasts}" if _sampled(design) else "proved in continuous time"]
     unsaid = {Verdict.REFUTED: "a counterexample checks in exact arithmetic", Verdict.UNDECIDED: "no certificate"}
     return _because(design.verdict, design.details.get("reason", unsaid[design.verdict]))
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 MODEL_LIMITS = (
     "the model is a block with one degree of freedom: it says nothing of where an earthquake ends, of rupture speed, "
     "of heating, or of seismicity around the fault",
-    "a guarantee is about every friction law, parameter and disturbance of its box; whether the fault is in the box is "
-    "a question of geology",
+    "a guarantee is about what it names, such as every friction law, parameter and disturbance of a box; whether the "
+    "fault is in it is a question of geology",
     "in these runs the pressure has no limit and is even over the patch",
 )
 REST_LIMITS = (

@@ -1,6 +1,7 @@
 """What `design` says and writes of a fault with rate-and-state friction: outcome, guarantee, cycle, one report."""
 
 import json
+import re
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -83,6 +84,8 @@ def test_the_report_is_the_one_of_all_faults(folder):
     assert first.index("never exceeds") < first.index("Not designed, 2-CTA, 2-DIA")
     assert "the slip rate follows the pressure at once" in first
     assert "guaranteed as it runs" in page
+    assert not re.search(r"for ever\b", page[: page.index("Glossary")])
+    assert first.index("every shear stress disturbance up to") < first.index("while the reference goes")
     assert "a well near the fault" in page
     assert "continued to negative slip rates" not in page
 

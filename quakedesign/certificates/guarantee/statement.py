@@ -213,8 +213,8 @@ class Guarantee:
     claims : Claims
     slow_gain : SlowGain, optional
         How the proof uses that the input gain is slow; None for one that lets it jump.
-    covers : str
-        For what it holds, in short.
+    covers, lasts : str
+        For what it holds, and for how long, in short.
     """
 
     task: Task
@@ -225,6 +225,7 @@ class Guarantee:
         "every friction law of the box and every disturbance up to the stated size, for a plant continued to negative "
         "slip rates"
     )
+    lasts: ClassVar[str] = "for ever"
 
     def __repr__(self) -> str:
         held, claims = self.held, self.claims

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
@@ -25,15 +25,23 @@ class SlidingGuarantee:
     cuts : Cuts
         How the box of constants falls into cells.
     claims : SlidingClaims
-    covers : str
-        For what it holds, in short.
     """
 
     task: SlidingTask
     held: Held
     cuts: Cuts
     claims: SlidingClaims
-    covers: ClassVar[str] = "the stated constants of friction and every shear stress disturbance up to the stated size"
+
+    @property
+    def covers(self) -> str:
+        """For what it holds, in short."""
+        stress = LowerBound(self.task.stress).quantity("Pa")
+        return f"the stated constants of friction and every shear stress disturbance up to {stress}, {self.lasts}"
+
+    @property
+    def lasts(self) -> str:
+        """For how long it holds, in short."""
+        return f"while the reference goes {float(self.task.distance):.4g} m"
 
     def __repr__(self) -> str:
         return f"SlidingGuarantee({self.task.name}: |ln(v/V)| <= {self.claims.log_rate:.4g})"
