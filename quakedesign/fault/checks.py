@@ -82,6 +82,11 @@ def require_finite(remedy: str = "", **values: float) -> None:
     _require(values, lambda v: True, "finite", remedy)
 
 
+def is_ordinary(size: float | Fraction, least: float = 1 / _LARGEST) -> bool:
+    """Whether a positive number can be the size of something in SI units."""
+    return least <= size <= _LARGEST
+
+
 def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) -> None:
     """Refuse values that are no sizes of anything, so that no product of them leaves the floats; zero is one.
 
@@ -92,7 +97,7 @@ def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) ->
     problems = Problems()
     for name, value in values.items():
         with problems.collected():
-            if value and not (least <= value <= _LARGEST or least <= -value <= _LARGEST):
+            if value and not is_ordinary(max(value, -value), least):
                 raise ParameterError(
                     f"{name} must be of a size between {least:g} and {_LARGEST:g} in SI units. "
                     f"Received {shown(value)}. Check its unit."

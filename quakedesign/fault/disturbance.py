@@ -31,6 +31,8 @@ def acceleration(quantity: Any, authority: Fraction, name: str) -> float:
     ------
     UnitError
         For another unit.
+    ParameterError
+        For a stress that is no size of anything on this fault.
     """
     try:
         return si_value(quantity, "m/s^2", name)
@@ -41,6 +43,7 @@ def acceleration(quantity: Any, authority: Fraction, name: str) -> float:
             if "Did you mean" in str(other):
                 raise
             raise UnitError(f"{error} A shear stress in Pa will do as well.") from None
+    require_ordinary(**{name: float(stress)})
     exact = abs(stress) * authority
     size = float(exact)
     while rational(size) < exact:  # the decimal that proofs read

@@ -1,6 +1,5 @@
 """Fault descriptions: TOML files with unit strings, checked at the boundary and turned into `Fault`."""
 
-import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, replace
@@ -9,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import ParameterError, ScenarioError
-from quakedesign.fault.checks import Problems, require_name, require_positive
+from quakedesign.fault.checks import Problems, is_ordinary, require_name, require_positive
 from quakedesign.fault.defaults import completed
 from quakedesign.fault.disturbance import Disturbance, acceleration
 from quakedesign.fault.friction import friction_law
@@ -159,7 +158,7 @@ def _authority(parts: Mapping[str, Any]) -> Fraction:
     """A/m [m²/kg]; of a plant that is wrong, and refused for it, any."""
     density, *sides = (parts.get(name) for name in ("density", "length", "width"))
     told = [value for value in (density, *sides) if value is not None]
-    if density is None or len(told) == 1 or not all(0 < value < math.inf for value in told):
+    if density is None or len(told) == 1 or not all(map(is_ordinary, told)):
         return Fraction(1)
     return 1 / (rational(density) * rational(min(told[1:])))
 

@@ -21,6 +21,7 @@ from quakedesign.output import write_whole
 from quakedesign.rationals import rational
 
 _DIGITS = 6
+_PROVABLE = "rate-and-state-aging"  # a test compares with what designs take
 _WEAKENING = {"residual", "drop", "critical_slip"}
 _RATE_AND_STATE = ("direct_effect", "evolution_effect", "critical_slip")
 
@@ -149,8 +150,7 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
     said = (
         "friction and uncertainty below hold every law of the boxes"
         if covers(identification.law)
-        else "friction below is the best fit: a fault file holds no ranges of this law; "
-        f"--spread {_spread(identification)} of design and guarantee holds those of a, b and D_c"
+        else "friction below is the best fit: a fault file holds no ranges of this law; " + _ranges(identification)
     )
     return [
         f"Friction identified from {identification.record.name!r} as {identification.law.name}; "
@@ -158,6 +158,12 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
         f"Best fit (95 % alone; box of all together); {said}.",
         *(_remark(estimate) for estimate in identification.estimates.values()),
     ]
+
+
+def _ranges(identification: Identification) -> str:
+    if identification.law.name != _PROVABLE:
+        return f"design and guarantee are for {_PROVABLE} alone"
+    return f"--spread {_spread(identification)} of design and guarantee holds those of a, b and D_c"
 
 
 def _spread(identification: Identification) -> str:

@@ -300,3 +300,14 @@ def test_a_push_is_not_negative_and_friction_with_a_state_has_a_stress_of_its_ow
         load_fault("crustal-patch", disturbance="35 kPa")
     with pytest.raises(ParameterError, match="density must be positive"):
         parse_fault(edited(AMPLITUDE, 'amplitude = "35 kPa"').replace("2500 kg/m^3", "0 kg/m^3"), "own.toml")
+
+
+@pytest.mark.parametrize(
+    ("stress", "density", "said"), [("1e200 Pa", "2500", "amplitude"), ("35 kPa", "1e-250", "density")]
+)
+def test_a_stress_that_no_fault_feels_is_refused_by_its_size(stress, density, said):
+    text = edited(AMPLITUDE, f'amplitude = "{stress}"').replace("2500 kg", f"{density} kg")
+    with pytest.raises(ParameterError, match=f"{said} must be of a size between 1e-40 and 1e.40 in SI units"):
+        parse_fault(text, "own.toml")
+    with pytest.raises(ParameterError, match=r"(amplitude|density) must be of a size"):
+        parse_fault(edited(AMPLITUDE, 'amplitude = "1e200 Pa"').replace("2500 kg", "1e-250 kg"), "own.toml")

@@ -3,14 +3,15 @@
 import importlib.util
 import itertools
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from quakedesign.errors import ParameterError, RecordError
+from quakedesign.certificates.slow_sliding.task import sliding_task
+from quakedesign.errors import ParameterError, RecordError, UnsupportedError
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.identification import Estimate, Record, cover, identified_fault, identify, save_fault
 from quakedesign.identification.setup import set_up
@@ -163,9 +164,11 @@ def test_the_file_is_a_fault_that_covers_the_truth(weak, tmp_path):
     assert "drop = 0.17" in path.read_text()
 
 
-def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, tmp_path):
-    """The remark names the worst end of three; the other numbers do not count."""
-    law = load_fault("crustal-patch").friction
+@pytest.mark.parametrize("name", ["rate-and-state-aging", "rate-and-state-slip", "regularised-rate-and-state"])
+def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, name, tmp_path):
+    """The remark names the worst end of three; the other numbers do not count; of laws without proofs it says so."""
+    patch = load_fault("crustal-patch")
+    law = friction_law(name)(**asdict(patch.friction))
     values = {
         name: getattr(law, name)
         for name in ("direct_effect", "evolution_effect", "critical_slip", "reference_coefficient")
@@ -178,8 +181,13 @@ def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, tmp
     estimates["evolution_effect"] = replace(b, least=b.value * 0.9377)
     estimates["reference_coefficient"] = replace(estimates["reference_coefficient"], most=2.0)
     path = tmp_path / "state.toml"
-    save_fault(replace(weak, law=law, estimates=estimates), load_fault("crustal-patch"), path)
-    assert "--spread 0.063 of design and guarantee" in path.read_text()
+    save_fault(replace(weak, law=law, estimates=estimates), patch, path)
+    try:
+        sliding_task(replace(patch, friction=law), Fraction(0))
+    except UnsupportedError:
+        assert "design and guarantee are for rate-and-state-aging alone." in path.read_text()
+    else:
+        assert "--spread 0.063 of design and guarantee holds" in path.read_text()
 
 
 @pytest.mark.parametrize(
