@@ -8,20 +8,13 @@ from collections.abc import Iterator
 from itertools import product
 
 import sympy as sp
+from filippov import FilippovField, filippov_derivative, inverse, lie_derivative
+from set_valued import restrict
 from steps import Step, cited, equal, printed, text, true
 
 from quakedesign.controllers import control_law
-from quakedesign.symbolic import (
-    AbsolutePower,
-    FilippovField,
-    SignedPower,
-    filippov_derivative,
-    homogeneous,
-    normal_form,
-    restrict,
-)
+from quakedesign.symbolic import AbsolutePower, SignedPower, homogeneous, normal_form
 from quakedesign.symbolic.balls import enclose
-from quakedesign.symbolic.filippov import inverse, lie_derivative
 
 R, ONE = sp.Rational, sp.Integer(1)
 e1, e2, e3, h = sp.symbols("e_1 e_2 e_3 h", real=True)
@@ -105,7 +98,7 @@ def homogeneity_steps() -> Iterator[Step]:
     """Both loops are homogeneous inclusions."""
     for name in GAINS:
         law, loop = control_law(name), closed_loop(name)
-        answer = homogeneous(loop, WEIGHTS)
+        answer = homogeneous(loop.rates, WEIGHTS)
         surfaces = ", ".join(f"{text(p)} (degree {m})" for p, m in answer.switching)
         shown = f"weights (3, 2, 1), degree {answer.degree}; switching surfaces {surfaces}"
         yield true(

@@ -7,10 +7,11 @@ The equilibrium is that of a constant reference (ERRATA 8), W takes the place of
 from collections.abc import Iterator
 
 import sympy as sp
+from set_valued import SetValued
 from steps import Step, cited, equal, printed, text, true
 
 from quakedesign.controllers import Signals, control_law
-from quakedesign.symbolic import SetValued, plant
+from quakedesign.symbolic import plant
 
 r0 = sp.Symbol("r_0", real=True)
 x1, x2, xi1, xi2 = X = (plant.x1, plant.x2, *sp.symbols("xi_1 xi_2", real=True))

@@ -1,4 +1,4 @@
-"""Weighted homogeneity of functions, vector fields and Filippov fields, with a proof or an exact counterexample."""
+"""Weighted homogeneity of functions and of fields with signs, with a proof or an exact counterexample."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,7 +9,6 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.symbolic.balls import enclose
-from quakedesign.symbolic.filippov import FilippovField
 from quakedesign.symbolic.normal_form import normal_form, signs, symbols_of
 
 Weights = Mapping[sp.Symbol, int | sp.Rational]
@@ -140,7 +139,7 @@ def dilate(expression: sp.Expr, weights: Weights, factor: sp.Expr = epsilon) -> 
 
 
 def homogeneous(
-    subject: sp.Expr | FilippovField | Mapping[sp.Symbol, sp.Expr],
+    subject: sp.Expr | Mapping[sp.Symbol, sp.Expr],
     weights: Weights,
     degree: int | sp.Rational | None = None,
 ) -> Homogeneity:
@@ -148,7 +147,7 @@ def homogeneous(
 
     Parameters
     ----------
-    subject : Expr, FilippovField or mapping of Symbol to Expr
+    subject : Expr or mapping of Symbol to Expr
         A function V(Δx) = ε^m V(x), or a field f(Δx) = ε^m Δf(x), single- or set-valued; parameters in intervals and
         all other symbols stay as they are.
     weights : mapping of Symbol to int or Rational
@@ -166,10 +165,8 @@ def homogeneous(
     ParameterError
         When a weight is missing or not positive.
     """
-    rates = subject.rates if isinstance(subject, FilippovField) else subject
-    components = (
-        {s: normal_form(r) for s, r in rates.items()} if isinstance(rates, Mapping) else {None: normal_form(rates)}
-    )
+    rates = subject if isinstance(subject, Mapping) else {None: subject}
+    components = {s: normal_form(r) for s, r in rates.items()}
     missing = [s for s in components if s is not None and s not in weights]
     if missing:
         raise ParameterError(f"every state needs a weight. None was given for {', '.join(map(str, missing))}.")
@@ -211,7 +208,7 @@ def _degrees(dilated: sp.Expr) -> set[sp.Rational] | None:
 def _switching(components: Mapping[Any, Any], weights: Mapping[Any, Any]) -> tuple[tuple[sp.Expr, sp.Rational], ...]:
     switches = dict[sp.Expr, sp.Rational]()
     for e in components.values():
-        for argument in FilippovField(rates={epsilon: e}).switching:
+        for argument in signs(e):
             degrees = _degrees(dilate(argument, weights)) or {sp.Integer(0)}
             switches[argument] = max(degrees)
     return tuple(switches.items())

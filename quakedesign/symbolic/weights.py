@@ -5,20 +5,18 @@ from collections.abc import Mapping
 import sympy as sp
 
 from quakedesign.errors import ParameterError
-from quakedesign.symbolic.filippov import FilippovField
 from quakedesign.symbolic.homogeneity import homogeneous
 from quakedesign.symbolic.normal_form import normal_form
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 
-def weights_for(
-    field: FilippovField | Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational
-) -> dict[sp.Symbol, sp.Rational]:
+def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -> dict[sp.Symbol, sp.Rational]:
     """Weights that make a field homogeneous of a degree, from the linear equations that its terms impose, then proved.
 
     Parameters
     ----------
-    field : FilippovField or mapping of Symbol to Expr
+    rates : mapping of Symbol to Expr
+        Of the field.
     degree : int or Rational
         Such as −1 for sliding modes with a discontinuous integral.
 
@@ -31,7 +29,6 @@ def weights_for(
     ParameterError
         When no weights exist, or they are not unique.
     """
-    rates = field.rates if isinstance(field, FilippovField) else field
     unknown = {state: sp.Dummy(f"r_{state}", positive=True) for state in rates}
     equations: list[sp.Expr] = []
     for state, rate in rates.items():
@@ -46,7 +43,7 @@ def weights_for(
             "Try another degree."
         )
     weights = dict(zip(rates, values, strict=True))
-    if not homogeneous(field, weights, degree):
+    if not homogeneous(rates, weights, degree):
         raise ParameterError(
             f"with the weights {weights} that the terms impose, homogeneity of degree {degree} is not proved."
         )

@@ -1,7 +1,10 @@
-"""Derivatives along discontinuous fields, sets where signs vanish, changes of coordinates."""
+"""Derivatives along discontinuous fields, sets where signs vanish, changes of coordinates, equations solved."""
 
+import importlib
 import itertools
 import random
+import sys
+from pathlib import Path
 
 import mpmath as mp
 import pytest
@@ -9,10 +12,15 @@ import sympy as sp
 
 from quakedesign.controllers import control_law
 from quakedesign.errors import KinkError, ParameterError
-from quakedesign.symbolic import FilippovField, SetValued, SignedPower, filippov_derivative, off_kinks, restrict
-from quakedesign.symbolic.filippov import inverse, lie_derivative
+from quakedesign.symbolic import SignedPower, off_kinks
 from quakedesign.symbolic.normal_form import normal_form
 from quakedesign.symbolic.signed_power import AbsolutePower
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "proofs"))
+filippov, sets = map(importlib.import_module, ("filippov", "set_valued"))
+FilippovField, filippov_derivative = filippov.FilippovField, filippov.filippov_derivative
+inverse, lie_derivative = filippov.inverse, filippov.lie_derivative
+SetValued, restrict, solve_signed = sets.SetValued, sets.restrict, sets.solve_signed
 
 R = sp.Rational
 x, y, z = sp.symbols("x y z", real=True)
@@ -220,3 +228,38 @@ def test_fields_and_sets_are_shown_as_latex():
     assert r"\dot{x}" in TWISTING._repr_latex_()
     assert r"\in" in filippov_derivative(y**2, TWISTING)._repr_latex_()
     assert r"\in" not in SetValued(expression=x)._repr_latex_()
+
+
+@pytest.mark.parametrize(
+    ("condition", "variable"),
+    [
+        (k ** R(3, 2) * x + SignedPower(y, R(3, 2)), x),
+        (k ** R(3, 2) * x + SignedPower(y, R(3, 2)), y),
+        (SignedPower(SignedPower(y, R(3, 2)) + k * x, R(1, 3)) - z, y),
+        (x**3 - y, x),
+        (sp.Eq(2 * y, k), y),
+    ],
+    ids=str,
+)
+def test_solutions_satisfy_their_equation(condition, variable):
+    left = condition.lhs - condition.rhs if isinstance(condition, sp.Equality) else condition
+    solution = solve_signed(condition, variable)
+    assert not solution.has(variable)
+    assert normal_form(left.subs(variable, solution)) == 0
+
+
+@pytest.mark.parametrize(
+    ("condition", "complaint"),
+    [
+        (AbsolutePower(x, R(1, 2)) - k, "takes a value twice"),
+        (x**2 - k, "takes a value twice"),
+        (SignedPower(x, 0) - y, "takes a value twice or jumps"),
+        (x + SignedPower(x, R(1, 2)) - y, "occurs in 2"),
+        (y - z, "occurs in 0"),
+        (y * x - 1, "must not vanish"),
+    ],
+    ids=str,
+)
+def test_what_has_no_single_solution_is_refused(condition, complaint):
+    with pytest.raises(ParameterError, match=complaint):
+        solve_signed(condition, x)

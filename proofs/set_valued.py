@@ -9,7 +9,7 @@ import sympy as sp
 
 from quakedesign.errors import KinkError, ParameterError
 from quakedesign.rationals import rational
-from quakedesign.symbolic.normal_form import normal_form, signs, solve_signed
+from quakedesign.symbolic.normal_form import normal_form, signs
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 Interval = tuple[sp.Expr, sp.Expr]
@@ -141,6 +141,52 @@ def restrict(value: sp.Expr | SetValued, *conditions: Condition) -> SetValued:
         solved = {v: normal_form(e.subs(solution)) for v, e in solved.items()} | solution
         current = substituted(current, solution)
     return current
+
+
+def solve_signed(condition: sp.Expr | sp.Eq, variable: sp.Symbol) -> sp.Expr:
+    """Only real solution of condition = 0 for a variable that occurs in one signed power.
+
+    c·⌈Q⌋^a + rest = 0 becomes Q = −⌈rest/c⌋^{1/a}, again and again, until the variable stands alone.
+
+    Parameters
+    ----------
+    condition : Expr or Eq
+    variable : Symbol
+
+    Returns
+    -------
+    Expr
+
+    Raises
+    ------
+    ParameterError
+        When the variable occurs not at all, in several terms, in an even power, or with a coefficient that may vanish.
+    """
+    left = condition.lhs - condition.rhs if isinstance(condition, sp.Equality) else condition
+    left = normal_form(left)
+    terms = sp.Add.make_args(left)
+    own = [term for term in terms if term.has(variable)]
+    if len(own) != 1:
+        raise ParameterError(
+            f"{variable} must occur in exactly one term of {left} = 0 to be solved for. It occurs in {len(own)}. "
+            "Solve for another variable, or split into sign cells."
+        )
+    coefficient, power = own[0].as_independent(variable, as_Add=False)
+    inner, exponent = _odd_power(power, left)
+    if not coefficient.is_nonzero:
+        raise ParameterError(f"the coefficient {coefficient} of {power} must not vanish. Declare its symbols positive.")
+    target = -SignedPower(normal_form((left - own[0]) / coefficient), 1 / exponent)
+    return normal_form(target) if inner == variable else solve_signed(inner - target, variable)
+
+
+def _odd_power(power: sp.Expr, left: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    base, n = power.as_base_exp()
+    inner, a = base.args if isinstance(base, SignedPower) else (base, sp.Integer(1))
+    if n.is_Integer and n % 2 == 1 and (a * n).is_positive and not isinstance(base, AbsolutePower):
+        return inner, a * n
+    raise ParameterError(
+        f"{power} in {left} = 0 takes a value twice or jumps. Only odd powers ⌈·⌋^a, a > 0, are solved."
+    )
 
 
 def exact_intervals(intervals: Mapping[sp.Symbol, tuple[Any, ...]]) -> dict[sp.Symbol, Interval]:

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import sympy as sp
+from set_valued import Condition, Interval, SetValued, exact_intervals, restrict, solve_signed, substituted
 
 from quakedesign.errors import KinkError, ParameterError
-from quakedesign.symbolic.normal_form import is_identity, normal_form, signs, solve_signed
-from quakedesign.symbolic.set_valued import Condition, Interval, SetValued, exact_intervals, restrict, substituted
+from quakedesign.symbolic.normal_form import normal_form, signs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +100,7 @@ def inverse(coordinates: Mapping[sp.Symbol, sp.Expr], states: Iterable[sp.Symbol
                 f"left holds several of {unknown}. Use a triangular map, one new state at a time."
             )
     for new, old in coordinates.items():
-        if not is_identity(old.subs(known, simultaneous=True), new):
+        if normal_form(old.subs(known, simultaneous=True) - new) != 0:
             raise ParameterError(f"the inverse {known} does not give {new} back; the map is not invertible.")
     return known
 
