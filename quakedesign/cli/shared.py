@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from textwrap import wrap
 from typing import Annotated, Any
 
 from cyclopts import App, Parameter
@@ -158,9 +159,24 @@ def print_lines(lines: Iterable[str]) -> None:
 class _Screen(Console):
     """Console on which a string is text: no markup, no emoji, nothing that a terminal would obey, no endless line."""
 
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Lines that are wider than a terminal go on below their beginning; files and pipes get them whole."""
+        if self.is_terminal:
+            objects = tuple(self._wrapped(told) if isinstance(told, str) else told for told in objects)
+        super().print(*objects, **options)
+
     def render_str(self, text: str, **options: Any) -> Text:
-        margin = " " * (len(text) - len(text.lstrip(" ")))
-        return super().render_str(f"\n  {margin}".join(in_lines(visible(text))), **options)
+        return super().render_str(f"\n{_hanging(text)}".join(in_lines(visible(text))), **options)
+
+    def _wrapped(self, text: str) -> Text:
+        below = _hanging(text)
+        lines = wrap(visible(text), self.width, subsequent_indent=below, break_long_words=False, break_on_hyphens=False)
+        return Text("\n".join(lines))
+
+
+def _hanging(text: str) -> str:
+    """Margin of what goes on below a line."""
+    return " " * (len(text) - len(text.lstrip(" ")) + 2)
 
 
 def console(**options: Any) -> Console:

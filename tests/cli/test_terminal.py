@@ -61,6 +61,20 @@ def test_lines_stay_lines(capsys):
     assert capsys.readouterr().out.splitlines() == ["x" * 300, "", "[/c]"]
 
 
+def test_a_terminal_shows_a_long_line_below_its_beginning_and_cuts_no_word():
+    out = io.StringIO()
+    told = "  the slip rate [m/s] stays below a-bound-as-long-as-a-path " + "and so on, " * 9 + "\x1b[31mto the end"
+    screen = console(file=out, force_terminal=True, color_system=None, width=44)
+    screen.print(told)
+    screen.print("")
+    *lines, last = out.getvalue().splitlines()
+    assert last == ""
+    assert " ".join(line.strip() for line in lines) == told.strip().replace("\x1b", r"\x1b")
+    assert lines[0].startswith("  the slip")
+    assert all(re.match(r"    \S", line) for line in lines[1:])
+    assert max(map(len, lines)) <= 44
+
+
 def test_nothing_else_prints_or_marks_up():
     """All text for people leaves through one console."""
     package = Path(quakedesign.__file__).parent
@@ -68,7 +82,7 @@ def test_nothing_else_prints_or_marks_up():
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"\[/?(bold|red|dim|green)\]", text), path.name
         assert not re.search(r"markup=True|(?<!soft_wrap=)\bConsole\((?!stderr)", text) or path.name == "shared.py"
-        plain = re.findall(r"(?<![\w.])print\((?!json\.dumps)(?!.*sys\.stderr)", text)
+        plain = re.findall(r"(?<![\w.])(?<!def )print\((?!json\.dumps)(?!.*sys\.stderr)", text)
         assert not plain, f"{path.name} prints past the console"
 
 
