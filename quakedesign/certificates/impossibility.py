@@ -173,6 +173,27 @@ def smallest_withdrawal(task: Task | SlidingPush, step: Fraction) -> LowerBound 
     return LowerBound(max(withdrawals)) if withdrawals else None
 
 
+def hopeless(task: Task, withdrawal: Fraction, delay: Fraction, diffusion: Fraction) -> str:
+    """Why no controller with such a withdrawal [Pa] holds the fault, whatever its T_s; empty where that is not proved.
+
+    Parameters
+    ----------
+    task : Task
+    withdrawal : Fraction
+        [Pa].
+    delay, diffusion : Fraction
+        θ and L²/D [s].
+    """
+    late, far = longest_reaction(task, withdrawal), longest_diffusion(task, withdrawal, _ZERO)
+    if task.change is None and late is not None and delay > late:
+        way = f"with a delay above {late.quantity('s')}"
+    elif task.change is None and far is not None and diffusion > far:
+        way = f"through rock of L^2/D above {far.quantity('s')}"
+    else:
+        return ""
+    return f"no controller whatever that withdraws at most {LowerBound(withdrawal).quantity('Pa')} holds it {way}"
+
+
 def _least(task: Task | SlidingPush, value: Callable[[_Pushed | SlidingPush], Any]) -> UpperBound | None:
     with ctx.workprec(_BITS):
         bounds = [upper(value(plant)) for plant in _pushed(task)]

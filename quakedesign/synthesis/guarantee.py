@@ -3,8 +3,9 @@
 from fractions import Fraction
 from typing import Unpack
 
-from quakedesign.certificates.guarantee import task_of
+from quakedesign.certificates.guarantee import NoGuarantee, task_of
 from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.impossibility import hopeless
 from quakedesign.controllers import Controller, control_law
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault import Fault
@@ -26,6 +27,8 @@ def answer(
     **around: Unpack[Around],
 ) -> Answer:
     """Guarantee of given e-LQR gains with summed integrals, of a law that is designed for it, or of a sliding mode.
+
+    Nothing is designed for a delay or rock beyond what any controller can do that withdraws at most σ′.
 
     Parameters
     ----------
@@ -59,5 +62,9 @@ def answer(
         raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")
     task = task_of(fault, rate_limited=disturbance_class == "rate")
     law = control_law(controller)
+    late, far = around.get("delay", Fraction(0)), around.get("diffusion", Fraction(0))
+    beyond = hopeless(task, rational(fault.effective_normal_stress), late, far)
+    if beyond and not gains:
+        return Answer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None))
     wanted = Wanted(gains=gains, objective=objective, scheme=scheme, measured=measured, around=around)
     return method_of(law).sampled(fault, task, law, period, wanted)

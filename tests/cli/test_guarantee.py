@@ -8,6 +8,9 @@ import pytest
 
 from quakedesign.certificates.command import check_files
 from quakedesign.cli import main
+from quakedesign.fault import load_fault
+from quakedesign.synthesis import answer
+from quakedesign.synthesis.methods.state_feedback import StateFeedback
 
 
 @pytest.fixture
@@ -71,6 +74,24 @@ def test_gains_that_do_not_hold_the_nominal_fault_either(call):
     code, out, _ = call("real-fault", "--gains", "1", "1", "1", "1")
     assert code == 1
     assert out.startswith("none: held over 0.184 s even the nominal loop is not stable")
+
+
+def test_nothing_is_designed_where_no_controller_whatever_can_hold_the_fault(call):
+    code, out, _ = call("real-fault", "--diffusion", "180 s")
+    assert code == 1
+    assert out.startswith("none: no controller whatever that withdraws at most 50 MPa holds it through rock of L^2/D")
+    assert "the command limits" in out
+
+
+@pytest.mark.parametrize(("name", "least", "most"), [("delay", F("17.7"), F("18.5")), ("diffusion", F(172), F(180))])
+def test_everything_else_is_designed_for(monkeypatch, name, least, most):
+    """The limits at T_s = 0.184 s are 17.7 s and 172 s; those whatever T_s a little more."""
+    fault = load_fault("real-fault")
+    monkeypatch.setattr(StateFeedback, "sampled", lambda *_: "designed")
+    assert answer(fault, **{name: least}) == "designed"
+    assert answer(fault, **{name: most}, disturbance_class="rate") == "designed"  # the limits push with what jumps
+    assert answer(fault, **{name: most}, gains=GAINS) == "designed"
+    assert not answer(fault, **{name: most}).proved
 
 
 def test_a_sliding_mode_with_its_file(call, tmp_path):

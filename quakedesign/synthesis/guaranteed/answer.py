@@ -48,7 +48,7 @@ class Answer:
             said = [self.found.sentence()]
             if self.shorter is not None:
                 said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
-            return said
+            return [*said, "the command limits tells for which T_s, delays and wells designs of this fault have one"]
         said = [f"proved: {self.found.sentence()}"]
         for name, seen in (("worst found", self.worst), ("worst found with stick", self.worst_with_stick)):
             if seen is not None:
