@@ -139,7 +139,7 @@ def synthesise(
     first = list(islice(begin_with(asked, seed), starts * _DRAWS))
     best = _best(asked, _climbed(asked.setting, first, starts, workers))
     mine = _synthesis(asked, *best) if best else None
-    return beside(asked, mine, asked.known) if compare else mine
+    return _beside(asked, mine) if compare else mine
 
 
 def _synthesis(asked: Question, certificate: Certificate, value: float) -> Synthesis:
@@ -154,18 +154,10 @@ def _synthesis(asked: Question, certificate: Certificate, value: float) -> Synth
     )
 
 
-def beside(asked: Question, mine: Synthesis | None, others: Sequence[Loop]) -> Synthesis | None:
-    """Gains found beside given ones, which take their place where they are better within the same bound on the norm.
-
-    Parameters
-    ----------
-    asked : Question
-    mine : Synthesis or None
-    others : sequence of Loop
-        With the gains.
-    """
+def _beside(asked: Question, mine: Synthesis | None) -> Synthesis | None:
+    """Gains found beside known ones, which take their place where they are better within the same bound on the norm."""
     objective = asked.setting.objective
-    compared = [given(asked, one) for one in others]
+    compared = [given(asked, one) for one in asked.known]
     for one in compared:
         if one.certificate is None or one.value is None or one.norm > (objective.bound or one.norm) * (1 + 1e-9):
             continue
