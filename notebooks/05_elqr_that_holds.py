@@ -38,9 +38,11 @@ from quakedesign.certificates.guarantee import task_of
 from quakedesign.report.linear import verdict_lines
 from quakedesign.simulation import natural_earthquake
 from quakedesign.synthesis.guaranteed import design_held, worst_found
-from quakedesign.synthesis.linear.analysis import printed_theorem as theorem
+from quakedesign.synthesis.linear.analysis.printed_theorem import both_tests
 from quakedesign.synthesis.linear.plant.uncertainty_bounds import uncertainty_bounds
 from quakedesign.synthesis.linear.analysis.verdict import judge
+
+from own import printed_examples as examples  # beside this notebook
 
 # %% [markdown]
 # ## Friction that the bound does not contain
@@ -48,9 +50,9 @@ from quakedesign.synthesis.linear.analysis.verdict import judge
 # friction or no friction. The theorem then accepts a $K$ that leaves the fault unstable.
 
 # %%
-missing = theorem.printed_bound_example()
-accepted, repaired = theorem.printed_design(missing), theorem.corrected_design(missing)
-judged = theorem.both_tests(missing.problem, accepted.gains, missing.printed)
+missing = examples.printed_bound_example()
+accepted, repaired = examples.printed_design(missing), examples.corrected_design(missing)
+judged = both_tests(missing.problem, accepted.gains, missing.printed)
 Markdown(judged.table())
 
 
@@ -80,9 +82,9 @@ plt.show()
 # uncertain by 1, every *constant* plant of the box is stable; one that switches between two of them is not.
 
 # %%
-row = theorem.printed_row_example()
-accepted_row, repaired_row = theorem.printed_design(row), theorem.corrected_design(row)
-judged_row = theorem.both_tests(row.problem, accepted_row.gains, row.printed, row.switching)
+row = examples.printed_row_example()
+accepted_row, repaired_row = examples.printed_design(row), examples.corrected_design(row)
+judged_row = both_tests(row.problem, accepted_row.gains, row.printed, row.switching)
 Markdown(judged_row.table())
 
 # %%

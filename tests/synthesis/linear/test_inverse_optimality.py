@@ -5,12 +5,12 @@ from fractions import Fraction as F
 
 import numpy as np
 import pytest
+from own.printed_examples import printed_design, printed_row_example
 
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
 from quakedesign.synthesis.linear.analysis.inverse_optimality_problem import Question, moment_matrix, refutes
-from quakedesign.synthesis.linear.analysis.printed_theorem import printed_design, printed_row_example
 from quakedesign.synthesis.linear.design.riccati import riccati_design
 from quakedesign.synthesis.linear.plant import rational_matrices as m
 from quakedesign.synthesis.linear.plant.problem import LinearProblem

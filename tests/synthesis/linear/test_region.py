@@ -5,9 +5,9 @@ from fractions import Fraction as F
 import control
 import numpy as np
 import pytest
+from own.printed_examples import printed_row_example
 
 import quakedesign as qd
-from quakedesign.synthesis.linear.analysis.printed_theorem import printed_row_example
 from quakedesign.synthesis.linear.design.admissible_weights import (
     limiting_gains,
     smallest_gain,

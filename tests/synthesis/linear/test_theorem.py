@@ -5,6 +5,7 @@ from fractions import Fraction as F
 
 import numpy as np
 import pytest
+from own.printed_examples import corrected_design, printed_bound_example, printed_design, printed_row_example
 from scipy.linalg import expm
 
 import quakedesign as qd
@@ -13,12 +14,8 @@ from quakedesign.controllers import control_law
 from quakedesign.synthesis.linear.analysis.printed_theorem import (
     Switching,
     both_tests,
-    corrected_design,
     decreases,
-    printed_bound_example,
-    printed_design,
     printed_row,
-    printed_row_example,
     switched_growth,
 )
 from quakedesign.synthesis.linear.plant import rational_matrices as m
