@@ -27,10 +27,12 @@ if TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class DesignOptions:
-    """How controllers are designed.
+    """Which controllers are designed for a fault, and how.
 
     Parameters
     ----------
+    controller
+        Law to design: cta, dia, elqr or all.
     objective
         tracking, or peak for the smallest guaranteed slip-rate error.
     continuous
@@ -55,8 +57,13 @@ class DesignOptions:
         unless given.
     spread
         Of such a fault: by how much of their values a, b and D_c may be off, such as 0.1.
+    published_scheme
+        Of the runs of published gains, see --scheme.
     """
 
+    controller: str = "all"
+    box: Box = None
+    disturbance: Shaking = None
     objective: Literal["tracking", "peak"] = "tracking"
     continuous: Annotated[bool, Parameter(negative="")] = False
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate"
@@ -67,6 +74,21 @@ class DesignOptions:
     diffusion: ExactSeconds | None = None
     stress: ExactPascals | None = None
     spread: str = "0"
+    published_scheme: str = "continuous"
+
+    def asked(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
+        """Fault of a name, and what `designed_comparison` is asked about it; refused before anything heavy is loaded.
+
+        Raises
+        ------
+        UnknownNameError, ParameterError
+        """
+        from quakedesign.fault import load_fault
+
+        controllers(self.controller)
+        found = load_fault(fault, box=self.box, disturbance=self.disturbance)
+        names = controllers(self.controller, found)
+        return found, {"names": names, "published_scheme": self.published_scheme, **self.told(names)}
 
     def told(self, names: list[str]) -> dict[str, Any]:
         """Options of `designed_comparison`.
@@ -100,11 +122,7 @@ def design(
     fault: FaultName,
     /,
     *,
-    controller: str = "all",
-    box: Box = None,
-    disturbance: Shaking = None,
     options: DesignOptions = _AS_USUAL,
-    published_scheme: str = "continuous",
     out: Path | None = None,
     format: Formats = ("svg",),
     force: Force = False,
@@ -118,27 +136,19 @@ def design(
 
     Parameters
     ----------
-    controller
-        cta, dia, elqr or all.
-    published_scheme
-        Of the runs of published gains, see --scheme.
     out
         Folder to write; ./quakedesign-FAULT unless given.
     """
-    from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare
 
-    controllers(controller)
-    found = load_fault(fault, box=box, disturbance=disturbance)
-    names = controllers(controller, found)
-    told = options.told(names)
+    found, asked = options.asked(fault)
     folder = out or Path(f"quakedesign-{found.name}")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import write_folder
 
     with progress() as tell:
-        comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
+        comparison = designed_comparison(found, tell=tell, **asked)
         results = write_folder(comparison, folder, force=force, formats=format, command=command_line(), tell=tell)
 
     def said() -> None:

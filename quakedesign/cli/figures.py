@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from quakedesign.cli.design import DesignOptions, controllers, positive
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
+from quakedesign.cli.design import DesignOptions, positive
+from quakedesign.cli.options import PLAIN, FaultName, Force, Formats, Output
 from quakedesign.cli.shared import app, command_line, console, print_json, print_lines, progress
 
 _AS_USUAL = DesignOptions()
@@ -14,36 +14,21 @@ def compare(
     fault: FaultName,
     /,
     *,
-    controller: str = "all",
-    box: Box = None,
-    disturbance: Shaking = None,
     options: DesignOptions = _AS_USUAL,
-    published_scheme: str = "continuous",
     output: Output = PLAIN,
 ) -> int:
     """Design, prove, simulate and compare with the published gains as `design` does, and write nothing.
 
     Exit code as `design`.
-
-    Parameters
-    ----------
-    controller
-        Law to design: cta, dia, elqr or all.
-    published_scheme
-        Of the runs of published gains, see --scheme.
     """
-    from quakedesign.fault import load_fault
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import results
     from quakedesign.report.numbers import printed_lines
     from quakedesign.studies.paper_numbers import printed, table
 
-    controllers(controller)
-    found = load_fault(fault, box=box, disturbance=disturbance)
-    names = controllers(controller, found)
-    told = options.told(names)
+    found, asked = options.asked(fault)
     with progress() as tell:
-        comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
+        comparison = designed_comparison(found, tell=tell, **asked)
     if output.json:
         beside = {"numbers": table(comparison), "printed": printed(comparison)}
         print_json({**results(comparison, stored=False), **beside})
@@ -60,11 +45,7 @@ def figures(
     fault: FaultName,
     /,
     *,
-    controller: str = "all",
-    box: Box = None,
-    disturbance: Shaking = None,
     options: DesignOptions = _AS_USUAL,
-    published_scheme: str = "continuous",
     out: Path | None = None,
     format: Formats = ("svg",),
     force: Force = False,
@@ -76,20 +57,12 @@ def figures(
 
     Parameters
     ----------
-    controller
-        Law to design: cta, dia, elqr or all.
-    published_scheme
-        Of the runs of published gains, see --scheme.
     out
         Folder to write; ./quakedesign-FAULT-figures unless given.
     """
-    from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare, write_folder
 
-    controllers(controller)
-    found = load_fault(fault, box=box, disturbance=disturbance)
-    names = controllers(controller, found)
-    told = options.told(names)
+    found, asked = options.asked(fault)
     folder = out or Path(f"quakedesign-{found.name}-figures")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
@@ -98,7 +71,7 @@ def figures(
     from quakedesign.report.paper_study import paper_study
 
     with progress() as tell:
-        comparison = designed_comparison(found, names, tell, published_scheme=published_scheme, **told)
+        comparison = designed_comparison(found, tell=tell, **asked)
         study = paper_study(comparison, progress=tell)
         results = write_folder(
             comparison, folder, force=force, study=study, formats=format, command=command_line(), tell=tell

@@ -1,7 +1,12 @@
 """The command about the loop that runs."""
 
+from dataclasses import asdict, dataclass
+from fractions import Fraction
 from pathlib import Path
+from time import perf_counter
 from typing import Any, Literal
+
+from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Shaking
 from quakedesign.cli.shared import (
@@ -13,9 +18,51 @@ from quakedesign.cli.shared import (
     app,
     new_file,
 )
+from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
 
 _USUAL = ("tracking", "amplitude")
+_SLOWLY = ("delay", "lag", "diffusion", "slip_noise")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Surroundings:
+    """What is between a law and its fault, what the law is told wrongly, and where the loop may start.
+
+    Parameters
+    ----------
+    delay
+        From the measurement to the pressure at the valve.
+    lag
+        Time constant between the valve and the fault, or the well where there is a diffusion.
+    diffusion
+        L²/D of the rock between well and fault; the designed e-LQR carries a model of it.
+    slip_noise
+        Bound of the error of the measured slip, whatever its course, such as '1 um'; q/2 for readings in steps of q.
+        simulate takes a standard deviation by this name.
+    rate_noise
+        The same of the measured slip rate.
+    initial_slip
+        Bound of the slip at the start, of either sign, such as '0.01 mm'; the law begins as it always does.
+    initial_slip_rate
+        The same of the slip rate, such as '0.1 mm/s'. Slip rates below zero are those of the continued plant.
+    """
+
+    delay: ExactSeconds = "0"
+    lag: ExactSeconds = "0"
+    diffusion: ExactSeconds = "0"
+    slip_noise: ExactMetres = "0"
+    rate_noise: ExactMetresPerSecond = "0"
+    initial_slip: ExactMetres = "0"
+    initial_slip_rate: ExactMetresPerSecond = "0"
+
+    def exact(self) -> dict[str, Fraction]:
+        """All of it as rationals in SI units."""
+        return {name: rational(told, name.replace("_", " ")) for name, told in asdict(self).items()}
+
+
+_ALONE = Surroundings()
 
 
 @app.command
@@ -28,14 +75,8 @@ def guarantee(
     gains: Gains = (),
     scheme: str | None = None,
     step: ExactSeconds | None = None,
-    delay: ExactSeconds = "0",
-    lag: ExactSeconds = "0",
-    diffusion: ExactSeconds = "0",
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
-    slip_noise: ExactMetres = "0",
-    rate_noise: ExactMetresPerSecond = "0",
-    initial_slip: ExactMetres = "0",
-    initial_slip_rate: ExactMetresPerSecond = "0",
+    around: Surroundings = _ALONE,
     disturbance_class: DisturbanceClass = "amplitude",
     stress: ExactPascals | None = None,
     spread: str = "0",
@@ -63,23 +104,8 @@ def guarantee(
         Of a sliding mode: compensated unless given; no other has a guarantee. The e-LQR runs in explicit.
     step
         T_s, such as '184 ms' or 7/50 (s); the fault's unless given.
-    delay
-        From the measurement to the pressure at the valve.
-    lag
-        Time constant between the valve and the fault, or the well where there is a diffusion.
-    diffusion
-        L²/D of the rock between well and fault; the designed e-LQR carries a model of it.
     measured
         What the designed e-LQR is told: slip-and-rate, or slip, from which it estimates the slip rate.
-    slip_noise
-        Bound of the error of the measured slip, whatever its course, such as '1 um'; q/2 for readings in steps of q.
-        simulate takes a standard deviation by this name.
-    rate_noise
-        The same of the measured slip rate.
-    initial_slip
-        Bound of the slip at the start, of either sign, such as '0.01 mm'; the law begins as it always does.
-    initial_slip_rate
-        The same of the slip rate, such as '0.1 mm/s'. Slip rates below zero are those of the continued plant.
     disturbance_class
         amplitude: any disturbance as large as the fault's; rate: one that starts at 0 and is no faster either.
     stress
@@ -90,74 +116,57 @@ def guarantee(
     out
         Certificate file to write.
     """
-    from time import perf_counter
-
-    from quakedesign.certificates.guarantee import Guarantee
-    from quakedesign.certificates.guarantee.files import save_guarantee
-    from quakedesign.certificates.slow_sliding import SlidingGuarantee, save_sliding
-    from quakedesign.errors import ParameterError
     from quakedesign.fault import load_fault
-    from quakedesign.synthesis import answer, answer_sliding
+    from quakedesign.synthesis import answer
 
     new_file(out, "certificate file", force=force)
     began, chosen = perf_counter(), load_fault(fault, box=box, disturbance=disturbance)
-    held_over = None if step is None else rational(step, "step")
-    times = {
-        "delay": rational(delay, "delay"),
-        "lag": rational(lag, "lag"),
-        "diffusion": rational(diffusion, "diffusion"),
-        "slip_noise": rational(slip_noise, "slip noise"),
-    }
-    start = {
-        "initial_slip": rational(initial_slip, "initial slip"),
-        "initial_slip_rate": rational(initial_slip_rate, "initial slip rate"),
-    }
+    known: dict[str, Any] = dict(around.exact())
+    held: dict[str, Any] = {"controller": controller, "step": None if step is None else rational(step, "step")}
+    sliding = {"stress": None if stress is None else rational(stress, "stress"), "spread": rational(spread, "spread")}
     if chosen.friction.state_names:
-        unusual = gains or scheme or rational(rate_noise, "rate noise") or (objective, disturbance_class) != _USUAL
-        if unusual or any(start.values()):
-            raise ParameterError(
-                "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
-                "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class or an initial "
-                "slip or slip rate. Leave them out."
-            )
-        told = None if stress is None else rational(stress, "stress")
-        sliding = answer_sliding(
-            chosen,
-            controller=controller,
-            step=held_over,
-            stress=told,
-            spread=rational(spread, "spread"),
-            **times,
-        )
-        if out is not None and isinstance(sliding.found, SlidingGuarantee):
-            save_sliding(sliding.found, out)
-        return _shown(sliding, disturbance_class, out, began, output)
-    if stress is not None or rational(spread, "spread"):
+        usual = not gains and scheme is None and (objective, disturbance_class) == _USUAL
+        proof = _slowly(chosen, known, usual=usual, **held, **sliding)
+    elif any(sliding.values()):
         raise ParameterError(
             f"stress and spread need friction with a state. Received {chosen.friction.name}. Leave them out."
         )
-    proof = answer(
-        chosen,
-        controller=controller,
-        gains=gains,
-        objective=objective,
-        scheme=scheme,
-        step=held_over,
-        measured=measured,
-        rate_noise=rational(rate_noise, "rate noise"),
-        disturbance_class=disturbance_class,
-        **times,
-        **start,
-    )
-    if out is not None and isinstance(proof.found, Guarantee):
-        save_guarantee(proof.found, out)
-    return _shown(proof, disturbance_class, out, began, output)
-
-
-def _shown(proof: Any, disturbance_class: str, out: Path | None, began: float, output: Output) -> int:
-    from time import perf_counter
-
-    written = str(out) if out is not None and proof.proved else None
-    facts = {**proof.to_dict(), "class": disturbance_class, "certificate": written, "seconds": perf_counter() - began}
-    output.show(facts, proof.lines())
+    else:
+        options: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "measured": measured}
+        proof = answer(chosen, disturbance_class=disturbance_class, **held, **options, **known)
+    written = None
+    if out is not None and proof.proved:
+        _save(proof.found, out)
+        written = str(out)
+    facts = {"class": disturbance_class, "certificate": written, "seconds": perf_counter() - began}
+    output.show({**proof.to_dict(), **facts}, proof.lines())
     return 0 if proof.proved else 1
+
+
+def _slowly(fault: Any, around: dict[str, Fraction], *, usual: bool, **asked: Any) -> Any:
+    """Guarantee of slow sliding; refuses what it has no use for.
+
+    Raises
+    ------
+    ParameterError
+    """
+    from quakedesign.synthesis import answer_sliding
+
+    taken: dict[str, Any] = {name: around[name] for name in _SLOWLY}
+    if not usual or any(value for name, value in around.items() if name not in taken):
+        raise ParameterError(
+            "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
+            "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class or an initial "
+            "slip or slip rate. Leave them out."
+        )
+    return answer_sliding(fault, **asked, **taken)
+
+
+def _save(found: Any, out: Path) -> None:
+    from quakedesign.certificates.guarantee.files import save_guarantee
+    from quakedesign.certificates.slow_sliding import SlidingGuarantee, save_sliding
+
+    if isinstance(found, SlidingGuarantee):
+        save_sliding(found, out)
+    else:
+        save_guarantee(found, out)
