@@ -358,7 +358,7 @@ fastest_rate = "1 m/s"
     found = json.loads(run(capsys, "fault", str(path), "--json")[1])
     assert [found[name] for name in ("seismic_moment", "magnitude", "rest_slip")] == [None] * 3
     refused = {
-        ("campaign", str(path), "--samples", "2"): "Use fault, derive, simulate, guarantee or design",
+        ("campaign", str(path), "--samples", "2"): "Give --controller elqr",
         ("guarantee", str(path)): "Give --diffusion, such as '833 s', or --lag",
     }
     for command, remedy in refused.items():

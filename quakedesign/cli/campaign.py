@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.cli.hardware import ActuatorOptions, SensorOptions
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, LawOptions, Output, RunOptions
-from quakedesign.cli.shared import Metres, MetresPerSecond, Whole, app, console, progress
+from quakedesign.cli.shared import Metres, MetresPerSecond, Pascals, Seconds, Whole, app, console, progress
+from quakedesign.cli.state import sliding_law_of
 from quakedesign.errors import ParameterError
 from quakedesign.interruption import remedy
 
@@ -32,6 +33,9 @@ def campaign(
     sensors: SensorOptions = _EXACT,
     initial_slip: Metres = 0.0,
     initial_rate: MetresPerSecond = 0.0,
+    spread: str = "0",
+    stress: Pascals | None = None,
+    stress_period: Seconds | None = None,
     seed: Whole = 0,
     search: str | None = None,
     rerun: str | None = None,
@@ -56,13 +60,20 @@ def campaign(
         explicit (unless given), implicit, semi-implicit or compensated (sampled control), or continuous. Designed laws
         are sampled and have their own.
     method
-        dormand-prince or rk4.
+        dormand-prince or rk4; for friction with a state cvodes or idas.
     plant
-        smooth or coulomb.
+        smooth or coulomb; for friction with a state smooth or quasi-dynamic (without inertia).
     initial_slip
         Largest slip at the start.
     initial_rate
         Largest slip rate at the start.
+    spread
+        Of friction with a state, held in slow sliding by the e-LQR that design finds: by how much of their values a, b
+        and D_c are off, such as 0.1; the effective normal stress, stiffness and damping by the box.
+    stress
+        Of such a fault: bound of a sine of shear stress, such as '25 kPa'; what is proved of the design unless given.
+    stress_period
+        Its period; that of the tide, 12.42 hours, unless given.
     seed
         Of samples and noise.
     search
@@ -85,8 +96,17 @@ def campaign(
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
     loaded = load_fault(fault, box=box)
-    chosen = law.choose(loaded)
-    controller = chosen.controller if chosen else None
+    told: dict[str, Any] = {}
+    if loaded.friction.state_names:
+        controller, told = sliding_law_of(loaded, law, actuator.diffusion, stress, spread)
+        told |= {} if stress_period is None else {"stress_period": stress_period}
+    elif (spread, stress, stress_period) != ("0", None, None):
+        raise ParameterError(
+            f"spread and stress need friction with a state. Received {loaded.friction.name}. Leave them out."
+        )
+    else:
+        chosen = law.choose(loaded)
+        controller = chosen.controller if chosen else None
     way, step, own = own_way(controller, scheme, run.step)
     period = loaded.sampling_time if step is None else step
     problem = campaign_problem(
@@ -101,6 +121,7 @@ def campaign(
         initial_slip=initial_slip,
         initial_slip_rate=initial_rate,
         seed=seed,
+        **told,
     )
     folder = out or Path(f"quakedesign-{loaded.name}-campaign")
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}

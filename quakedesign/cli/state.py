@@ -11,13 +11,14 @@ from quakedesign.cli.shared import Pascals, Seconds
 from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:
+    from quakedesign.cli.options import LawOptions
     from quakedesign.fault import Fault
     from quakedesign.simulation.recording import Recording
 
 _GROUP = Group("Friction with a state (rate-and-state)")
 _BOTH = {"duration": "duration", "plant": "plant", "method": "method"}
 _FREE = {"drift": "loading_rate", **_BOTH}
-_HELD = {"step": "step", "diffusion": "diffusion", **_BOTH}
+_HELD = {"step": "step", "lag": "lag", "diffusion": "diffusion", **_BOTH}
 _AROUND = ("fault", "controller", "gains", "state", "out", "force", "json")
 
 
@@ -102,6 +103,24 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
         trajectory.save(Path(options["out"]))
     options["output"].show(answer, [trajectory.name, *(f"  {line}" for line in lines(answer))])
     return 0
+
+
+def sliding_law_of(
+    fault: "Fault", law: "LawOptions", diffusion: float | None, stress: float | None, spread: str
+) -> tuple[Any, dict[str, Any]]:
+    """Law that `design` finds for a fault whose friction has a state, and spread and stress of its campaign.
+
+    It is designed for the nominal normal stress, stiffness and damping, whatever the box of the campaign.
+    """
+    from quakedesign.rationals import rational
+    from quakedesign.synthesis import design
+
+    _require_designed({"controller": law.controller, "gains": law.gains})
+    off = rational(spread, "spread")
+    found = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=stress, spread=off)
+    if found.controller is None or found.sliding is None:
+        raise ParameterError(f"a campaign needs a law. Received none from design: {found.details['reason']}.")
+    return found.controller, {"spread": off, "stress": float(found.sliding.task.stress)}
 
 
 def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str]) -> dict[str, Any]:

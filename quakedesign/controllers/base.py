@@ -56,11 +56,16 @@ class Sampling:
         Of `quakedesign.loop.schemes`.
     settings : tuple of (str, Fraction)
         Numbers of the scheme by name, in its own units.
+    lag, diffusion : Fraction
+        Time constant of the pump and L²/D of the rock [s] for which it is meant. A run of friction with a state brings
+        the pressure through them unless told; other runs are told.
     """
 
     step: Fraction
     scheme: str = "explicit"
     settings: tuple[tuple[str, Fraction], ...] = ()
+    lag: Fraction = Fraction(0)
+    diffusion: Fraction = Fraction(0)
 
     def __str__(self) -> str:
         numbers = "".join(f", {name} {float(value)!r}" for name, value in self.settings)
@@ -253,6 +258,11 @@ class Controller(Law):
     def sampling_time(self) -> float | None:
         """T_s [s] of a law of samples; None in continuous time."""
         return float(self.sampling.step) if self.sampling else None
+
+    @property
+    def of_slip(self) -> Any:
+        """Matrices of a linear law of samples that is told the slip alone (`quakedesign.loop.LinearLaw`), or None."""
+        return None
 
     @property
     def scale(self) -> Fraction | None:

@@ -24,6 +24,8 @@ class SampledController(Controller):
     law : LinearLaw
     step : Fraction
         T_s [s] for which it is meant.
+    lag, diffusion : Fraction
+        As of `Sampling` [s].
     gains : mapping of str to Fraction
         Read off the law: p = −k1·e1 − k2·e2 − Σ gain·state, every state under its name.
     """
@@ -35,18 +37,25 @@ class SampledController(Controller):
     gains: Mapping[str, Fraction] = field(default_factory=dict, init=False)
     law: LinearLaw
     step: Fraction
+    lag: Fraction = Fraction(0)
+    diffusion: Fraction = Fraction(0)
 
     def __post_init__(self) -> None:
         values = (-v for v in (*self.law.feedback, *self.law.output))
         object.__setattr__(self, "gains", MappingProxyType(dict(zip(self.gain_units, values, strict=True))))
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
-        return partial(type(self), law=self.law, step=self.step), ()
+        return partial(type(self), law=self.law, step=self.step, lag=self.lag, diffusion=self.diffusion), ()
 
     @property
     def sampling(self) -> Sampling:
         """By the scheme ``explicit``, once every T_s."""
-        return Sampling(step=self.step)
+        return Sampling(step=self.step, lag=self.lag, diffusion=self.diffusion)
+
+    @property
+    def of_slip(self) -> LinearLaw | None:
+        """The law, if it does without the slip rate."""
+        return self.law if self.law.of_slip_alone else None
 
     @property
     def gain_units(self) -> Mapping[str, str]:  # type: ignore[override]

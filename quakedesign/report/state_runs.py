@@ -59,7 +59,8 @@ def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
     """Lines for people, from `HeldRun.to_dict`: outcome, errors, pressure; no guarantee."""
     outcome, found = answer["outcome"], answer["metrics"]
     least, largest = (p / 1e6 for p in answer["pressure"])
-    path = f", through rock of L^2/D = {answer['diffusion']:.4g} s" if answer["diffusion"] else ""
+    path = f", through a lag of {answer['lag']:.4g} s" if answer["lag"] else ""
+    path += f", through rock of L^2/D = {answer['diffusion']:.4g} s" if answer["diffusion"] else ""
     shaken = f", under a shear stress of up to {answer['stress'] / 1e3:.4g} kPa" if answer["stress"] else ""
     return [
         f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.4g} m/s, the reference's is "

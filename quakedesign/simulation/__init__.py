@@ -55,6 +55,9 @@ if TYPE_CHECKING:
     from quakedesign.simulation.sensitivity import gain_sensitivity as gain_sensitivity
     from quakedesign.simulation.sensitivity import noise_sensitivity as noise_sensitivity
     from quakedesign.simulation.simulate import simulate as simulate
+    from quakedesign.simulation.sliding_conditions import SlidingVariation as SlidingVariation
+    from quakedesign.simulation.sliding_conditions import Tide as Tide
+    from quakedesign.simulation.slow_sliding import SlidingRun as SlidingRun
     from quakedesign.simulation.state_plants import SpringSlider as SpringSlider
     from quakedesign.simulation.state_run import simulate_state as simulate_state
     from quakedesign.simulation.state_run import velocity_step as velocity_step

@@ -1,9 +1,12 @@
 """One closed loop from rest over the whole task."""
 
 from collections.abc import Callable
+from inspect import signature
 from pathlib import Path
+from typing import Any
 
 from quakedesign.controllers import Controller
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.checks import require_nonnegative
 from quakedesign.loop.actuators import Actuator
@@ -16,6 +19,8 @@ from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import loop_class, run, run_adaptive, sampled_scheme
 from quakedesign.simulation.setting import Setting
+from quakedesign.simulation.sliding_conditions import PressurePath, SlidingVariation, Tide
+from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
 from quakedesign.simulation.trajectory import Trajectory
 from quakedesign.simulation.variation import Variation
 
@@ -34,7 +39,7 @@ def simulate(
     compiled: bool | None = None,
     plant: str = "smooth",
     load: Load | None = None,
-    variation: Variation | None = None,
+    variation: Variation | SlidingVariation | None = None,
     rtol: float = 1e-9,
     checkpoint: str | Path | None = None,
     substeps: int = 1,
@@ -42,8 +47,13 @@ def simulate(
     measurement: Sensor | None = None,
     initial_slip: float = 0.0,
     initial_slip_rate: float = 0.0,
+    tide: Tide | None = None,
 ) -> Trajectory:
     """Simulate a fault under a controller, from rest unless told, with the fault's own disturbance and reference.
+
+    A fault whose friction has a state starts in steady sliding at the mean rate of its task and is held there by a law
+    of samples that is told the slip alone, as `design` gives it, in its own scheme and step; of what stands below it
+    takes the parameters up to `progress`, plant, variation, actuator (lag and rock) and tide.
 
     Parameters
     ----------
@@ -59,7 +69,7 @@ def simulate(
     method : str
         Integrator with a fixed step, or, for smooth loops, ``"cvodes"`` or ``"idas"`` with a step of its own choice;
         see `quakedesign.simulation.integrators`. The latter answer at every multiple of `step`, where the run is
-        watched.
+        watched. Friction with a state is stiff between samples: ``"cvodes"`` unless ``"idas"``.
     duration : float, optional
         [s]; the operation time unless given. Whole steps are taken, as many as fit.
     samples : int
@@ -73,11 +83,13 @@ def simulate(
         is long enough to be worth it and a C compiler works. The digits are the same.
     plant : str
         ``"smooth"``: eq. shift, which holds for slip rates that are not negative. ``"coulomb"``: friction opposes slip
-        in both directions and holds the fault at rest (ERRATA 14).
+        in both directions and holds the fault at rest (ERRATA 14). Of friction with a state ``"smooth"`` or
+        ``"quasi-dynamic"``, without inertia.
     load : Load, optional
         Drift of the far end and a perturbation, beside the fault's own disturbance.
-    variation : Variation, optional
+    variation : Variation or SlidingVariation, optional
         True parameters other than the nominal ones, within the fault's box. One machine code serves all variations.
+        The latter of friction with a state.
     rtol : float
         Tolerance of ``"cvodes"`` and ``"idas"``, 1e-13 … 1e-3; a fixed step has none.
     checkpoint : str or Path, optional
@@ -86,17 +98,21 @@ def simulate(
     substeps : int
         Steps of the integrator per `step`, for a named scheme that samples.
     actuator : Actuator, optional
-        What lies between the pressure that is asked for and that in the fault, for a named scheme that samples.
+        What lies between the pressure that is asked for and that in the fault, for a named scheme that samples. Of
+        friction with a state a lag, rock, or both; those which the law is designed for unless given.
     measurement : Measurement or Sensor, optional
         Noise of what the controller sees, or a sensor that tells it estimates from the slip alone, for a named scheme
         that samples.
     initial_slip, initial_slip_rate : float
         x1 [m] and x2 [m/s] at the start, zero or positive. The reference starts at zero all the same.
+    tide : Tide, optional
+        Shear stress on a fault whose friction has a state; none unless given.
 
     Returns
     -------
     Trajectory
-        A `SampledTrajectory`, which has the signals of the actuator too, where there is one.
+        A `SampledTrajectory`, which has the signals of the actuator too, where there is one; a `SlidingRun` of friction
+        with a state.
         One that diverges ends there, says so in `events`, and has no metrics.
 
     Raises
@@ -109,7 +125,14 @@ def simulate(
         When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
         cannot go on, or when the checkpoint is that of another run.
     """
-    require_fault(fault).require_memoryless("a controlled run")
+    asked = dict(locals())
+    if require_fault(fault).friction.state_names:
+        return _held_in_sliding(**asked)
+    if tide is not None or isinstance(variation, SlidingVariation):
+        raise ParameterError(
+            f"a tide and a sliding variation need friction with a state. Received {fault.friction.name}. Give a load "
+            "or a variation."
+        )
     scheme, step, own = own_way(controller, scheme, step, "continuous")
     setting = Setting.of(fault, step, duration, samples, settled_from)
     if variation:
@@ -124,3 +147,37 @@ def simulate(
     if issubclass(chosen, AdaptiveIntegrator):
         return run_adaptive(recorder, setting, chosen, criterion, rtol=rtol, progress=progress, checkpoint=checkpoint)
     return run(recorder, setting, chosen, criterion, progress=progress, compiled=compiled, checkpoint=checkpoint)
+
+
+_OF_SLIDING = ("duration", "samples", "settled_from", "progress", "variation", "tide")
+_READ = ("fault", "controller", "scheme", "step", "method", "plant", "actuator")
+
+
+def _held_in_sliding(**asked: Any) -> SlidingRun:
+    """A fault whose friction has a state, as `simulate` was asked for it."""
+    usual = {name: option.default for name, option in signature(simulate).parameters.items()}
+    changed = {name: value for name, value in asked.items() if value is not usual[name] and value != usual[name]}
+    fault, controller, variation = asked["fault"], asked["controller"], asked["variation"]
+    law, meant = (controller.of_slip, controller.sampling) if controller else (None, None)
+    foreign = [name for name in changed if name not in (*_OF_SLIDING, *_READ)]
+    foreign += ["variation"] if isinstance(variation, Variation) else []
+    if law is None or meant is None or foreign:
+        raise ParameterError(
+            f"friction with a state is held by a law of samples, as design gives it, with {', '.join(_OF_SLIDING)} (a "
+            f"SlidingVariation), method, plant and actuator. Received {', '.join(foreign) or repr(controller)} with "
+            f"{fault.friction.name}. Without a controller use simulate_state."
+        )
+    own_way(controller, asked["scheme"], asked["step"])
+    require_known(asked["plant"], PLANTS, "plant of a fault with a state", UnknownNameError)
+    path = PressurePath.of(meant, asked["actuator"])
+    told = {name: changed[name] for name in _OF_SLIDING if name in changed} | {"samples": asked["samples"]}
+    return simulate_sliding(
+        fault,
+        law,
+        meant.step,
+        lag=path.lag,
+        diffusion=path.diffusion,
+        inertia=PLANTS[asked["plant"]],
+        method=changed.get("method", "cvodes"),
+        **told,
+    )

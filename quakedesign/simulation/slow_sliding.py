@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from fractions import Fraction
 from time import perf_counter
 from typing import Any
@@ -12,20 +12,22 @@ import numpy as np
 
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault import Fault
-from quakedesign.fault.checks import require_nonnegative, require_positive
-from quakedesign.loop import Layer, LinearLaw
+from quakedesign.fault.checks import require_positive
+from quakedesign.loop import LinearLaw
 from quakedesign.simulation.integrators import adaptive_integrators
+from quakedesign.simulation.integrators.adaptive import StoppedError
 from quakedesign.simulation.metrics import Metrics
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.run import library_versions
 from quakedesign.simulation.setting import Setting
+from quakedesign.simulation.sliding_conditions import PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.slip_events import dynamic_rate
 from quakedesign.simulation.state_plants import SpringSlider
 from quakedesign.simulation.trajectory import Trajectory
 
-MODES = 24  # of the layer; the law has fewer
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run is recorded
 _RTOL = 1e-11
+PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 
 SIGNALS = {
     "slip_error": ("slip less that of the reference", "m"),
@@ -33,26 +35,6 @@ SIGNALS = {
     "asked": ("pressure that the law asks for beside that of the reference", "Pa"),
     "stress": ("shear stress disturbance", "Pa"),
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tide:
-    """Shear stress S·sin(2πt/P) on the fault, beside that of the spring.
-
-    Attributes
-    ----------
-    amplitude : float
-        S [Pa], not negative.
-    period : float
-        P [s], positive.
-    """
-
-    amplitude: float = 0.0
-    period: float = 1.0
-
-    def __post_init__(self) -> None:
-        require_nonnegative(stress=self.amplitude)
-        require_positive(stress_period=self.period)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,9 +66,13 @@ def simulate_sliding(
     law: LinearLaw,
     step: Fraction,
     *,
+    lag: Fraction = Fraction(0),
     diffusion: Fraction = Fraction(0),
     tide: Tide | None = None,
+    variation: SlidingVariation | None = None,
     duration: float | None = None,
+    settled_from: float | None = None,
+    samples: int | None = None,
     inertia: bool = False,
     method: str = "cvodes",
     progress: Callable[[float], None] = lambda _: None,
@@ -94,7 +80,8 @@ def simulate_sliding(
     """Let a fault slip at its mean rate V, target slip over operation time, from steady sliding at V.
 
     The far end rests. The pressure p_n that the nominal fault needs for it grows by kV/(μ*A) a second and reaches the
-    fault as it is; the law sees the slip error at every sample, and what it asks for is held and goes through the rock.
+    fault as it is; the law sees the slip error at every sample, and what it asks for is held and goes through the lag
+    and the rock.
 
     Parameters
     ----------
@@ -104,17 +91,28 @@ def simulate_sliding(
         Of the slip error alone [m → Pa].
     step : Fraction
         T_s [s].
-    diffusion : Fraction
-        L²/D of the rock between well and fault [s]; 0 for none.
+    lag, diffusion : Fraction
+        As of `PressurePath`.
     tide : Tide, optional
         None: no disturbance.
+    variation : SlidingVariation, optional
+        True constants other than the nominal ones; the fault slides steadily at V at the start all the same.
     duration : float, optional
         [s]; the operation time unless given.
+    settled_from : float, optional
+        Time [s] from which errors count; a quarter of the operation time, or of a shorter run.
+    samples : int, optional
+        About how many instants to keep; all unless given. Metrics are taken from all.
     inertia : bool
         Whether the fault has its mass.
     method : str
         ``"cvodes"`` or ``"idas"``.
     progress : callable
+
+    Returns
+    -------
+    SlidingRun
+        One that opens ends there; one with which the solver cannot go on has diverged, and has no metrics.
 
     Raises
     ------
@@ -128,12 +126,28 @@ def simulate_sliding(
     require_known(method, adaptive_integrators(), "method")
     began, length = perf_counter(), fault.reference.operation_time if duration is None else duration
     require_positive(duration=length, step=float(step))
-    setting = Setting.of(fault, float(step), max(length, float(step)), 1, None)
-    loop = _Loop.of(fault, diffusion, tide or Tide(), inertia)
-    rows, opened = _followed(loop, law, float(step), length, method, progress)
+    setting = Setting.of(fault, float(step), max(length, float(step)), samples or 1, settled_from)
+    loop = _Loop.of(
+        fault, PressurePath(lag=lag, diffusion=diffusion), tide or Tide(), variation or SlidingVariation(), inertia
+    )
+    rows, events = _followed(loop, law, float(step), length, method, progress)
     told = {"scheme": "explicit", "step": float(step), "method": method, "inertia": str(inertia)}
-    run = _recorded(fault, loop, rows, opened, told | {"plant": "smooth" if inertia else "quasi-dynamic"})
-    return replace(run, metrics=_metrics(run, setting, perf_counter() - began))
+    told |= {
+        f"variation_{name}": value for name, value in asdict(variation or SlidingVariation()).items() if value != 1
+    }
+    run = _recorded(fault, loop, rows, events, told | {"plant": "smooth" if inertia else "quasi-dynamic"})
+    run = replace(run, metrics=_metrics(run, setting, perf_counter() - began))
+    return run if samples is None else _thinned(run, samples)
+
+
+def _thinned(run: SlidingRun, samples: int) -> SlidingRun:
+    """About so many instants of a run, the first and the last among them."""
+    count = len(run.time)
+    kept = np.unique(np.linspace(0, count - 1, min(count, samples + 1)).astype(int))
+    arrays: dict[str, Any] = {
+        f.name: value[..., kept] for f in fields(run) if isinstance(value := getattr(run, f.name), np.ndarray)
+    }
+    return replace(run, **arrays)
 
 
 @dataclass(frozen=True)
@@ -148,13 +162,18 @@ class _Loop:
     share: "np.ndarray"
 
     @classmethod
-    def of(cls, fault: Fault, diffusion: Fraction, tide: Tide, inertia: bool) -> "_Loop":
-        slider = SpringSlider.of(fault, inertia=inertia)
+    def of(cls, fault: Fault, path: PressurePath, tide: Tide, variation: SlidingVariation, inertia: bool) -> "_Loop":
         speed = fault.reference.target_slip / fault.reference.operation_time
         steady = float(fault.friction.steady_coefficient(speed))
-        layer, count = Layer(time=diffusion or Fraction(1)), MODES if diffusion else 0
-        decay, share = (np.array([float(of(i)) for i in range(count)]) for of in (layer.rate, layer.share))
-        return cls(slider, speed, slider.stiffness * speed / steady, tide, decay, share)
+        ramp = fault.stiffness / fault.area * speed / steady
+        return cls(variation.slider(fault, inertia=inertia), speed, ramp, tide, *path.modes)
+
+    @property
+    def start(self) -> "np.ndarray":
+        """In steady sliding, but that the stress of the tide has come at once."""
+        y = np.array(self.slider.start(self.speed))
+        y[1] += self.tide.at(0.0) / self.slider.stiffness
+        return y if self.tide.at(0.0) == 0 else self.slider.stepped(y, 0.0, 0.0)
 
     def pressure(self, time: Any, held: Any, since: Any, modes: Any, exp: Callable[[Any], Any] = np.exp) -> Any:
         """Pressure [Pa] of the fault at a time [s], `since` [s] after the law asked for `held` [Pa]."""
@@ -168,22 +187,19 @@ class _Loop:
         time, y, told = ca.SX.sym("t"), ca.SX.sym("y", 4), ca.SX.sym("told", 2 + len(self.decay))
         pressure = self.pressure(time, told[0], time - told[1], told[2:], ca.exp)
         turn = 2 * math.pi / self.tide.period
-        load = self.tide.amplitude * turn * ca.cos(turn * time) / self.slider.stiffness
+        load = self.tide.amplitude * turn * ca.cos(turn * time + self.tide.phase) / self.slider.stiffness
         field = self.slider.rates(y, ca.vertcat(load, pressure, ca.jacobian(pressure, time)))[0]
         return ca.Function("rates", [time, y, told], [ca.densify(field)])
-
-    def stress(self, time: "np.ndarray") -> "np.ndarray":
-        return self.tide.amplitude * np.sin(2 * math.pi / self.tide.period * time)
 
 
 def _followed(
     loop: _Loop, law: LinearLaw, step: float, length: float, method: str, progress: Callable[[float], None]
-) -> tuple["np.ndarray", float | None]:
-    """Rows of (time, y, asked, pressure), and when the fault opens."""
+) -> tuple["np.ndarray", dict[str, float]]:
+    """Rows of (time, y, asked, pressure), and what ends them: when the fault opens, or nothing can go on."""
     sizes = [float(loop.slider.law.critical_slip)] * 2 + [1.0, 1.0]  # type: ignore[attr-defined]
     flow = adaptive_integrators()[method].flow(loop.rates(), sizes, _SHARES, rtol=_RTOL)
     own, fed, output = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output))
-    z, y, held, modes = np.zeros(len(output)), np.array(loop.slider.start(loop.speed)), 0.0, np.zeros(len(loop.decay))
+    z, y, held, modes = np.zeros(len(output)), loop.start, 0.0, np.zeros(len(loop.decay))
     rows = [[0.0, *y, 0.0, 0.0]]
     for k in range(math.ceil(length / step)):
         now = k * step
@@ -192,18 +208,22 @@ def _followed(
         z = own @ z + fed[:, 0] * error
         before, after = (loop.pressure(now, p, 0.0, modes) for p in (held, asked))
         if after >= loop.slider.normal_stress:
-            return np.array(rows), now
+            return np.array(rows), {"opening": now}
         y, held = loop.slider.stepped(y, before, after), asked
-        for share, values in zip(_SHARES, flow.follow(now, step, y, (held, now, *modes))[0].T, strict=True):
+        try:
+            found = flow.follow(now, step, y, (held, now, *modes))[0]
+        except StoppedError:
+            return np.array(rows), {"diverged": now}
+        for share, values in zip(_SHARES, found.T, strict=True):
             pressure = loop.pressure(now + share * step, held, share * step, modes)
             rows.append([now + share * step, *values, held, pressure])
-        y, modes = values, held + (modes - held) * np.exp(-loop.decay * step)
+        y, modes = found[:, -1], held + (modes - held) * np.exp(-loop.decay * step)
         progress(min(1.0, (now + step) / length))
-    return np.array(rows), None
+    return np.array(rows), {}
 
 
 def _recorded(
-    fault: Fault, loop: _Loop, rows: "np.ndarray", opened: float | None, told: Mapping[str, Any]
+    fault: Fault, loop: _Loop, rows: "np.ndarray", events: Mapping[str, float], told: Mapping[str, Any]
 ) -> SlidingRun:
     time, slip, _, log_rate, log_state, asked, pressure = rows.T.copy()
     friction = loop.slider.readings.map(len(time))(rows[:, 1:5].T, pressure)[0].full().ravel()
@@ -223,24 +243,31 @@ def _recorded(
         integral_units=(),
         metrics=Metrics(settled_from=0.0, steps=0, seconds=0.0),
         energy=None,
-        events={} if opened is None else {"opening": opened},
-        criterion=OutcomeCriterion(
-            natural_peak=None,
-            inertial_rate=math.inf,
-            reference_rate=loop.speed,
-            target_slip=fault.reference.target_slip,
-            dynamic_rate=dynamic_rate(fault),
-        ),
+        events=events,
+        criterion=criterion_of(fault),
         provenance={"friction": fault.friction.name, "controller": "elqr", **told}
         | library_versions("casadi", "numpy", "quakedesign"),
         theta=np.exp(log_state),
         asked=asked,
-        stress=loop.stress(time),
+        stress=loop.tide.at(time),
+    )
+
+
+def criterion_of(fault: Fault) -> OutcomeCriterion:
+    """What the outcome of a run in slow sliding is decided by; the natural peak takes a cycle to know."""
+    return OutcomeCriterion(
+        natural_peak=None,
+        inertial_rate=math.inf,
+        reference_rate=fault.reference.target_slip / fault.reference.operation_time,
+        target_slip=fault.reference.target_slip,
+        dynamic_rate=dynamic_rate(fault),
     )
 
 
 def _metrics(run: SlidingRun, setting: Setting, seconds: float) -> Metrics:
-    """Figures of all instants of a run that followed its reference."""
+    """Figures of all instants of a run that followed its reference; none of one that diverged."""
+    if "diverged" in run.events:
+        return Metrics(settled_from=setting.settled_from, steps=len(run.time) - 1, seconds=seconds)
     late = run.time > setting.settled_from
     slip, rate = (values[late] for values in (run.slip - run.reference, run.slip_rate - run.reference_rate))
     pressure = run.pressure[late]

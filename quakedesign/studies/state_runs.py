@@ -18,17 +18,16 @@ from quakedesign.rationals import rational
 from quakedesign.simulation import PressureCourse, StateTrajectory, simulate_state
 from quakedesign.simulation.metrics import Metrics
 from quakedesign.simulation.outcome import Outcome
+from quakedesign.simulation.sliding_conditions import TIDE, Tide
 from quakedesign.simulation.slip_events import SlipEvent, cycle_outcome, dynamic_rate, slip_events
-from quakedesign.simulation.slow_sliding import SlidingRun, Tide, simulate_sliding
+from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
 from quakedesign.simulation.starting_state import StartingState, cycles, disturbed, late_in_cycle, locked, sliding
 from quakedesign.symbolic import derive
 from quakedesign.synthesis import Design
 from quakedesign.synthesis.linear.plant.sliding_model import growth_rate, sliding_model
 from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
 
-PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 _RTOL = 1e-8
-TIDE = 12.42 * 3600.0  # s, of the largest tide, M2
 _UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
 
 
@@ -214,6 +213,7 @@ def designed_run(design: Design, natural_peak: float | None, progress: Callable[
         design.fault,
         answer.held.law,
         answer.held.step,
+        lag=answer.held.lag,
         diffusion=answer.held.diffusion,
         tide=Tide(amplitude=float(answer.task.stress), period=TIDE),
         inertia=True,
@@ -230,7 +230,7 @@ class HeldRun:
     ----------
     fault : Fault
     model : SlidingModel
-    step, diffusion : Fraction
+    step, lag, diffusion : Fraction
         [s].
     trajectory : SlidingRun
     """
@@ -238,6 +238,7 @@ class HeldRun:
     fault: Fault
     model: SlidingModel
     step: Fraction
+    lag: Fraction
     diffusion: Fraction
     trajectory: SlidingRun
 
@@ -249,6 +250,7 @@ class HeldRun:
             "reference_rate": rate,
             "growth_rate": growth_rate(self.model),
             "step": float(self.step),
+            "lag": float(self.lag),
             "diffusion": float(self.diffusion),
             "metrics": {
                 "max_log_rate": float(np.max(np.abs(np.log(run.slip_rate / rate)))),
@@ -268,6 +270,7 @@ def run_held(
     fault: Fault,
     *,
     step: float | None = None,
+    lag: float = 0.0,
     diffusion: float = 0.0,
     stress: float = 0.0,
     stress_period: float = TIDE,
@@ -283,6 +286,8 @@ def run_held(
         Its friction has one state.
     step : float, optional
         [s]; the sampling time of the fault unless given.
+    lag : float
+        Time constant of pump and pipe [s], which the law does not know.
     diffusion : float
         L²/D of the rock between well and fault [s].
     stress, stress_period : float
@@ -302,13 +307,14 @@ def run_held(
         fault,
         law,
         held,
+        lag=rational(lag),
         diffusion=path,
         tide=Tide(amplitude=stress, period=stress_period),
         duration=duration,
         inertia=PLANTS[plant],
         method=method,
     )
-    return HeldRun(fault=fault, model=model, step=held, diffusion=path, trajectory=run)
+    return HeldRun(fault=fault, model=model, step=held, lag=rational(lag), diffusion=path, trajectory=run)
 
 
 def _require_runnable(fault: Fault, plant: str) -> None:

@@ -2,7 +2,7 @@
 
 import json
 import pickle
-from dataclasses import replace
+from dataclasses import asdict, replace
 from fractions import Fraction as F
 
 import control
@@ -20,7 +20,6 @@ from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Variation, export_controller, to_casadi, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
-from quakedesign.simulation.campaign.worker import advance
 
 STEP = F("0.184")
 LAW = disturbance_estimate(
@@ -120,8 +119,8 @@ def test_a_campaign_runs_it_as_simulate_does():
     """The undisturbed sample, by the program that all samples share."""
     problem = campaign_problem(REAL, HELD.controller, duration=18.4, initial_slip=1e-6)
     json.dumps(problem.inputs, allow_nan=False)
-    start = Sample(variation=Variation(), initial_slip=1e-6, initial_slip_rate=0.0, noise_seed=0)
-    (end,) = advance(problem.program, [problem.start(start)], problem.setting.steps)
+    start = Sample(numbers=asdict(Variation()) | {"initial_slip": 1e-6, "initial_slip_rate": 0.0}, noise_seed=0)
+    (end,) = problem.program.ends([problem.start(start)], problem.setting.steps)
     run = problem.trajectory(start, 101)
     assert np.allclose(run.pressure, recursion(run, LAW), rtol=1e-9, atol=1e-6)
     assert end[2] == pytest.approx(run.slip[-1], rel=1e-12)

@@ -6,15 +6,19 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
 from scipy.special import lambertw
 
-from quakedesign.errors import ParameterError
+from quakedesign import simulate
+from quakedesign.certificates.guarantee import Held
+from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Reference, load_fault
 from quakedesign.fault.friction import friction_law
 from quakedesign.loop import LinearLaw, sliding_loop
-from quakedesign.simulation.slow_sliding import Tide, _Loop, simulate_sliding
+from quakedesign.simulation import Actuator, Diffusion, Lag, Saturation, Variation
+from quakedesign.simulation.sliding_conditions import PressurePath, SlidingVariation, Tide
+from quakedesign.simulation.slow_sliding import _Loop, simulate_sliding
 from quakedesign.symbolic import derive
 from quakedesign.synthesis.linear.plant.sliding_model import growth_rate, sliding_model
 from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
@@ -92,28 +96,31 @@ def asking_for(pressure):
     )  # fmt: skip
 
 
-def oracle(law, name, tide, count):
+def oracle(law, name, tide, count, off=(1.0,) * 6):
     """Slip error and ln(v/V) at every sample: balance of forces by Lambert's function, LSODA between samples."""
+    a, b, d, sigma, stiffness, damping = (
+        x * y for x, y in zip((A, B, D, NORMAL, STIFFNESS, DAMPING), off, strict=True)
+    )
     ramp = STIFFNESS * V / MU
     z, held, x, w, found = np.zeros(len(law.output)), 0.0, 0.0, 0.0, []
     update, fed, output = (np.array(part, float) for part in (law.update, law.measured, law.output))
 
     def rate(t, x, w, held):
-        normal = NORMAL - ramp * t - held
+        normal = sigma - ramp * t - held
         stress = (
-            NORMAL * MU
-            + DAMPING * V
-            + STIFFNESS * (-V * t - x)
-            + tide.amplitude * math.sin(2 * math.pi * t / tide.period)
+            sigma * MU
+            + damping * V
+            + stiffness * (-V * t - x)
+            + tide.amplitude * math.sin(2 * math.pi * t / tide.period + tide.phase)
         )
-        driving = stress / normal - MU - B * w
-        scale = A * normal / DAMPING
-        return math.log(scale / V * lambertw(math.exp(driving / A) * V / scale).real)
+        driving = stress / normal - MU - b * w
+        scale = a * normal / damping
+        return math.log(scale / V * lambertw(math.exp(driving / a) * V / scale).real)
 
     def field(t, state, held):
         y = rate(t, *state, held)
         grown = math.exp(-state[1]) - math.exp(y) if name.endswith("aging") else -math.exp(y) * (y + state[1])
-        return [V * math.expm1(y), V / D * grown]
+        return [V * math.expm1(y), V / d * grown]
 
     for k in range(count):
         held = float(output @ z) + float(law.feedback[0]) * x
@@ -137,9 +144,97 @@ def test_a_held_run_agrees_with_an_independent_integrator(name):
     assert run.pressure == pytest.approx(STIFFNESS * V / MU * run.time + run.asked, abs=1e-6)
 
 
+def test_true_constants_other_than_the_nominal_ones_are_those_of_the_plant_alone():
+    """The law, its plan of the pressure and the start at V stay what they are."""
+    off = {"direct_effect": 1.1, "evolution_effect": 0.93, "critical_slip": 1.2}
+    off |= {"normal_stress": 0.9, "stiffness": 1.15, "damping": 1.3}
+    law, tide = sliding_law(sliding_model(fault()), STEP), Tide(amplitude=90e3, period=3000.0, phase=1.0)
+    told = {"tide": tide, "duration": 2000.0, "variation": SlidingVariation(**off)}
+    run = simulate_sliding(fault(), law, STEP, **told)
+    error, log_rate = oracle(law, "rate-and-state-aging", tide, 50, tuple(off.values()))
+    assert np.max(np.abs(log_rate)) > 0.1
+    assert run.slip_error[4::4] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
+    assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
+    assert run.provenance["variation_critical_slip"] == 1.2
+    with pytest.raises(ParameterError, match="direct_effect must be positive"):
+        SlidingVariation(direct_effect=0.0)
+
+
+@pytest.mark.parametrize("lag", [50.0, 833.0, 8 * 833.0 / math.pi**2 / 2])
+def test_a_step_goes_through_a_lag_and_then_the_layer(lag):
+    """The step of Carslaw and Jaeger's layer, folded with e^(−t/ℓ)/ℓ by quadrature; one ℓ has the rate of a mode."""
+    path = PressurePath(lag=Fraction(lag), diffusion=PATH)
+    n, tau = np.arange(60), float(PATH)
+    rates, shares = ((2 * n + 1) * math.pi / 2) ** 2 / tau, 4 / math.pi * (-1.0) ** n / (2 * n + 1)
+
+    def behind(t):
+        return quad(lambda s: (1 - shares @ np.exp(-rates * (t - s))) * math.exp(-s / lag) / lag, 0, t, epsabs=1e-9)[0]
+
+    loop = _Loop.of(fault(), path, Tide(), SlidingVariation(), inertia=False)
+    for time in (40.0, 400.0, 2000.0):
+        found = loop.pressure(0.0, 1.0, time, np.zeros(len(loop.decay)))
+        assert found == pytest.approx(behind(time), abs=2e-5)
+    alone = _Loop.of(fault(), PressurePath(lag=Fraction(lag)), Tide(), SlidingVariation(), inertia=False)
+    assert alone.pressure(0.0, 1.0, 40.0, np.zeros(1)) == pytest.approx(-math.expm1(-40.0 / lag), rel=1e-12)
+
+
+@pytest.mark.parametrize("inertia", [True, False])
+def test_a_stress_that_has_come_at_once_makes_the_rate_jump(inertia):
+    """By about S/(aN) without inertia, as soon as that has acted with it."""
+    law, tide = sliding_law(sliding_model(fault()), STEP), Tide(amplitude=10e3, period=1e6, phase=math.pi / 2)
+    run = simulate_sliding(fault(), law, STEP, tide=tide, duration=40.0, inertia=inertia)
+    jumped = np.log(run.slip_rate / V)
+    assert jumped[0] == pytest.approx(0 if inertia else 10e3 / (A * NORMAL), rel=5e-3, abs=1e-12)
+    assert jumped[1] == pytest.approx(10e3 / (A * NORMAL), rel=0.05)
+    assert run.stress[0] == pytest.approx(10e3)
+
+
+def test_simulate_runs_what_a_design_found_in_its_own_way():
+    path, tide = Fraction(500), Tide(amplitude=5e3, period=3000.0)
+    law = sliding_law(sliding_model(fault()), STEP, diffusion=path)
+    controller = Held(law=law, step=STEP, diffusion=path).controller
+    given = {"duration": 400.0, "tide": tide}
+    run = simulate(fault(), controller, **given, plant="quasi-dynamic", samples=10)
+    own = simulate_sliding(fault(), law, STEP, diffusion=path, **given)
+    assert len(run.time) == 11
+    assert run.slip_rate[-1] == own.slip_rate[-1]
+    assert dataclasses.replace(run.metrics, seconds=0.0) == dataclasses.replace(own.metrics, seconds=0.0)
+    assert run.outcome == own.outcome
+    other = Actuator(stages=(Lag(time_constant=30.0), Diffusion.of_time(100.0)))
+    late = simulate(fault(), controller, **given, plant="quasi-dynamic", actuator=other)
+    written = simulate_sliding(fault(), law, STEP, lag=Fraction(30), diffusion=Fraction(100), **given)
+    assert late.slip_rate[-1] == written.slip_rate[-1]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"controller": None}, "Without a controller use simulate_state"),
+        ({"substeps": 2}, "Received substeps"),
+        ({"initial_slip": 1e-3}, "Received initial_slip"),
+        ({"variation": Variation()}, "Received variation"),
+        ({"step": 20.0}, "runs with the scheme explicit"),
+        ({"plant": "coulomb"}, "one of smooth, quasi-dynamic"),
+        (
+            {"actuator": Actuator(stages=(Saturation(lowest=0.0, highest=1.0),))},
+            "a lag, rock, or both. Received saturation",
+        ),
+    ],
+)
+def test_what_a_run_in_slow_sliding_does_not_take_is_refused(wrong, said):
+    law = sliding_law(sliding_model(fault()), STEP)
+    with pytest.raises((ParameterError, UnknownNameError), match=said):
+        simulate(fault(), **({"controller": Held(law=law, step=STEP).controller, "duration": 80.0} | wrong))
+
+
+def test_a_fault_without_a_state_has_no_tide():
+    with pytest.raises(ParameterError, match="need friction with a state"):
+        simulate(load_fault("real-fault"), tide=Tide(amplitude=1.0))
+
+
 def test_a_step_goes_through_the_layer_as_in_carslaw_and_jaeger():
     """1 − (4/π)Σ(−1)ⁿ/(2n + 1)e^(−((2n + 1)π/2)²t/τ) after a unit step of the well."""
-    loop = _Loop.of(fault(), PATH, Tide(), inertia=False)
+    loop = _Loop.of(fault(), PressurePath(diffusion=PATH), Tide(), SlidingVariation(), inertia=False)
     for share in (0.05, 0.2, 1.0):
         time = share * float(PATH)
         n = np.arange(200)

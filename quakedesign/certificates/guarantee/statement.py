@@ -123,7 +123,7 @@ class Held:
         """
         if self.law.root is not None:
             raise UnsupportedError("a law with an implicit root has no explicit run. Simulate its own controller.")
-        return loops.SampledController(law=self.law, step=self.step)
+        return loops.SampledController(law=self.law, step=self.step, lag=self.lag, diffusion=self.diffusion)
 
     def loop(self, task: Task, model: Model | None = None) -> PeriodicLoop:
         """Nominal error loop on a task, of its model or another one."""

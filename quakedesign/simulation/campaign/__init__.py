@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from quakedesign.simulation.campaign.running import campaign_problem as campaign_problem
     from quakedesign.simulation.campaign.running import run_campaign as run_campaign
     from quakedesign.simulation.campaign.search import Worst as Worst
+    from quakedesign.simulation.campaign.sliding import SlidingProblem as SlidingProblem
     from quakedesign.simulation.campaign.space import Sample as Sample
     from quakedesign.simulation.campaign.space import Space as Space
+    from quakedesign.simulation.campaign.stepped import SteppedProblem as SteppedProblem
 
 face(__name__)

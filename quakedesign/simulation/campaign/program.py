@@ -20,6 +20,7 @@ from quakedesign.simulation.stepping import Advancer
 from quakedesign.temporary import temporary_folder
 
 Mover = Callable[["np.ndarray", int], None]
+SLICE = 200_000  # steps of all samples together in one call of compiled code, which is deaf: a fraction of a second
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +60,7 @@ def _digest(content: bytes) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Program:
+class CompiledProgram:
     """What a worker needs to move samples on; it can be sent anywhere.
 
     Attributes
@@ -83,7 +84,7 @@ class Program:
     library: Library | None = None
 
     @classmethod
-    def of(cls, step: Any, diverged: int) -> "Program":
+    def of(cls, step: Any, diverged: int) -> "CompiledProgram":
         """Program of a CasADi Function that maps the vector one step on."""
         source, function = lanes_c(step, diverged), expanded(step).serialize()
         return cls(source=source, function=function, size=step.size1_in(0), diverged=diverged)
@@ -93,7 +94,7 @@ class Program:
         """Digest of the arithmetic of one step."""
         return hashlib.sha256(self.function.encode()).hexdigest()
 
-    def compiled(self, folder: Path) -> "Program":
+    def compiled(self, folder: Path) -> "CompiledProgram":
         """Program whose library lies in a folder, which must be private; the same program where no compiler works."""
         try:
             command = compiler()
@@ -102,9 +103,25 @@ class Program:
         except (OSError, subprocess.SubprocessError):
             return self
 
+    def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
+        """Vectors after a number of steps, one a row, in slices that can be interrupted; one that diverges ends there.
+
+        Parameters
+        ----------
+        starts : ndarray
+            Shape (samples, size).
+        steps : int
+        """
+        move = mover(self)
+        vectors = np.array(starts, dtype=np.float64, order="C", ndmin=2)
+        slice_ = max(1, SLICE // len(vectors))
+        for taken in range(0, steps, slice_):
+            move(vectors, min(slice_, steps - taken))
+        return vectors
+
 
 @lru_cache(maxsize=8)
-def mover(program: Program) -> Mover:
+def mover(program: CompiledProgram) -> Mover:
     """Callable (vectors, steps) that moves vectors, one a row, on in place: machine code where it can be had.
 
     A library that is missing or is not what was built, as on another machine, is built anew.
@@ -137,7 +154,7 @@ def _machine_code(content: bytes, folder: Path, size: int) -> Mover:
     return move
 
 
-def _virtual_machine(program: Program) -> Mover:
+def _virtual_machine(program: CompiledProgram) -> Mover:
     rungs = ladder(ca.Function.deserialize(program.function))
     advancer = Advancer.of(Backend(rungs, "virtual-machine", ""), [0.0] * program.size)
     alone = Lock()  # threads share the advancer

@@ -3,9 +3,10 @@
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from fractions import Fraction
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,19 +14,22 @@ from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.loop.schemes import Scheme, own_way, simulation_scheme
+from quakedesign.rationals import rational
 from quakedesign.simulation.campaign.crews import Cluster, Given
 from quakedesign.simulation.campaign.dispatch import dispatch
 from quakedesign.simulation.campaign.ledger import Ledger
-from quakedesign.simulation.campaign.problem import Problem, SampleResult
-from quakedesign.simulation.campaign.program import Program
+from quakedesign.simulation.campaign.problem import Problem, Program, SampleResult
 from quakedesign.simulation.campaign.result import Campaign, Failure, badness, metric_names, require_metric
 from quakedesign.simulation.campaign.search import Worst, search
+from quakedesign.simulation.campaign.sliding import SlidingProblem, sliding_space
 from quakedesign.simulation.campaign.space import Sample, Space, require_count, require_seed
-from quakedesign.simulation.campaign.worker import advance
+from quakedesign.simulation.campaign.stepped import SteppedProblem
 from quakedesign.simulation.integrators import integrator
+from quakedesign.simulation.integrators.dormand_prince import DormandPrince
 from quakedesign.simulation.lanes import LANES
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.setting import Setting
+from quakedesign.simulation.sliding_conditions import TIDE
 from quakedesign.temporary import temporary_folder
 from quakedesign.workers import Crew, Processes
 
@@ -53,6 +57,9 @@ def campaign_problem(
     load: Load | None = None,
     initial_slip: float = 0.0,
     initial_slip_rate: float = 0.0,
+    spread: float | Fraction = 0,
+    stress: float = 0.0,
+    stress_period: float = TIDE,
     seed: int = 0,
 ) -> Problem:
     """Closed loop and the space of its samples.
@@ -61,13 +68,18 @@ def campaign_problem(
     ----------
     fault : Fault
     controller : Controller, optional
-        None: the pressure stays zero.
+        None: the pressure stays zero. Of friction with a state an e-LQR of `design`, which holds it in slow sliding.
     scheme, step, method, duration, settled_from, plant, load
         As in `simulate`; step [s], duration [s], settled_from [s].
     initial_slip : float
         Largest initial slip of a sample [m].
     initial_slip_rate : float
         Largest initial slip rate of a sample [m/s].
+    spread : float or Fraction
+        Of friction with a state: by how much of their values a, b and D_c are off [-]; σ', k and η by the fault's box,
+        whose authority is that of σ'.
+    stress, stress_period : float
+        Of friction with a state: bound [Pa] and period [s] of a sine of shear stress, of any share and phase.
     seed : int
         Of the Sobol sequence and of everything else that is random.
 
@@ -78,17 +90,29 @@ def campaign_problem(
     """
     require_seed(seed)
     scheme, step, own = own_way(controller, scheme, step)
-    return Problem(
-        fault=fault,
-        controller=controller,
-        scheme=simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme,
-        setting=Setting.of(fault, step, duration, 1, settled_from),
-        method=integrator(method),
-        plant=plant,
-        load=load or Load(),
-        space=Space.of(fault, initial_slip=initial_slip, initial_slip_rate=initial_slip_rate),
-        seed=seed,
-    )
+    told: dict[str, Any] = {
+        "fault": fault,
+        "controller": controller,
+        "scheme": simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme,
+        "setting": Setting.of(fault, step, duration, 1, settled_from),
+        "plant": plant,
+        "seed": seed,
+    }
+    if fault.friction.state_names:
+        if load not in (None, Load()) or initial_slip or initial_slip_rate:
+            raise ParameterError(
+                "friction with a state starts in steady sliding and is pushed by a stress. Received a load or an "
+                f"initial slip or slip rate with {fault.friction.name}. Leave them out."
+            )
+        space = sliding_space(fault, rational(spread, "spread"))
+        solver = "cvodes" if method == DormandPrince.name else method
+        return SlidingProblem(**told, space=space, method=solver, stress=stress, stress_period=stress_period)
+    if spread or stress:
+        raise ParameterError(
+            f"spread and stress need friction with a state. Received {fault.friction.name}. Leave them out."
+        )
+    space = Space.of(fault, initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
+    return SteppedProblem(**told, space=space, method=integrator(method), load=load or Load())
 
 
 def run_campaign(
@@ -216,8 +240,8 @@ class _Runner:
             self._tell(what, done / total)
 
         steps = self._problem.setting.steps
-        tasks = {first: (self._program, rows, steps) for first, rows in batches.items()}
-        for first, reason in sorted(dispatch(advance, tasks, self._crew, keep).items()):
+        tasks = {first: (rows, steps) for first, rows in batches.items()}
+        for first, reason in sorted(dispatch(self._program.ends, tasks, self._crew, keep).items()):
             self.failures.append(Failure(samples=tuple(names[first : first + size]), reason=reason))
 
     def _batch_size(self, count: int) -> int:

@@ -5,14 +5,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_nonnegative
-from quakedesign.simulation.variation import Variation, names
 
 MOST_SAMPLES = 2**20
 PERIODIC = frozenset({"phase"})
@@ -25,24 +23,15 @@ class Sample:
 
     Attributes
     ----------
-    variation : Variation
-        True parameters and disturbance.
-    initial_slip, initial_slip_rate : float
-        x1 [m] and x2 [m/s] at the start.
+    numbers : mapping of str to float
+        What differs from sample to sample but for the seed, by the names of the space; x1 [m] and x2 [m/s] at the
+        start as ``initial_slip`` and ``initial_slip_rate``.
     noise_seed : int
         Of the noise in the measurements.
     """
 
-    variation: Variation
-    initial_slip: float
-    initial_slip_rate: float
+    numbers: Mapping[str, float]
     noise_seed: int
-
-    @property
-    def numbers(self) -> dict[str, float]:
-        """Everything but the seed, by name."""
-        varied = dict(zip(names(), self.variation.values, strict=True))
-        return varied | {"initial_slip": self.initial_slip, "initial_slip_rate": self.initial_slip_rate}
 
 
 @dataclass(frozen=True)
@@ -98,12 +87,11 @@ class Space:
         """
         if len(point) != len(self.ranges):
             raise ParameterError(f"point must hold {len(self.ranges)} numbers, one a range. Received {len(point)}.")
-        values: dict[str, Any] = {
+        values = {
             name: min(high, low + float(share) * (high - low))
             for (name, (low, high)), share in zip(self.ranges.items(), point, strict=True)
         }
-        varied = {name: values.pop(name) for name in names()}
-        return Sample(variation=Variation(**varied), noise_seed=noise_seed, **values)
+        return Sample(numbers=values, noise_seed=noise_seed)
 
 
 def point(seed: int, index: int, dimension: int) -> "np.ndarray":

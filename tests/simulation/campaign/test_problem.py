@@ -1,6 +1,6 @@
 """Disturbance and start of a sample are what they are called."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -14,7 +14,6 @@ from quakedesign.fault import load_fault
 from quakedesign.simulation import Load, Variation, simulate
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
-from quakedesign.simulation.campaign.worker import advance
 
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]
@@ -39,7 +38,7 @@ def test_a_disturbance_outside_the_class_is_refused(wrong):
 
 def test_a_start_away_from_rest_keeps_the_energy_budget():
     problem = campaign_problem(LAB, LAW, step=1e-4, duration=0.05, load=Load(drift=1e-3))
-    sample = Sample(variation=Variation(), initial_slip=2e-4, initial_slip_rate=0.03, noise_seed=0)
+    sample = Sample(numbers=asdict(Variation()) | {"initial_slip": 2e-4, "initial_slip_rate": 0.03}, noise_seed=0)
     run = problem.trajectory(sample, 50)
     assert (run.slip[0], run.slip_rate[0]) == (2e-4, 0.03)
     kinetic = LAB.mass * (run.slip_rate[-1] ** 2 - 0.03**2) / 2
@@ -53,17 +52,17 @@ def test_divergence_is_that_of_the_sampled_linear_loop():
     ranges = problem.space.ranges | {"weakening": (0.0, 0.0)}
     problem = replace(problem, space=replace(problem.space, ranges=MappingProxyType(ranges)))
     samples = [problem.sample(i) for i in range(32)]
-    ends = advance(problem.program, [problem.start(s) for s in samples], problem.setting.steps)
-    radii = np.array([spectral_radius(sample.variation) for sample in samples])
+    ends = problem.program.ends([problem.start(s) for s in samples], problem.setting.steps)
+    radii = np.array([spectral_radius(sample.numbers) for sample in samples])
     found = np.array([result.diverged for result in problem.results(ends)])
     clear = (radii < 1) | (radii > 1.012)  # 1.012^4000 is 5e20
     assert min(sum(found[clear]), sum(~found[clear])) > 3
     assert np.array_equal(found[clear], radii[clear] > 1)
 
 
-def spectral_radius(variation):
-    k, eta = variation.stiffness * LAB.specific_stiffness, variation.damping * LAB.specific_damping
-    gain = LAB.friction.residual * LAB.authority * variation.authority
+def spectral_radius(numbers):
+    k, eta = numbers["stiffness"] * LAB.specific_stiffness, numbers["damping"] * LAB.specific_damping
+    gain = LAB.friction.residual * LAB.authority * numbers["authority"]
     field = np.array([[0, 1, 0], [LAB.disturbance.slip_growth - k, -eta, gain], [0, 0, 0]])
     step, (k1, k2, k3, k4) = LAB.sampling_time, (float(v) for v in LAW.gains.values())
     held = expm(field * step)

@@ -13,9 +13,8 @@ from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Variation, simulate
 from quakedesign.simulation.backend import compiler, shared_library
 from quakedesign.simulation.campaign import campaign_problem
-from quakedesign.simulation.campaign import worker as worker_module
+from quakedesign.simulation.campaign import program as program_module
 from quakedesign.simulation.campaign.program import mover
-from quakedesign.simulation.campaign.worker import advance
 
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]  # sampled at 1 ms it is on the verge of instability (ERRATA 22)
@@ -32,7 +31,7 @@ def starts(count):
 def ends(tmp_path_factory):
     program = PROBLEM.program.compiled(tmp_path_factory.mktemp("library"))
     assert program.library
-    return advance(program, starts(16), STEPS)
+    return program.ends(starts(16), STEPS)
 
 
 def test_some_diverge_and_some_do_not(ends):
@@ -44,15 +43,15 @@ def test_the_virtual_machine_has_the_same_digits(ends, monkeypatch, tmp_path):
     monkeypatch.setenv("CC", "false")
     mover.cache_clear()
     assert PROBLEM.program.compiled(tmp_path).library is None
-    slow = advance(PROBLEM.program, starts(16), STEPS)
+    slow = PROBLEM.program.ends(starts(16), STEPS)
     mover.cache_clear()
     assert slow.tobytes() == ends.tobytes()
 
 
 def test_slices_and_company_change_nothing(ends, monkeypatch):
-    monkeypatch.setattr(worker_module, "SLICE", 77)
+    monkeypatch.setattr(program_module, "SLICE", 77)
     for i in (0, 5, 15):
-        assert advance(PROBLEM.program, starts(16)[[i, 3]], STEPS)[0].tobytes() == ends[i].tobytes()
+        assert PROBLEM.program.ends(starts(16)[[i, 3]], STEPS)[0].tobytes() == ends[i].tobytes()
 
 
 PLANTED = """
@@ -84,7 +83,7 @@ def test_the_planted_library_of_these_tests_would_be_seen(plant, tmp_path):
 def test_a_planted_library_is_not_loaded(ends, plant, tmp_path):
     program = PROBLEM.program.compiled(tmp_path)
     mark = plant(program.library.path)
-    assert advance(program, starts(2), STEPS).tobytes() == ends[:2].tobytes()
+    assert program.ends(starts(2), STEPS).tobytes() == ends[:2].tobytes()
     assert not mark.exists()
 
 
@@ -93,13 +92,13 @@ def test_a_damaged_library_is_built_anew(ends, tmp_path, left):
     program = PROBLEM.program.compiled(tmp_path)
     content = program.library.path.read_bytes()
     program.library.path.write_bytes(content[: int(left * len(content))])
-    assert advance(program, starts(2), STEPS).tobytes() == ends[:2].tobytes()
+    assert program.ends(starts(2), STEPS).tobytes() == ends[:2].tobytes()
 
 
 def test_a_library_that_is_gone_is_built_anew(ends, tmp_path):
     program = PROBLEM.program.compiled(tmp_path)
     program.library.path.unlink()
-    assert advance(program, starts(2), STEPS).tobytes() == ends[:2].tobytes()
+    assert program.ends(starts(2), STEPS).tobytes() == ends[:2].tobytes()
 
 
 def test_nothing_compiled_in_its_folder_changes_a_campaign(ends, plant, tmp_path):
@@ -122,7 +121,7 @@ def test_a_sample_is_what_simulate_gives():
 
     problem = campaign_problem(LAB, LAW, scheme=SCHEME, duration=0.1)
     sample = problem.sample(3)
-    (result,) = problem.results(advance(problem.program, [problem.start(sample)], problem.setting.steps))
+    (result,) = problem.results(problem.program.ends([problem.start(sample)], problem.setting.steps))
     scheme = reseeded(SCHEME, sample.noise_seed)
     run = simulate(LAB, LAW, scheme=scheme, duration=0.1, variation=Variation(**_varied(sample)))
     figures = run.metrics.to_dict()

@@ -71,7 +71,7 @@ def test_the_table_has_units_and_all_samples():
     table = campaign([3.0, None, 1.0, math.nan]).to_pandas()
     assert table["max_slip_error [m]"].tolist()[:3] == [3.0, math.inf, 1.0]
     assert math.isnan(table["max_slip_error [m]"][3])
-    assert table["phase [rad]"][2] == PROBLEM.sample(2).variation.phase
+    assert table["phase [rad]"][2] == PROBLEM.sample(2).numbers["phase"]
 
 
 def test_the_figure_shows_the_share_of_all_samples():

@@ -28,7 +28,7 @@ def test_corners_are_all_combinations():
 def test_a_convex_function_is_worst_in_a_corner():
     worst = found_by(lambda n: 3 * n["weakening"] - n["amplitude"], rounds=0)
     assert worst.value == 3.0
-    assert (worst.sample.variation.weakening, worst.sample.variation.amplitude) == (1.0, 0.0)
+    assert (worst.sample.numbers["weakening"], worst.sample.numbers["amplitude"]) == (1.0, 0.0)
 
 
 def test_a_peak_inside_is_approached():
