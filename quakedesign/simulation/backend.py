@@ -16,6 +16,7 @@ import casadi as ca
 
 from quakedesign import cache
 from quakedesign.errors import SimulationError
+from quakedesign.simulation.c_files import c_file
 from quakedesign.simulation.instructions import expanded, expanded_size
 from quakedesign.simulation.portable_c import in_place_of_the_library
 from quakedesign.temporary import temporary_folder
@@ -30,28 +31,6 @@ _WORTH = 100_000_000
 
 STEP = "quakedesign_step"
 """Name of a step function: in a library that is loaded, that of a function of the C library would be taken for it."""
-_LOOP = """
-CASADI_SYMBOL_EXPORT int advance(double* vector, long long steps) {{
-  double first[{size}], second[{size}], work[{work}];
-  casadi_int integers[{integers}];
-  const double* arguments[{arguments}];
-  double* results[{results}];
-  double *now = first, *next = second, *other;
-  long long taken;
-  int i;
-  for (i = 0; i < {size}; ++i) now[i] = vector[i];
-  for (taken = 0; taken < steps; ++taken) {{
-    arguments[0] = now;
-    results[0] = next;
-    if ({step}(arguments, results, integers, work, 0)) return 1;
-    other = now;
-    now = next;
-    next = other;
-  }}
-  for (i = 0; i < {size}; ++i) vector[i] = now[i];
-  return 0;
-}}
-"""
 
 MachineCode = Callable[[Any, int], int]
 
@@ -138,7 +117,7 @@ def _source(step: Any) -> str:
         "arguments": step.sz_arg(),
         "results": step.sz_res(),
     }
-    return in_place_of_the_library() + str(generator.dump()) + _LOOP.format(**sizes)
+    return in_place_of_the_library() + str(generator.dump()) + c_file("steps.c", **sizes)
 
 
 def compiler() -> tuple[str, ...]:

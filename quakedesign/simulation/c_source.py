@@ -7,6 +7,8 @@ from typing import Any
 
 import casadi as ca
 
+from quakedesign.simulation.c_files import c_file
+
 SOURCE, HEADER = "controller.c", "controller.h"
 _WIDTH = 110
 _USE = """
@@ -17,51 +19,6 @@ memory they are given, allocate nothing, and may be called from several threads 
 are not finite are not caught: check measurement and pressure.
 """
 _COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and link with -lm."
-_BODY = """
-#include "{header}"
-
-void controller_reset(double* memory) {{
-  static const double start[CONTROLLER_MEMORY] = {{
-{start}
-  }};
-  int i;
-  for (i = 0; i < CONTROLLER_MEMORY; ++i) memory[i] = start[i];
-}}
-
-void controller_step(const double* measurement, double* memory, double* pressure) {{
-  const double* arguments[{arguments}] = {{measurement, memory}};
-  double after[CONTROLLER_MEMORY];
-  double* results[{results}] = {{after, pressure}};
-  casadi_int integers[{integers}];
-  double work[{work}];
-  int i;
-  sampled_step(arguments, results, integers, work, 0);
-  for (i = 0; i < CONTROLLER_MEMORY; ++i) memory[i] = after[i];
-}}
-"""
-_HEADER = """#ifndef CONTROLLER_H
-#define CONTROLLER_H
-
-#define CONTROLLER_STEP {step!r} /* s */
-#define CONTROLLER_MEASUREMENTS {measurements}
-#define CONTROLLER_MEMORY {memory}
-
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
-/* Memory before the first call. */
-void controller_reset(double* memory);
-
-/* One sample: measurement in, memory updated, pressure [Pa] out. */
-void controller_step(const double* measurement, double* memory, double* pressure);
-
-#ifdef __cplusplus
-}}
-#endif
-
-#endif
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,8 +62,8 @@ def header_text(exported: ControllerStep) -> str:
     facts = (f"{name}: {value}" for name, value in exported.facts.items())
     lines = ["A sampled controller for a fault, in SI units.", "", *_wrapped(_USE), "", _COMPILE, "", *measured, *kept]
     comment = _comment([*lines, "", "Where it comes from:", *facts])
-    sizes = {"step": exported.step, "measurements": len(exported.measurement), "memory": len(exported.start)}
-    return comment + _HEADER.format(**sizes)
+    sizes = {"step": repr(exported.step), "measurements": len(exported.measurement), "memory": len(exported.start)}
+    return comment + c_file("controller.h", **sizes)
 
 
 def source_text(exported: ControllerStep, header: str) -> str:
@@ -114,7 +71,7 @@ def source_text(exported: ControllerStep, header: str) -> str:
     generator = ca.CodeGenerator("sampled_step.c", {"with_export": False})
     generator.add(exported.function)
     start = ",\n".join(f"    {value!r}" for value in exported.start.values())
-    return generator.dump() + _BODY.format(header=header, start=start, **_sizes(exported.function))
+    return generator.dump() + c_file("controller.c", header=header, start=start, **_sizes(exported.function))
 
 
 def _sizes(function: Any) -> dict[str, int]:

@@ -6,11 +6,11 @@ import subprocess
 import xml.etree.ElementTree as ET
 import zipfile
 from hashlib import sha256
-from importlib.resources import files
 from pathlib import Path
 from uuid import UUID
 
 from quakedesign.simulation.backend import compiler, shared_library
+from quakedesign.simulation.c_files import c_file
 from quakedesign.simulation.c_source import HEADER, SOURCE, ControllerStep, header_text, source_text
 from quakedesign.temporary import temporary_folder
 
@@ -38,7 +38,7 @@ def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
     ----------
     Functional Mock-up Interface for Model Exchange and Co-Simulation, version 2.0.4, sections 2.2 and 4.
     """
-    interface = files("quakedesign.simulation").joinpath("fmu.c").read_text(encoding="utf-8")
+    interface = c_file("fmu.c")
     plain = {SOURCE: source_text(exported, HEADER), "fmu.c": interface}
     guid = f"{{{UUID(sha256(''.join([header_text(exported), *plain.values()]).encode()).hexdigest()[:32])}}}"
     sources = plain | {HEADER: f'#define CONTROLLER_GUID "{guid}"\n{header_text(exported)}'}

@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 
+from quakedesign.simulation.c_files import c_file
 from quakedesign.simulation.elementary import FUNCTIONS, verbatim
 from quakedesign.simulation.instructions import Instruction, NotPortableError, instructions
 
@@ -40,43 +41,6 @@ _OF_THE_LIBRARY = {
     ca.OP_ASINH: "asinh",
     ca.OP_LOG1P: "log1p",
 }
-# The bits of a float hold its exponent, moved by 1023, before the 52 of its fraction.
-_ATOMS = """#include <math.h>
-#include <string.h>
-
-#if defined(__GNUC__)
-#define PORTABLE static inline __attribute__((always_inline))
-#else
-#define PORTABLE static inline
-#endif
-
-PORTABLE double two_to(double exponent) {
-  double shifted = exponent + 4503599627371519.0;
-  unsigned long long bits;
-  memcpy(&bits, &shifted, 8);
-  bits <<= 52;
-  memcpy(&shifted, &bits, 8);
-  return shifted;
-}
-
-/* n of x = m 2^n with m from the root of 1/2, whose bits are subtracted, to that of 2. */
-PORTABLE double exponent_of(double x) {
-  unsigned long long bits;
-  memcpy(&bits, &x, 8);
-  bits = ((bits + 0x00095F619980C433ULL) >> 52) | 0x4330000000000000ULL;
-  memcpy(&x, &bits, 8);
-  return x - 4503599627371519.0;
-}
-
-/* m of the same. */
-PORTABLE double mantissa_of(double x) {
-  unsigned long long bits;
-  memcpy(&bits, &x, 8);
-  bits -= ((bits + 0x00095F619980C433ULL) & 0xFFF0000000000000ULL) - 0x3FF0000000000000ULL;
-  memcpy(&x, &bits, 8);
-  return x;
-}
-"""
 
 
 @dataclass(frozen=True)
@@ -148,7 +112,7 @@ def called_alone(code: int) -> str | None:
 @cache
 def elementary_c() -> str:
     """The elementary functions in C, to be inlined."""
-    return _ATOMS + "".join(_function_c(function) for function in dict.fromkeys(FUNCTIONS.values()))
+    return c_file("portable.c") + "".join(_function_c(function) for function in dict.fromkeys(FUNCTIONS.values()))
 
 
 def _function_c(function: Callable[..., Any]) -> str:
