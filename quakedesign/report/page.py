@@ -23,6 +23,7 @@ from quakedesign.studies.state_runs import StateRun
 from quakedesign.text import visible
 
 if TYPE_CHECKING:
+    from quakedesign.fault import Fault
     from quakedesign.studies.comparison import Compared
 
 MODEL_LIMITS = (
@@ -53,7 +54,6 @@ def table_html(comparison: "Compared") -> str:
 def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Reproduction) -> str:
     """Whole report as HTML with its figures, SVG elements by name, inside."""
     told = accounts(comparison)
-    glossary = tomllib.loads(_text("glossary.toml"))["terms"]
     page: str = (
         _environment()
         .get_template("page.html")
@@ -69,7 +69,7 @@ def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Repro
             schemes=scheme_sentence(comparison),
             limits=_limits(comparison, told),
             known_columns=FEEDFORWARD_COLUMNS,
-            glossary=[(mathml(s, display="inline") if s else "", *rest) for s, *rest in glossary],
+            glossary=[(mathml(s, display="inline") if s else "", *rest) for s, *rest in _terms(comparison.fault)],
             asked=[(name, ASKED[name]) for name in ASKED if any(name == row[0] for a in told for row in a.premises)],
             figures=[{"name": name, "svg": drawn, "caption": CAPTIONS[name]} for name, drawn in figures.items()],
             parameters=parameter_rows(comparison.fault),
@@ -135,6 +135,13 @@ def _limits(comparison: "Compared", told: list[Account]) -> list[str]:
 def _tables(comparison: "Compared") -> dict[str, Any]:
     """Columns and rows of both tables."""
     return {"outcomes": (OUTCOMES, outcome_rows(comparison)), "numbers": (COLUMNS, rows(comparison))}
+
+
+def _terms(fault: "Fault") -> list[list[str]]:
+    """Symbol, meaning and unit of what a report of the fault may speak of."""
+    terms: dict[str, list[list[str]]] = tomllib.loads(_text("glossary.toml"))
+    own = terms["state" if fault.friction.state_names else "stateless"]
+    return sorted(terms["every"] + own, key=lambda term: not term[0])  # symbols first
 
 
 def _text(name: str) -> str:

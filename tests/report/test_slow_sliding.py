@@ -72,6 +72,9 @@ def test_the_folder_holds_the_certificate_the_figures_and_the_keys_of_all_design
     assert found["uncontrolled"]["cycle"] == {"recurrence_interval": None, "slip": None, "magnitude": None}
     assert set(found["not_applicable"]) == {"cta", "dia"}
     assert {path.stem for path in (folder / "figures").iterdir()} == {"cycle", "slow-sliding", "errors"}
+    page = (folder / "report.html").read_text()
+    assert "state of rate-and-state friction, the age of contacts" in page
+    assert "signed power" not in page  # of sliding modes, which such faults have not
 
 
 def test_the_report_is_the_one_of_all_faults(folder):
