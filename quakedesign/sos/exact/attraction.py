@@ -11,6 +11,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from quakedesign.errors import PolynomialError
+from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination, constant, degree, evaluate, product
 from quakedesign.sos.exact.proofs import Point, SumOfSquares, holds
 from quakedesign.sos.exact.squares import Square
@@ -144,11 +145,14 @@ class Region:
         By a point where V is not positive or does not fall; so is every level above the value of V there.
     remark : str
         Why nothing was proved; empty otherwise.
+    inclusion : Answer or None
+        Proof that V is below the level where a shape is at most β, where a shape was asked about.
     """
 
     proved: Attraction | None
     refuted: Attraction | None
     remark: str = ""
+    inclusion: Answer | None = None
 
     @staticmethod
     def of(claim: Attraction) -> "Region":
@@ -168,6 +172,14 @@ class Region:
     def level(self) -> Fraction | None:
         """Proved level; None if nothing is proved, or everything."""
         return None if self.proved is None else self.proved.level
+
+    @property
+    def shape_level(self) -> Fraction | None:
+        """β of the inclusion; None without one."""
+        if self.inclusion is None:
+            return None
+        inside = self.inclusion.statement.inequalities[0]
+        return inside[(0,) * len(self.inclusion.statement.variables)]
 
     @property
     def refuted_above(self) -> Fraction | None:

@@ -26,6 +26,8 @@ def region_words(found: Region) -> list[str]:
     shown = found.proved or found.refuted
     if shown is not None:
         lines += claim_words(shown)
+    if found.inclusion is not None:
+        lines.append(_inclusion_words(found))
     if found.proved is not None and found.refuted is not None:
         lines += _point_words(found.refuted)
     return [*lines, *filter(None, [found.remark])]
@@ -42,11 +44,25 @@ def region_facts(found: Region) -> dict[str, Any]:
         "V": polynomial_words(shown.lyapunov, shown.variables) if shown else None,
         "everywhere": found.proved is not None and found.proved.level is None,
         "level": None if found.level is None else str(found.level),
+        "shape": None if found.inclusion is None else _shape(found),
+        "shape_level": None if found.shape_level is None else str(found.shape_level),
         "refuted_above": None if found.refuted_above is None else str(found.refuted_above),
         "point": None if coordinates is None else [str(x) for x in coordinates],
         "equilibrium": None if found.refuted is None else found.refuted.equilibrium,
         "remark": found.remark or None,
     }
+
+
+def _shape(found: Region) -> str:
+    """The polynomial s of the inequality β − s ≥ 0."""
+    assert found.inclusion is not None
+    asked = found.inclusion.statement
+    return polynomial_words({e: -c for e, c in asked.inequalities[0].items() if any(e)}, asked.variables)
+
+
+def _inclusion_words(found: Region) -> str:
+    assert found.shape_level is not None
+    return f"that is so wherever {_shape(found)} <= {found.shape_level} ({LowerBound(found.shape_level)} rounded down)"
 
 
 def _start(claim: Attraction) -> str:

@@ -10,12 +10,13 @@ from flint import fmpq, fmpq_mat
 from quakedesign.errors import PolynomialError
 from quakedesign.rationals import fraction_of
 from quakedesign.sos.exact.attraction import Attraction, LyapunovProof, Region, along
-from quakedesign.sos.exact.polynomial import Exponents, combination, constant, monomials
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination, constant, monomials
 from quakedesign.sos.exact.proofs import SumOfSquares
 from quakedesign.sos.exact.reading import read
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.decide import strict_proof
 from quakedesign.sos.solve.engine import decide
+from quakedesign.sos.solve.expanding_interior import affine, decision_names, expanded, with_shape
 from quakedesign.sos.solve.faces import simplest_between
 from quakedesign.sos.solve.level_crossing import lowest_crossing, other_equilibrium
 from quakedesign.sos.solve.program import Program
@@ -62,7 +63,14 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
     return next(filter(None, map(_proved, searched)), claim)
 
 
-def region_of_attraction(field: Mapping[Any, Any], V: Any = None, *, relative: float = 1e-4) -> Region:
+def region_of_attraction(
+    field: Mapping[Any, Any],
+    V: Any = None,
+    *,
+    relative: float = 1e-4,
+    degree: int | None = None,
+    shape: Any = None,
+) -> Region:
     """Find the largest level ρ for which V̇ < 0 wherever V < ρ, but at the origin: then {V < ρ} is attracted by it.
 
     Parameters
@@ -71,6 +79,11 @@ def region_of_attraction(field: Mapping[Any, Any], V: Any = None, *, relative: f
         As for `stability`, but V solves AᵀP + PA = −I for the linearised field x' = Ax unless given.
     relative : float
         Width of the last step of the bisection, between proved and not proved; from 1e-6 to below 1.
+    degree : int, optional
+        Even: search other V of at most this degree, from the one at hand, for a larger part of the shape in the region.
+    shape : str, SymPy expression or mapping, optional
+        A polynomial that is positive but at the origin. The largest β found is proved for which shape ≤ β lies in
+        the region. Σ x_i² with a degree, none unless given.
 
     Returns
     -------
@@ -87,11 +100,22 @@ def region_of_attraction(field: Mapping[Any, Any], V: Any = None, *, relative: f
             f"relative must be from {_FINEST:g} to below 1. Received {relative!r}. Leave it out for 1e-4."
         )
     claim = _claim(field, V)
+    inner = _shape(field, shape, degree)
     if V is None:
         own = _of_linearised(claim)
         if own is None:
             return Region(proved=None, refuted=None, remark="the linearised field has no V = x'Px. Give a V")
         claim = replace(claim, lyapunov=own)
+    found = _region(claim, relative)
+    if inner is None:
+        return found
+    return (
+        with_shape(found, inner) if degree is None else expanded(found, inner, degree, lambda c: _region(c, relative))
+    )
+
+
+def _region(claim: Attraction, relative: float) -> Region:
+    """Largest level that is proved for the V of a claim, and what refutes more."""
     refuted = _refuted(claim)
     if refuted is None:
         proved = _proved(claim) or next(filter(None, (_proved(replace(claim, level=r)) for r in _UNBOUNDED)), None)
@@ -100,6 +124,13 @@ def region_of_attraction(field: Mapping[Any, Any], V: Any = None, *, relative: f
         return Region(proved=None, refuted=refuted, remark="V is not positive")
     found = Region(proved=_bisected(claim, refuted.height or Fraction(0), relative), refuted=refuted)
     return found if found.proved else replace(found, remark="no level below was proved")
+
+
+def _shape(field: Mapping[Any, Any], shape: Any, degree: int | None) -> Polynomial | None:
+    """The shape as it is read, Σ x_i² where V is searched without one, or else None."""
+    if degree is not None and not (isinstance(degree, int) and degree >= 2 and degree % 2 == 0):
+        raise PolynomialError(f"degree must be an even number from 2. Received {degree!r}. Give for example 4.")
+    return None if shape is None and degree is None else _claim(field, shape).lyapunov
 
 
 def _claim(field: Mapping[Any, Any], V: Any) -> Attraction:
@@ -205,16 +236,10 @@ def _searched(claim: Attraction, top: int) -> Attraction | None:
     """Claim with a V of some degree for which V − Σ x_i² and −V̇ have squares; None if none is found."""
     size = len(claim.variables)
     terms = list(monomials(size, top, 2))
-    decisions = [f"c{i}" for i in range(len(terms))]
-    units = [tuple(int(i == j) for j in range(len(terms))) for i in range(len(terms))]
-    program = Program(claim.variables, decisions)
-    zero = (0,) * len(terms)
-    lower = {(*e, *zero): -c for e, c in claim.lyapunov.items()}
-    program.require({**lower, **{(*e, *u): Fraction(1) for e, u in zip(terms, units, strict=True)}})
-    falling: dict[Exponents, Fraction] = {}
-    for e, u in zip(terms, units, strict=True):
-        falling |= {(*m, *u): -c for m, c in along(claim.field, {e: Fraction(1)}).items()}
-    program.require(falling)
+    program = Program(claim.variables, decision_names(claim.variables, len(terms)))
+    powers: list[Polynomial] = [{e: Fraction(1)} for e in terms]
+    program.require(affine(combination([(Fraction(-1), claim.lyapunov)]), powers))
+    program.require(affine({}, [combination([(Fraction(-1), along(claim.field, p))]) for p in powers]))
     solution = program.solve()
     if solution is None:
         return None

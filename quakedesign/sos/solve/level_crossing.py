@@ -23,15 +23,15 @@ _BEYOND = (0.0, 1e-10, 1e-7, 1e-4)  # how far a point is moved out, relative
 
 
 class _Rays:
-    """V and V̇ along rays from the origin, as polynomials in the distance."""
+    """V, and V̇ or another polynomial that becomes positive, along rays from the origin, in powers of the distance."""
 
-    def __init__(self, claim: Attraction) -> None:
-        self.size = len(claim.variables)
-        self.lyapunov = Arrays(claim.lyapunov, self.size)
-        self.rate = self._graded(claim.derivative)
-        self.depth = self._graded({e: -c for e, c in claim.lyapunov.items()})
+    def __init__(self, size: int, lyapunov: Polynomial, rate: Polynomial) -> None:
+        self.size = size
+        self.lyapunov = Arrays(lyapunov, size)
+        self.rate = self.graded(rate)
 
-    def _graded(self, polynomial: Polynomial) -> list[Arrays]:
+    def graded(self, polynomial: Polynomial) -> list[Arrays]:
+        """Forms of every degree."""
         top = max((sum(e) for e in polynomial), default=0)
         return [Arrays({e: c for e, c in polynomial.items() if sum(e) == k}, self.size) for k in range(top + 1)]
 
@@ -53,6 +53,18 @@ class _Rays:
         """V where it stops to fall in one direction."""
         return float(self.heights((direction / np.linalg.norm(direction))[None, :])[0])
 
+    def sampled(self) -> Any:
+        """Seeded directions, one a row, and those of the axes."""
+        random = np.random.default_rng(_SEED).standard_normal((_DIRECTIONS * self.size, self.size))
+        return np.concatenate([random / np.linalg.norm(random, axis=1)[:, None], np.eye(self.size), -np.eye(self.size)])
+
+    def lowest(self, directions: Any) -> list[Any]:
+        """Directions, refined, in which V stops to fall where it is lowest."""
+        heights = self.heights(directions)
+        order = np.argsort(heights, kind="stable")[:_REFINED]
+        starts = [directions[i] for i in order if np.isfinite(heights[i])]
+        return [minimize(self.height, d, method="Nelder-Mead", options=_PRECISE).x for d in starts]
+
 
 def _first_root(row: Any) -> float:
     """Smallest r > 0 from which on Σ row_k·r^k is not negative; infinite if there is none."""
@@ -66,20 +78,21 @@ def _first_root(row: Any) -> float:
 
 def lowest_crossing(claim: Attraction) -> Point | None:
     """Rational point, not the origin, where V ≤ 0 or V̇ ≥ 0, with the lowest V found; None if none is found."""
-    rays = _Rays(claim)
-    random = np.random.default_rng(_SEED).standard_normal((_DIRECTIONS * rays.size, rays.size))
-    directions = np.concatenate(
-        [random / np.linalg.norm(random, axis=1)[:, None], np.eye(rays.size), -np.eye(rays.size)]
-    )
-    heights = rays.heights(directions)
-    order = np.argsort(heights, kind="stable")[:_REFINED]
-    starts = [directions[i] for i in order if np.isfinite(heights[i])]
-    lowest = [minimize(rays.height, d, method="Nelder-Mead", options=_PRECISE).x for d in starts]
-    ends = [rays.crossings((d / np.linalg.norm(d))[None, :], rays.rate)[0] for d in lowest]
-    below = rays.crossings(directions, rays.depth)
+    size = len(claim.variables)
+    rays = _Rays(size, claim.lyapunov, claim.derivative)
+    directions = rays.sampled()
+    ends = [rays.crossings((d / np.linalg.norm(d))[None, :], rays.rate)[0] for d in rays.lowest(directions)]
+    depth = rays.graded({e: -c for e, c in claim.lyapunov.items()})
+    below = rays.crossings(directions, depth)
     ends += list(below[np.isfinite(below).all(axis=1)][:_REFINED])
     candidates = (point for x in ends if np.all(np.isfinite(x)) for point in _rational(claim, x))
     return min(candidates, key=lambda point: evaluate(claim.lyapunov, point.coordinates), default=None)
+
+
+def lowest_value_on(function: Polynomial, boundary: Polynomial) -> float:
+    """Lowest value found of a polynomial where another, negative at the origin, first vanishes along a ray."""
+    rays = _Rays(len(next(iter(boundary))), function, boundary)
+    return min(map(rays.height, rays.lowest(rays.sampled())), default=0.0)
 
 
 def _rational(claim: Attraction, x: Any) -> Iterator[Point]:

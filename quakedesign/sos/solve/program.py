@@ -1,6 +1,6 @@
 """Positivity with decision variables: solved by cvxpy and Clarabel, rounded, and proved polynomial by polynomial."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -145,21 +145,38 @@ class Program:
         Solution or None
             None says nothing about feasibility.
         """
+        for best, room in self._interior(_ROOM):
+            solution = self._rounded(best, room)
+            if solution is not None:
+                return solution
+        return None
+
+    def proposal(self, room: float) -> list[float] | None:
+        """Decisions with the largest margin, in floating point: no proof; None if none are found.
+
+        Parameters
+        ----------
+        room : float
+            Share of the optimum that is given up for the margin, or of 1 if that is larger.
+        """
+        found = next(self._interior((room,)), None)
+        return None if found is None else np.asarray(self._vector.value).tolist()
+
+    def _interior(self, rooms: Sequence[float]) -> Iterator[tuple[float, float]]:
+        """The optimum, and how much of it was given up where decisions with a margin are now at hand."""
         import cvxpy as cp
 
         problem = self.problem()
         if not solve(problem):
-            return None
+            return
         best = float(problem.value)
         margin, least = cp.Variable(), cp.Parameter()
         wanted = [self._value(self._objective) >= least] if self._objective else []
         within = Compiled(cp.Problem(cp.Maximize(margin), [*self._constraints(margin), margin <= 1, *wanted]))
-        for room in (share * max(1.0, abs(best)) for share in _ROOM):
+        for room in (share * max(1.0, abs(best)) for share in rooms):
             least.value = best - room
-            solution = self._rounded(best, room) if within.solve() and within.problem.value >= 1e-11 else None
-            if solution is not None:
-                return solution
-        return None
+            if within.solve() and within.problem.value >= 1e-11:
+                yield best, room
 
     def _rounded(self, best: float, room: float) -> Solution | None:
         """Proved decision near the last one of the solver, which gave up some room of the optimum for its margin."""
@@ -204,7 +221,7 @@ class Program:
         return np.array([float(affine.get(u, 0)) for u in units]) @ self._vector + float(affine.get(zero, 0))
 
     def _affine(self, given: Any) -> dict[Exponents, Fraction]:
-        if not isinstance(given, str) and not hasattr(given, "free_symbols"):
+        if not isinstance(given, str | Mapping) and not hasattr(given, "free_symbols"):
             return {(0,) * len(self.decisions): rational(given, "entry")}
         _, exact, _, _, _ = read(given, (), None, self.decisions)
         if degree(exact) > 1:

@@ -1,5 +1,7 @@
 """Regions of attraction: levels of the literature, closed forms, refutations, and the command."""
 
+import contextlib
+import io
 import json
 import re
 import tomllib
@@ -18,17 +20,19 @@ from quakedesign.cli import main
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.attraction_files import load, text
 from quakedesign.sos.exact.field_files import read_field
+from quakedesign.sos.exact.files import load as load_polynomial
 from quakedesign.sos.exact.proofs import Point
 from quakedesign.sos.solve import attraction
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "howto" / "region_of_attraction.md").read_text(encoding="utf-8")
-ROWS = {
-    row[0]: row
-    for row in re.findall(r"^\| (?!system)([a-z0-9-]+) \| (.+?) \| (.*?) \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.M)
-}
+ROWS = {row[0]: row for row in re.findall(r"^\| (?!system|field)([a-z0-9-]+)" + r" \| (.+?)" * 6 + r" \|$", PAGE, re.M)}
 SYSTEMS = tomllib.loads((ROOT / "tests" / "sos" / "regions.toml").read_text(encoding="utf-8"))
-TRUTH = {"cubic": 1, "drake-12876": 1 / 20, "hahn": 8 * sqrt(3) / 9, "ahmadi-krstic-parrilo": 27 / 4}  # by hand
+TRUTH = {
+    "cubic": 1, "cubic-quartic": 1, "rational-cubic": 1, "drake-12876": 1 / 20, "hahn": 8 * sqrt(3) / 9,
+    "ahmadi-krstic-parrilo": 27 / 4, "tibken": 4,
+}  # fmt: skip  # by hand
+PLANAR = [name for name, row in SYSTEMS.items() if len(row["field"]) == 2]
 VAN_DER_POL = SYSTEMS["van-der-pol"]["field"]
 
 
@@ -44,7 +48,7 @@ def test_the_table_is_about_all_systems():
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_the_level_is_proved_and_a_point_just_above_refutes_more(name):
     found = region(name)
-    *_, published, _, proved, above = ROWS[name]
+    *_, published, _, _, proved, above = ROWS[name]
     assert (found.verdict, found.proved.verdict, found.refuted.verdict) == ("proved", "proved", "refuted")
     assert load(text(found.proved)).check()
     assert load(text(found.refuted)).check()
@@ -59,8 +63,40 @@ def test_levels_known_by_hand_are_met(name):
     assert float(region(name).level) <= TRUTH[name] * (1 + 1e-12)
 
 
+def symbolic(name):
+    """States, field and V, the latter from the linearised field unless given, all by SymPy alone."""
+    row = SYSTEMS[name]
+    x = sp.Matrix(sp.symbols(list(row["field"])))
+    f = sp.Matrix([sp.nsimplify(sp.sympify(text.replace("^", "**")), rational=True) for text in row["field"].values()])
+    if "V" in row:
+        return x, f, sp.sympify(row["V"].replace("^", "**"))
+    a, b, c = sp.symbols("p_a p_b p_c")
+    A, P = f.jacobian(x).subs(dict.fromkeys(x, 0)), sp.Matrix([[a, b], [b, c]])
+    return x, f, (x.T * P.subs(sp.solve(list(A.T * P + P * A + sp.eye(2)), [a, b, c])) * x)[0]
+
+
+def least_on_the_zero_set(name):
+    """Least V > 0 where V̇ = 0: V at all such points on the lines x = root of the resultant of Lagrange's equations."""
+    (x, y), f, V = symbolic(name)
+    rate = sp.expand(sp.diff(V, x) * f[0] + sp.diff(V, y) * f[1])
+    tangent = sp.expand(sp.diff(V, x) * sp.diff(rate, y) - sp.diff(V, y) * sp.diff(rate, x))
+    factors = sp.factor_list(sp.resultant(rate, tangent, y), x)[1]
+    lines = [sp.re(r) for g, _ in factors for r in sp.Poly(g, x).nroots(n=40, maxsteps=500) if abs(sp.im(r)) < 1e-15]
+    places = [(r, q.real) for r in lines for q in np.roots([float(c) for c in sp.Poly(rate.subs(x, r), y).all_coeffs()])
+              if abs(q.imag) < 1e-4]  # fmt: skip
+    return min(v for v in (float(V.subs({x: r, y: q})) for r, q in places) if v > 1e-9)
+
+
+@pytest.mark.parametrize("name", PLANAR)
+def test_the_level_is_almost_the_least_v_where_it_does_not_fall(name):
+    largest = least_on_the_zero_set(name)
+    written = float(sp.sympify(ROWS[name][3].replace("√3", "*sqrt(3)")))
+    assert (1 - 1e-4) * largest < float(region(name).level) <= (1 + 1e-12) * largest
+    assert largest == pytest.approx(written, rel=2e-7)
+
+
 def test_levels_that_are_simple_numbers_are_proved_exactly():
-    exact = {"cubic": 1, "drake-12876": F(1, 20), "ahmadi-krstic-parrilo": F(27, 4), "chesi-1": 4}
+    exact = {"cubic": 1, "drake-12876": F(1, 20), "ahmadi-krstic-parrilo": F(27, 4), "chesi-1": 4, "tibken": 4}
     assert {name: region(name).level for name in exact} == exact
 
 
@@ -83,6 +119,96 @@ def test_solutions_from_just_inside_the_proved_region_arrive():
         start = 0.9999 * size * direction
         end = solve_ivp(lambda t, x: [-x[1], x[0] + (x[0] ** 2 - 1) * x[1]], (0, 60), start, rtol=1e-9).y[:, -1]
         assert np.abs(end).max() < 1e-6
+
+
+@pytest.fixture(scope="module")
+def on_the_page(tmp_path_factory):
+    """Names of the page's Python, what it prints and the folder that it writes to."""
+    said, names = io.StringIO(), {"folder": tmp_path_factory.mktemp("page")}
+    with contextlib.chdir(names["folder"]), contextlib.redirect_stdout(said):
+        for block in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL):
+            exec(compile(block, "region_of_attraction.md", "exec"), names)
+    return names | {"said": said.getvalue()}
+
+
+# ---------------------------------------------------------------- searched functions
+
+SEARCHED = {row[0]: row[1:] for row in re.findall(r"^\| ([a-z0-9-]+)" + r" \| ([\d.]+)" * 5 + r" \|$", PAGE, re.M)}
+
+
+@cache
+def grown(name, degree):
+    shape = " + ".join(f"{x}^2" for x in SYSTEMS[name]["field"])
+    return sos.region_of_attraction(SYSTEMS[name]["field"], SYSTEMS[name].get("V"), degree=degree, shape=shape)
+
+
+def test_the_table_of_searched_functions_is_about_all_fields_of_which_a_start_outside_is_known():
+    assert SEARCHED.keys() == {name for name, row in SYSTEMS.items() if "escape" in row}
+
+
+@pytest.mark.parametrize("name", SEARCHED)
+def test_a_solution_from_just_outside_does_not_arrive(name):
+    x, f, _ = symbolic(name)
+    start = SYSTEMS[name]["escape"]
+    far = lambda t, z: float(np.dot(z, z)) - 1e4  # noqa: E731
+    far.terminal = True
+    rates = sp.lambdify([list(x)], list(f))
+    end = solve_ivp(lambda t, z: rates(z), (0, 200), start, rtol=1e-9, atol=1e-12, events=far).y[:, -1]
+    assert np.abs(end).max() > 1
+    assert float(SEARCHED[name][-1]) == pytest.approx(float(np.dot(start, start)), rel=1e-4)
+
+
+@pytest.mark.parametrize("name", SEARCHED)
+def test_what_is_inside_is_below_what_is_outside(name):
+    found = grown(name, None)
+    level = float(found.shape_level)
+    assert float(SEARCHED[name][0]) <= level < float(SEARCHED[name][-1])
+    assert found.inclusion.check()
+
+
+def test_a_searched_function_is_proved_and_its_region_has_the_part_of_the_shape(on_the_page):
+    found = on_the_page["grown"]
+    assert (found.verdict, found.proved.verdict, found.refuted.verdict) == ("proved", "proved", "refuted")
+    assert found.proved.check()
+    assert found.inclusion.check()
+    asked = found.inclusion.statement
+    inside = {(0, 0): found.shape_level, (2, 0): -1, (0, 2): -1}
+    assert asked.inequalities == (inside,)
+    assert asked.polynomial == {e: -c for e, c in found.proved.lyapunov.items()} | {
+        (0, 0): F(999999, 10**6) * found.level
+    }
+    assert float(SEARCHED["parrilo"][1]) <= float(found.shape_level) < float(SEARCHED["parrilo"][-1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEARCHED)
+@pytest.mark.parametrize(("degree", "column"), [(2, 1), (4, 2), (6, 3)])
+def test_functions_of_higher_degree_prove_more(name, degree, column):
+    found = grown(name, degree)
+    assert found.proved.check()
+    assert found.inclusion.check()
+    assert load(text(found.proved)).check()
+    assert float(SEARCHED[name][column]) <= float(found.shape_level) < float(SEARCHED[name][-1])
+    assert max(map(sum, found.proved.lyapunov)) <= degree
+
+
+@pytest.mark.parametrize("degree", [0, 3, -2])
+def test_a_degree_must_be_even(degree):
+    with pytest.raises(PolynomialError, match="degree must be an even number from 2"):
+        sos.region_of_attraction({"x": "-x + x^3"}, degree=degree)
+
+
+def test_a_shape_without_a_part_in_the_region_is_left_out():
+    """−x² is at most β everywhere; the region is not."""
+    found = sos.region_of_attraction({"x": "-x + x^3"}, "x^2", shape="-x^2")
+    assert (found.level, found.inclusion, found.shape_level) == (1, None, None)
+    with pytest.raises(PolynomialError, match="vanish at the origin"):
+        sos.region_of_attraction({"x": "-x + x^3"}, "x^2", shape="x^2 + 1")
+
+
+def test_states_may_have_the_names_of_decisions():
+    claim = sos.stability({"c0": "-c0^3 + c1", "c1": "-c0 - c1^3"}, degrees=(2,))
+    assert (claim.verdict, claim.check()) == ("proved", True)
 
 
 # ---------------------------------------------------------------- everywhere
@@ -200,6 +326,21 @@ def test_the_command_proves_refutes_and_writes_both(tmp_path, capsys):
     assert (code, out.count(": proved"), out.count(": refuted")) == (1, 1, 1)
 
 
+def test_the_command_writes_the_proof_of_the_part_of_a_shape(tmp_path, capsys):
+    (tmp_path / "field.toml").write_text('V = "x^2"\n[field]\nx = "-x + x^3"\n')
+    line = ["attraction", tmp_path / "field.toml", "--shape", "4*x^2", "--inclusion", tmp_path / "part.json"]
+    code, out, _ = run(capsys, *line, "--json")
+    facts = json.loads(out)
+    assert (code, facts["shape"], facts["file_inclusion"]) == (0, "4*x^2", str(tmp_path / "part.json"))
+    assert float(F(facts["shape_level"])) == pytest.approx(4, rel=2e-5)
+    assert F(facts["shape_level"]) < 4
+    code, out, _ = run(capsys, *line, "--force")
+    assert f"that is so wherever 4*x^2 <= {facts['shape_level']} (3.9999" in out
+    assert run(capsys, "check", tmp_path / "part.json")[0] == 0
+    code, _, said = run(capsys, *line[:2], "--everywhere", "--degree", "2")
+    assert (code, "--degree and --shape are of a region" in said) == (2, True)
+
+
 def test_the_command_says_what_is_not_so_everywhere(tmp_path, capsys):
     (tmp_path / "field.toml").write_text('V = "x^2"\n[field]\nx = "-x + x^3"\n')
     code, out, _ = run(capsys, "attraction", tmp_path / "field.toml", "--everywhere", "--out", tmp_path / "no.json")
@@ -220,10 +361,12 @@ def test_another_file_is_refused_in_one_line(tmp_path, content):
         read_field(tmp_path / "none.toml")
 
 
-def test_everything_on_the_page_runs(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    for block in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL):
-        exec(compile(block, "region_of_attraction.md", "exec"), {})
-    assert capsys.readouterr().out.endswith("True True\nproved\n")
+def test_everything_on_the_page_runs(on_the_page, tmp_path):
+    assert on_the_page["said"].count("True True") == 2
+    assert on_the_page["said"].endswith("\nproved\n")
+    assert (
+        load_polynomial((on_the_page["folder"] / "inclusion.json").read_text())[1]
+        == on_the_page["grown"].inclusion.proof
+    )
     (tmp_path / "field.toml").write_text(re.search(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)[1])
     assert read_field(tmp_path / "field.toml") == (SYSTEMS["parrilo"]["field"], SYSTEMS["parrilo"]["V"])
