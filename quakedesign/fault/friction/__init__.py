@@ -15,7 +15,7 @@ def friction_laws() -> dict[str, type[FrictionLaw]]:
 
     A law that cannot be built (an abstract class, for others to derive from) counts for its module but is not listed.
     """
-    return discovered(__name__, FrictionLaw, shared=("base",))
+    return discovered(__name__, FrictionLaw, shared=("base", "weakening"))
 
 
 def friction_law(name: str) -> type[FrictionLaw]:

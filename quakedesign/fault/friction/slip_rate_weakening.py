@@ -3,32 +3,23 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
-from quakedesign.fault.checks import require_nonnegative, require_positive
-from quakedesign.fault.friction.base import FrictionLaw
+from quakedesign.fault.checks import require_positive
+from quakedesign.fault.friction.weakening import Weakening
 
 if TYPE_CHECKING:
     import sympy as sp
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SlipRateWeakening(FrictionLaw):
+class SlipRateWeakening(Weakening):
     """μ(rate) = residual + drop/(1 + rate/critical_rate) for rate ≥ 0, even in the rate when extended.
 
     The coefficient is that of motion forward; whether friction opposes motion is the plant's matter (ERRATA 14).
 
     Attributes
     ----------
-    residual : float
-        Friction coefficient at a high rate [-], positive.
-    drop : float
-        Static minus residual friction coefficient [-], not negative.
     critical_rate : float
         Rate v_c [m/s] at which half of the drop has happened, positive.
-
-    Raises
-    ------
-    ParameterError
-        When a parameter is outside its range.
     """
 
     name: ClassVar[str] = "slip-rate-weakening"
@@ -38,13 +29,11 @@ class SlipRateWeakening(FrictionLaw):
     )
     domain: ClassVar[str] = "rate >= 0"
 
-    residual: float = field(metadata={"unit": "", "symbol": r"\mu_{res}"})
-    drop: float = field(metadata={"unit": "", "symbol": r"\Delta\mu"})
     critical_rate: float = field(metadata={"unit": "m/s", "symbol": "v_c"})
 
     def __post_init__(self) -> None:
-        require_positive(residual=self.residual, critical_rate=self.critical_rate)
-        require_nonnegative("It is the static minus the residual coefficient.", drop=self.drop)
+        Weakening.__post_init__(self)
+        require_positive(critical_rate=self.critical_rate)
 
     def coefficient(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
         """Friction coefficient [-] for rate ≥ 0."""
@@ -55,16 +44,6 @@ class SlipRateWeakening(FrictionLaw):
         import sympy as sp
 
         return self.coefficient(slip, sp.Abs(rate))
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Residual and static friction coefficient [-]; the residual is never reached."""
-        return self.residual, self.residual + self.drop
-
-    @property
-    def slip_slope(self) -> float:
-        """Zero: the law does not depend on the slip [1/m]."""
-        return 0
 
     @property
     def rate_slope(self) -> float:
