@@ -82,9 +82,10 @@ def test_verdicts_and_radii_do_not_depend_on_the_units():
     here = [F(k) for k in gains]
     assert inverse_optimality(one, here).verdict is inverse_optimality(two, there).verdict
     for step in (1e-3, 0.5e-3):
-        first, other = hold_verdict(one, here, step), hold_verdict(two, there, F(step) / F(second))
-        assert first.verdict is other.verdict
-        assert first.radius == pytest.approx(other.radius, rel=1e-9)
+        period = F(step) / F(second)
+        assert hold_verdict(one, here, step).verdict is hold_verdict(two, there, period).verdict
+        measured = largest_radius(two, there, float(period))
+        assert largest_radius(one, here, step) == pytest.approx(measured, rel=1e-9)
 
 
 def test_scaling_is_undone_exactly():

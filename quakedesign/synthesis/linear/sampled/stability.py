@@ -1,4 +1,7 @@
-"""Whether a sampled e-LQR is stable over a whole box, and up to which sampling period (ERRATA 22)."""
+"""Whether a sampled e-LQR is stable over a whole box, and up to which sampling period (ERRATA 22).
+
+p is held over every period, parameters are constant anywhere in the box, which is cut up in ball arithmetic.
+"""
 
 import heapq
 import math
@@ -30,7 +33,6 @@ Range = tuple[Fraction, Fraction]
 _DOUBLINGS, _CELLS = 24, 4000
 _BITS = (53, 400)
 _SHARES = tuple(Fraction(n, 100) for n in (100, 98, 95, 90, 80, 60, 40, 20, 5))
-CLAIM = "p held over every period, parameters constant anywhere in the box, ball arithmetic on a subdivision of it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,34 +43,12 @@ class HoldVerdict:
     ----------
     verdict : Verdict
         REFUTED: not asymptotically stable at `witness`, in ball arithmetic.
-    steps : (Fraction, Fraction)
-        Sampling periods [s] that it holds for.
     witness : (Fraction, Fraction, Fraction) or None
         β, s [1/s²], w [1/s].
-    radius : float
-        Largest spectral radius over the vertices at the longest period, floating point.
-    cells : int
-        Of the subdivision.
-    claim : str
     """
 
     verdict: Verdict
-    steps: Range
     witness: Vertex | None
-    radius: float
-    cells: int
-    claim: str = CLAIM
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI."""
-        return {
-            "verdict": str(self.verdict),
-            "steps": [float(v) for v in self.steps],
-            "witness": [float(v) for v in self.witness] if self.witness else None,
-            "radius": self.radius,
-            "cells": self.cells,
-            "claim": self.claim,
-        }
 
 
 def hold_verdict(
@@ -105,16 +85,10 @@ def hold_verdict(
     inside, t = problem.nondimensional(scales), scales.time
     task = _Task(inside, scales.gains_inside(gains), integration)
     box = ((steps[0] / t, steps[1] / t), inside.sectors.beta, inside.sectors.slip, inside.sectors.rate)
-    verdict, witness, used = task.decide(box, cells)
+    verdict, witness = task.decide(box, cells)
     if witness is not None:
         witness = (witness[0], witness[1] / t**2, witness[2] / t)
-    return HoldVerdict(
-        verdict=verdict,
-        steps=steps,
-        witness=witness,
-        radius=largest_radius(problem, gains, float(steps[1]), integration),
-        cells=used,
-    )
+    return HoldVerdict(verdict=verdict, witness=witness)
 
 
 Cell = tuple[Range, ...]
@@ -133,27 +107,27 @@ class _Task:
         push = [ball(k * self.inside.sectors.authority) for k in self.gains]
         return conditions(T, coefficients(T, beta, s, w, push, self.integration))
 
-    def decide(self, box: Cell, limit: int) -> tuple[Verdict, Vertex | None, int]:
-        """Verdict, witness, number of cells."""
+    def decide(self, box: Cell, limit: int) -> tuple[Verdict, Vertex | None]:
+        """Verdict and witness, from at most so many cells."""
         if not self.gains[3]:  # then z = 1 is a pole, whatever the plant
-            return Verdict.REFUTED, self.inside.vertices()[0], 0
+            return Verdict.REFUTED, self.inside.vertices()[0]
         for vertex in self.inside.vertices():
             if self._unstable((box[0][1], *vertex)):
-                return Verdict.REFUTED, vertex, 0
+                return Verdict.REFUTED, vertex
         order = count()
         heap = [(0.0, next(order), box)]
-        used = 0
-        while heap and used < limit:
+        for _ in range(limit):
+            if not heap:
+                return Verdict.PROVED, None
             _, _, cell = heapq.heappop(heap)
-            used += 1
             if all(v > 0 for v in self.conditions(cell)):
                 continue
             middle = tuple((a + b) / 2 for a, b in cell)
             if self._unstable(middle):
-                return Verdict.REFUTED, (middle[1], middle[2], middle[3]), used
+                return Verdict.REFUTED, (middle[1], middle[2], middle[3])
             for part in self._halves(cell):
                 heapq.heappush(heap, (-max(_widths(part, box)), next(order), part))
-        return (Verdict.UNDECIDED if heap else Verdict.PROVED), None, used
+        return (Verdict.UNDECIDED if heap else Verdict.PROVED), None
 
     def _unstable(self, point: Sequence[Fraction]) -> bool:
         """Whether a condition is surely violated at a point, with more digits where the plant grows far in a period."""
@@ -207,13 +181,10 @@ class LargestStep:
         Every period in (0, proved] is stable over the whole box [s].
     refuted : Fraction or None
         A longer one that is not [s]; None where none was found, up to four million times the fastest pole's time.
-    cells : int
-        Of the final subdivision over periods and box.
     """
 
     proved: LowerBound
     refuted: Fraction | None
-    cells: int
 
 
 def largest_step(
@@ -259,7 +230,7 @@ def _all_shorter(
         step = longest * share
         verdict = hold_verdict(problem, gains, (Fraction(0), step), integration=integration, cells=_CELLS)
         if verdict.verdict is Verdict.PROVED:
-            return LargestStep(proved=LowerBound(step), refuted=refuted, cells=verdict.cells)
+            return LargestStep(proved=LowerBound(step), refuted=refuted)
     return None
 
 

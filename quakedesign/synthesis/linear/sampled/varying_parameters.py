@@ -1,4 +1,8 @@
-"""Up to which sampling period the law that runs is proved: summed integrals, parameters that vary as they like."""
+"""Up to which sampling period the law that runs is proved: summed integrals, parameters that vary as they like.
+
+The integrals are summed over the samples as in the scheme ``explicit``; β, s and w are measurable in time, anywhere in
+their ranges over the box, also inside a period.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,10 +16,6 @@ from quakedesign.synthesis.linear.sampled.clock_dependent import DEGREE, ClockPr
 from quakedesign.synthesis.linear.sampled.input_delay import DelayProof, delay_proof
 from quakedesign.synthesis.linear.sampled.stability import LargestStep, hold_verdict
 
-CLAIM = (
-    "p held, integrals summed over the samples as in the scheme explicit, beta, s and w measurable in time anywhere in "
-    "their ranges over the box, also inside a period"
-)
 _SHARES = tuple(Fraction(n, 100) for n in (99, 98, 96, 93, 88, 80))
 """Of the limit for constant parameters, where a V that depends on the clock is tried; degree 8 reaches 98 or 99 %."""
 _DEGREES = (DEGREE, 2 * DEGREE)
@@ -38,14 +38,12 @@ class VaryingVerdict:
     proof : DelayProof, ClockProof or None
     witness : (Fraction, Fraction, Fraction) or None
         β, s [1/s²], w [1/s].
-    claim : str
     """
 
     verdict: Verdict
     step: Fraction
     proof: HoldProof | None = None
     witness: Vertex | None = None
-    claim: str = CLAIM
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
