@@ -34,7 +34,14 @@ def test_presets_are_the_columns_of_the_table():
     hour = 3600
     real = (2500, 30e9, 5e14, 5000, 50e6, 0.2353, 0.1, 0.27635, 0.785, 184.17 * hour, 0.184)
     lab = (1385, 225.5e3, 408, 0.1, 0.1e6, 0.4, 0.17, 2.5e-3, 7.1e-3, hour, 1e-3)
-    assert presets() == ["creeping-patch", "crustal-patch", "lab-fault", "real-fault"]
+    assert presets() == [
+        "creeping-patch",
+        "crustal-patch",
+        "double-direct-shear",
+        "geothermal-fault",
+        "lab-fault",
+        "real-fault",
+    ]
     assert plain(load_fault("real-fault")) == pytest.approx(real, rel=1e-15)
     assert plain(load_fault("lab-fault")) == pytest.approx(lab, rel=1e-15)
 
@@ -49,13 +56,15 @@ def test_the_laboratory_disturbance_is_that_of_the_real_fault_by_similarity():
 
 @pytest.mark.parametrize("name", presets())
 def test_every_preset_has_a_source(name):
-    paper = "Erickson et al. (2020)" if name.endswith("patch") else "Earthquake Control"
-    assert paper in load_fault(name).source
+    patches = dict.fromkeys(("crustal-patch", "creeping-patch"), "Erickson et al. (2020)")
+    others = {"geothermal-fault": "Valley and Evans (2007", "double-direct-shear": "Leeman et al. (2016"}
+    assert (patches | others).get(name, "Earthquake Control") in load_fault(name).source
     assert load_fault(name).name == name
 
 
 @pytest.mark.parametrize(
-    ("name", "direct", "change"), [("crustal-patch", 0.010, 0.005), ("creeping-patch", 0.025, -0.010)]
+    ("name", "direct", "change"),
+    [("crustal-patch", 0.010, 0.005), ("creeping-patch", 0.025, -0.010)],
 )
 def test_patches_have_the_numbers_of_the_benchmark(name, direct, change):
     """BP1-QD: ρ, c_s, σ_n, a, b, D_c, and f0 = 0.6 at 1 µm/s carried to the plate rate of 1 nm/s."""
@@ -67,6 +76,31 @@ def test_patches_have_the_numbers_of_the_benchmark(name, direct, change):
     assert (law.direct_effect, law.evolution_effect, law.critical_slip) == (direct, 0.015, 8e-3)
     assert law.reference_coefficient == pytest.approx(0.6 + change * math.log(1e3), abs=5e-6)
     assert law.reference_rate == 1e-9
+
+
+def test_the_geothermal_fault_is_loaded_as_the_stresses_of_its_site_say():
+    """Valley and Evans (2007) in MPa and km: Sv = 25.5z − 1.3, Sh = 14.06z − 1.78, pore pressure 9.8z + 0.9."""
+    fault, depth, angle = load_fault("geothermal-fault"), 4.7, math.radians(60)
+    largest, least, pore = 25.5 * depth - 1.3, 14.06 * depth - 1.78, 9.8 * depth + 0.9
+    normal = largest * math.cos(angle) ** 2 + least * math.sin(angle) ** 2 - pore
+    assert fault.effective_normal_stress == pytest.approx(1e6 * normal, rel=0.01)
+    assert (largest - least) * math.sin(2 * angle) / 2 / normal == pytest.approx(
+        fault.friction.reference_coefficient, abs=0.02
+    )
+    assert fault.friction.direct_effect - fault.friction.evolution_effect == pytest.approx(-0.004)
+    assert fault.damping == pytest.approx(fault.area * math.sqrt(fault.density * fault.shear_modulus) / 2, rel=1e-3)
+    moment = fault.moment_of(fault.reference.target_slip)
+    assert (math.log10(moment) - 9.1) / 1.5 == pytest.approx(3.2, abs=0.05)
+
+
+def test_the_apparatus_is_near_its_critical_stiffness():
+    fault = load_fault("double-direct-shear")
+    law, normal, stiffness = fault.friction, fault.effective_normal_stress, fault.stiffness / fault.area
+    assert (normal, law.reference_rate) == (12e6, 1e-5)
+    critical = (law.evolution_effect - law.direct_effect) * normal / law.critical_slip
+    assert stiffness == pytest.approx(6e9)
+    assert stiffness / critical == pytest.approx(0.83, abs=0.005)
+    assert fault.damping / fault.area == pytest.approx(math.sqrt(stiffness * 785) / 2, rel=1e-3)
 
 
 def test_a_file_is_read_like_a_preset(tmp_path):
@@ -144,7 +178,7 @@ def test_wrong_descriptions(old, new, kind, match):
 def test_neither_preset_nor_file(source):
     with pytest.raises(
         UnknownNameError,
-        match=r"must be a preset \(creeping-patch, crustal-patch, lab-fault, real-fault\) or the path of a \.toml file",
+        match=r"must be a preset \(creeping-patch, crustal-patch, .*, real-fault\) or the path of a \.toml file",
     ):
         load_fault(source)
 
