@@ -3,8 +3,11 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import casadi as ca
+
 from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators.base import SampledStage
+from quakedesign.loop.sensing.measurement import Measurement, generator, uniform
 
 MOST_SAMPLES = 100
 
@@ -17,6 +20,11 @@ class Delay(SampledStage):
     ----------
     samples : int
         0 … 100.
+    jitter : int
+        Largest number of further samples, drawn anew at every sample, each equally likely, 0 … 100. What has acted
+        once is not followed by anything older.
+    seed : int
+        Of the jitter, not negative.
 
     Raises
     ------
@@ -26,18 +34,31 @@ class Delay(SampledStage):
     name: ClassVar[str] = "delay"
 
     samples: int
+    jitter: int = 0
+    seed: int = 0
 
     def __post_init__(self) -> None:
-        whole = isinstance(self.samples, int) and not isinstance(self.samples, bool)
-        if not (whole and 0 <= self.samples <= MOST_SAMPLES):
-            raise ParameterError(f"samples of a delay must be a whole number, 0 to 100. Received {self.samples!r}.")
+        for name, value in (("samples of a delay", self.samples), ("jitter", self.jitter)):
+            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_SAMPLES:
+                raise ParameterError(f"{name} must be a whole number, 0 to {MOST_SAMPLES}. Received {value!r}.")
+        Measurement(seed=self.seed)
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Nothing asked for yet [Pa], oldest first."""
-        return (0.0,) * self.samples
+        """Nothing asked for yet [Pa], oldest first; with jitter the age of what acts [samples] and the generator."""
+        queue = (0.0,) * (self.samples + self.jitter)
+        return (*queue, float(self.samples), *generator(self.seed)) if self.jitter else queue
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
-        """Oldest pressure of the queue; see `SampledStage.apply`."""
-        queue = [*memory, pressure]
-        return queue[0], queue[1:]
+        """Pressure of the queue that is as old as the delay; see `SampledStage.apply`."""
+        longest = self.samples + self.jitter
+        queue = [*memory[:longest], pressure]
+        if not self.jitter:
+            return queue[0], queue[1:]
+        age, *state = memory[longest:]
+        state, drawn = uniform(state)
+        age = ca.fmin(age + 1, self.samples + ca.floor((self.jitter + 1) * drawn))
+        acting = queue[0]
+        for samples in range(longest):
+            acting = ca.if_else(age == samples, queue[longest - samples], acting)
+        return acting, [*queue[1:], age, *state]

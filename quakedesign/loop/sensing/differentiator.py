@@ -34,6 +34,8 @@ class Differentiator:
         n_f; n_d + n_f is 12 at most.
     discretisation : str
         ``"euler"``, ``"homogeneous"`` (both estimate from earlier readings), or ``"implicit"`` (with the latest too).
+    inner_steps : int
+        n, at least 1: so many steps of T/n per reading, which is held in between.
 
     Raises
     ------
@@ -45,10 +47,11 @@ class Differentiator:
     order: int = 1
     filter_order: int = 0
     discretisation: str = "implicit"
+    inner_steps: int = 1
 
     def __post_init__(self) -> None:
         require_positive(bound=self.bound, step=self.step)
-        for name, least in (("order", 1), ("filter_order", 0)):
+        for name, least in (("order", 1), ("filter_order", 0), ("inner_steps", 1)):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < least:
                 raise ParameterError(f"{name} must be a whole number of at least {least}. Received {value!r}.")
@@ -58,7 +61,7 @@ class Differentiator:
                 f"Received {self.order} + {self.filter_order}."
             )
         require_known(self.discretisation, DISCRETISATIONS, "discretisation")
-        size = math.log(self.bound) + (self.size + 1) * math.log(self.step)
+        size = math.log(self.bound) + (self.size + 1) * math.log(self.step / self.inner_steps)
         if not math.log(sys.float_info.min) < size < math.log(sys.float_info.max):
             raise ParameterError(
                 f"bound·step^{self.size + 1} must not vanish in double precision, nor overflow. "
@@ -82,8 +85,8 @@ class Differentiator:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """T, the N gains of a step, and for an implicit one λ_d·T^N."""
-        size, step, bound = self.size, self.step, self.bound
+        """T/n, the N gains of such a step, and for an implicit one λ_d·(T/n)^N."""
+        size, step, bound = self.size, self.step / self.inner_steps, self.bound
         places = range(1, size + 1)
         if self.discretisation == "implicit":
             gains = tuple(self.table[size - j] * bound * step ** (size - j + 1) for j in places)
@@ -105,12 +108,16 @@ class Differentiator:
             n_d + 1 entries [m], [m/s] ….
         list of SX
         """
-        step, gains = numbers[0], numbers[1 : self.size + 1]
+        step, gains, after = numbers[0], numbers[1 : self.size + 1], memory
+        for _ in range(self.inner_steps):
+            if self.discretisation == "implicit":
+                after = implicit_step(gains, numbers[-1], self.table, step, after, slip, self.filter_order)
+            else:
+                taylor = self.discretisation == "homogeneous"
+                after = explicit_step(gains, step, after, slip, self.filter_order, taylor)
         if self.discretisation == "implicit":
-            after = implicit_step(gains, numbers[-1], self.table, step, memory, slip, self.filter_order)
             return _without_lag(after[self.filter_order :], step), after
-        taylor = self.discretisation == "homogeneous"
-        return memory[self.filter_order :], explicit_step(gains, step, memory, slip, self.filter_order, taylor)
+        return memory[self.filter_order :], after
 
 
 def _without_lag(derivatives: list[Any], step: Any) -> list[Any]:

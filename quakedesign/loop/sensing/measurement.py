@@ -68,11 +68,7 @@ class Measurement(Sensor):
     @property
     def start(self) -> tuple[float, ...]:
         """State of the generator, from the seed; none without noise."""
-        if not self.noisy:
-            return ()
-
-        words = np.random.SeedSequence(self.seed).generate_state(len(_MODULI))
-        return tuple(float(int(word) % (m - 1) + 1) for word, m in zip(words, _MODULI, strict=True))
+        return generator(self.seed) if self.noisy else ()
 
     def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
         """Measured x1 [m] and x2 [m/s] (SX), and the generator afterwards."""
@@ -80,7 +76,7 @@ class Measurement(Sensor):
             return x, memory
         drawn = []
         for _ in numbers:
-            memory, number = _uniform(memory) if self.bounded else _normal(memory)
+            memory, number = uniform(memory) if self.bounded else _normal(memory)
             drawn.append(2 * number - 1 if self.bounded else number)
         return x + ca.vertcat(*(size * each for size, each in zip(numbers, drawn, strict=True))), memory
 
@@ -88,14 +84,20 @@ class Measurement(Sensor):
 EXACT = Measurement()
 
 
+def generator(seed: int) -> tuple[float, ...]:
+    """State of a generator of random numbers, from a seed."""
+    words = np.random.SeedSequence(seed).generate_state(len(_MODULI))
+    return tuple(float(int(word) % (m - 1) + 1) for word, m in zip(words, _MODULI, strict=True))
+
+
 def _normal(memory: list[Any]) -> tuple[list[Any], Any]:
     """State of the generator after two steps, and a number of the standard normal distribution."""
-    memory, radius = _uniform(memory)
-    memory, angle = _uniform(memory)
+    memory, radius = uniform(memory)
+    memory, angle = uniform(memory)
     return memory, ca.sqrt(-2 * ca.log(radius)) * ca.cos(2 * ca.pi * angle)
 
 
-def _uniform(memory: list[Any]) -> tuple[list[Any], Any]:
+def uniform(memory: list[Any]) -> tuple[list[Any], Any]:
     """Next state of the generator, and a number strictly between 0 and 1."""
     after = [ca.fmod(a * state, m) for a, state, m in zip(_FACTORS, memory, _MODULI, strict=True)]
     difference = after[0] - after[1]

@@ -1,5 +1,7 @@
 """Orders of accuracy, measured against theory."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.loop.sensing import Differentiator
 from quakedesign.loop.sensing.accuracy import constants, error_scale, worst_errors
+from quakedesign.loop.sensing.differentiator import DISCRETISATIONS
 
 PAIRS = [(1, 0), (2, 0), (1, 1), (2, 2)]
 
@@ -109,6 +112,7 @@ def test_errors_scale_with_bound_and_step():
         ({"order": True}, "order"),
         ({"filter_order": -1}, "filter_order"),
         ({"order": 7, "filter_order": 6}, "at most 12"),
+        ({"inner_steps": 0}, "inner_steps"),
         ({"discretisation": "exact"}, "discretisation"),
         ({"step": 1e-30, "order": 11}, "double precision"),
     ],
@@ -116,3 +120,23 @@ def test_errors_scale_with_bound_and_step():
 def test_what_cannot_be_is_refused(settings, named):
     with pytest.raises(ParameterError, match=named):
         Differentiator(**{"bound": 1.0, "step": 1e-3, **settings})
+
+
+@pytest.mark.parametrize("discretisation", DISCRETISATIONS)
+def test_steps_inside_are_those_of_a_faster_one_that_is_told_every_reading_often(discretisation):
+    inside = Differentiator(bound=3.0, step=0.01, order=2, filter_order=1, discretisation=discretisation, inner_steps=4)
+    faster = replace(inside, step=0.0025, inner_steps=1)
+    states, after = [], []
+    for d, times in ((inside, 1), (faster, 4)):
+        memory, slip = ca.SX.sym("memory", d.size), ca.SX.sym("slip")
+        estimates, end = d.estimate([*map(ca.SX, d.numbers)], ca.vertsplit(memory), slip)
+        step = ca.Function("step", [memory, slip], [ca.vertcat(*end), ca.vertcat(*estimates)])
+        state, told = ca.DM.zeros(d.size), None
+        for reading in (0.1, 0.3, -0.2):
+            for _ in range(times):
+                state, told = step(state, reading)
+        states.append(state.full().ravel())
+        after.append(told.full().ravel())
+    assert states[0] == pytest.approx(states[1], rel=1e-12)
+    if discretisation == "implicit":  # the others estimate from earlier readings, not from this one's first steps
+        assert after[0] == pytest.approx(after[1], rel=1e-12)

@@ -1,6 +1,7 @@
 """Noise and bandwidth of the transducer."""
 
 import math
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -51,8 +52,28 @@ def test_without_noise_and_limit_of_bandwidth_nothing_happens():
 
 @pytest.mark.parametrize(
     ("settings", "named"),
-    [({"deviation": -1.0}, "deviation"), ({"bandwidth": 0.0}, "bandwidth"), ({"bandwidth": math.nan}, "bandwidth")],
+    [
+        ({"deviation": -1.0}, "deviation"),
+        ({"quantum": -1.0}, "quantum"),
+        ({"bandwidth": 0.0}, "bandwidth"),
+        ({"bandwidth": math.nan}, "bandwidth"),
+    ],
 )
 def test_what_cannot_be_is_refused(settings, named):
     with pytest.raises(ParameterError, match=named):
         Transducer(**settings)
+
+
+def test_a_reading_is_the_nearest_multiple_of_the_quantum():
+    slips = np.linspace(-3e-6, 3e-6, 401)
+    found = pass_on(Transducer(quantum=1e-7), slips)
+    assert np.rint(found / 1e-7) == pytest.approx(found / 1e-7, abs=1e-9)
+    assert np.max(np.abs(found - slips)) <= 0.5e-7 * (1 + 1e-9)
+
+
+def test_what_is_rounded_is_the_noisy_slip_behind_the_filter():
+    """With noise of many quanta rounding adds q²/12 to its variance (Bennett 1948)."""
+    noisy = Transducer(deviation=1e-6, bandwidth=50.0, seed=3)
+    smooth, found = (pass_on(stage, np.full(20000, 1e-3)) for stage in (noisy, replace(noisy, quantum=1e-6)))
+    assert np.std(found - smooth) == pytest.approx(1e-6 / math.sqrt(12), rel=0.02)
+    assert abs(np.mean(found - smooth)) < 4e-6 / math.sqrt(12 * 20000)
