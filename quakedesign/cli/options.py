@@ -24,8 +24,8 @@ def _fault_name(_type: Any, tokens: Sequence[Any]) -> str:
 FaultName = Annotated[
     str,
     Parameter(
-        help="Preset (real-fault, lab-fault, crustal-patch, creeping-patch, geothermal-fault, double-direct-shear) or "
-        "path of a .toml file.",
+        help="Preset (real-fault, lab-fault, lab-apparatus, crustal-patch, creeping-patch, geothermal-fault, "
+        "double-direct-shear) or path of a .toml file.",
         converter=_fault_name,
     ),
 ]

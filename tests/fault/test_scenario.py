@@ -39,6 +39,7 @@ def test_presets_are_the_columns_of_the_table():
         "crustal-patch",
         "double-direct-shear",
         "geothermal-fault",
+        "lab-apparatus",
         "lab-fault",
         "real-fault",
     ]

@@ -1,0 +1,119 @@
+"""The laboratory experiment in its own apparatus: the preset, its numbers, and what explains that it worked."""
+
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from quakedesign.controllers import published
+from quakedesign.fault import load_fault
+from quakedesign.fault.statics import rest_slip
+from quakedesign.simulation.campaign import Campaign
+from quakedesign.simulation.campaign.problem import SampleResult
+from quakedesign.studies.laboratory import Apparatus, Finding, conditions, explain, guaranteed_in, guarantees, numbers
+
+PRINTED, KNOWN = Apparatus.printed(), Apparatus.known()
+TABLE, BOTH = load_fault("lab-fault"), load_fault("lab-apparatus")
+
+
+def test_both_interfaces_move_as_one_with_the_spring_of_the_footnote():
+    assert BOTH.stiffness == pytest.approx(45.1e3, rel=1e-12)
+    assert BOTH.area == pytest.approx(2 * 0.01, rel=1e-12)
+    for name in ("specific_stiffness", "specific_damping", "authority"):
+        assert getattr(BOTH, name) == pytest.approx(getattr(TABLE, name), rel=1e-12)
+
+
+def test_the_printed_slip_of_7_mm_needs_the_printed_area_at_each_interface():
+    """With 100 cm² for both, k = 45.1 N/mm leaves a rest at 2.2 mm; the whole drop over k is the 7.5 mm of the text."""
+    law, load, spring = BOTH.friction, 0.1e6 * 0.01, 45.1e3
+    assert rest_slip(law, 2 * load, spring) == pytest.approx(7.1e-3, abs=0.05e-3)
+    once = rest_slip(law, load, spring)
+    assert once == pytest.approx(2.2e-3, abs=0.05e-3)
+    assert 0.17 * load * (1 - math.exp(-once / 2.5e-3)) == pytest.approx(spring * once, rel=1e-9)
+    assert 0.17 * 2 * load / spring == pytest.approx(7.5e-3, abs=0.05e-3)
+
+
+def test_every_number_says_how_it_is_known_and_lies_in_its_range():
+    assert list(numbers()) == [field.name for field in fields(Apparatus)]
+    for name, one in numbers().items():
+        low, high = one["range"]
+        assert low <= one["value"] <= high, name
+        assert one["how"] in ("printed", "read", "assumed"), name
+        assert one["unit"], name
+        assert one["why"].endswith("."), name
+    for name, one in conditions().items():
+        for number, known in numbers().items():
+            assert known["range"][0] <= getattr(one, number) <= known["range"][1], (name, number)
+
+
+def test_roughness_is_as_large_as_told_and_another_seed_is_another_pair_of_surfaces():
+    slip = sp.Symbol("slip", real=True)
+    size = KNOWN.roughness * KNOWN.fault().authority * 0.1e6
+    one, other = (sp.lambdify(slip, KNOWN.load(seed).perturbation)(np.linspace(0, 0.0075, 20001)) for seed in (0, 1))
+    for waves in (one, other):
+        assert 0.6 * size < np.max(np.abs(waves)) <= size
+        assert abs(np.mean(waves)) < 0.1 * size
+    assert abs(np.corrcoef(one, other)[0, 1]) < 0.2
+    assert PRINTED.load(0).perturbation is None
+
+
+def test_a_deficit_is_a_stress_on_both_interfaces():
+    """At the verge less 1 kPa times 200 cm², over 2.77 kg times the mass's factor."""
+    fault = replace(KNOWN, deficit=1e3, mass=2.0).fault()
+    assert fault.disturbance.constant == pytest.approx(-1e3 * 0.02 / (2 * 2.77), rel=1e-12)
+    assert fault.mass == pytest.approx(2 * 2.77, rel=1e-12)
+
+
+def test_what_is_printed_ends_in_an_earthquake_within_seconds():
+    problem = PRINTED.problem(published("lab-fault")["cta"], 0, duration=4.0)
+    run = problem.trajectory(problem.sample(1), 200)
+    assert run.outcome.kind == "earthquake"
+    assert run.outcome.share_of_natural > 1
+
+
+def test_a_finding_is_least_median_and_largest_of_the_specimens():
+    problem = PRINTED.problem(published("lab-fault")["dia"], 0)
+    peak = problem.criterion.natural_peak
+    shares = (0.5, 0.001, 0.05, 0.002)
+    figures = [
+        {"max_slip_error": 1e-5 * n, "peak_slip_rate": share * peak, "rms_pressure": 1e3 * n}
+        for n, share in enumerate(shares, start=1)
+    ]
+    results = [SampleResult(figures=one, events={}) for one in figures]
+    found = Finding.of("any", "dia", Campaign(problem=problem, results=tuple(results)))
+    assert found.outcomes == {"tracked": 2, "slow slip": 1, "earthquake": 1, "diverged": 0, "opened": 0}
+    assert found.harmless == 3
+    assert found.slip_error == pytest.approx((1e-5, 2e-5, 4e-5))
+    assert found.peak_slip_rate == pytest.approx((0.001 * peak, 0.002 * peak, 0.5 * peak))
+    assert found.rms_pressure == pytest.approx((1e3, 2e3, 4e3))
+    broken = Campaign(problem=problem, results=(*results[1:], SampleResult(figures={}, events={"diverged": 3.0})))
+    assert Finding.of("any", "dia", broken).slip_error == pytest.approx((2e-5, 3e-5, math.inf))
+
+
+@pytest.mark.slow  # some minutes of simulated loops
+def test_stick_and_a_quick_differentiator_explain_it_together_and_not_alone():
+    for printed in explain({"printed": PRINTED}, specimens=4, duration=60.0, laws=["cta", "dia"]):
+        assert printed.outcomes["earthquake"] == 4
+        assert printed.slip_error[1] == pytest.approx(0.011, rel=0.1)
+    stick = replace(PRINTED, stick=1)
+    quick = replace(stick, bound=KNOWN.bound)
+    chosen = {"stick": stick, "both": quick, "quick": replace(quick, stick=0)}
+    found: dict[tuple[str, str], Finding] = {}
+    for one in explain(chosen, specimens=4, duration=400.0):
+        found[one.condition, one.law] = one
+    assert {f.harmless for (name, _), f in found.items() if name == "both"} == {4}
+    assert {f.harmless for (name, _), f in found.items() if name == "stick"} == {0}
+    assert found["quick", "elqr"].harmless == 0
+
+
+@pytest.mark.slow  # five designs with proof, and a loop of an hour
+def test_the_guaranteed_law_keeps_what_is_proved_where_it_is_proved():
+    found = guarantees()
+    assert not found["2 ms late, lag 1 ms, readings off by 1 um, rate"].proved
+    proof = found["1 ms late, lag 0 ms, readings off by 1 um, amplitude"].found
+    inside = replace(KNOWN, jitter=0, lag=0.0)
+    run = guaranteed_in(inside, proof, specimens=4)
+    assert run.slip_error[2] <= proof.claims.slip_error
+    assert run.peak_slip_rate[2] <= proof.claims.peak_slip_rate
