@@ -26,6 +26,7 @@ GUARANTEES = [p for p in FILES if p.stem.startswith("guarantee")]
 SLIDING = [p for p in FILES if p.stem.startswith("sliding")]
 LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES, *SLIDING)]
 each = pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
+LONG = {"sliding_crustal-patch", "cta3_1_2_2_0.05_0.02_0.01"}  # a proof of either kind is checked by both elsewhere
 each_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda p: p.stem)
 
 # L̄ and [b_m, b_M] of every file; four 2-CTA sets are those of Torres-González et al. (2017) for L̄ = 1, the fifth and
@@ -58,7 +59,9 @@ def test_the_catalogue_is_complete():
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
 
 
-@each
+@pytest.mark.parametrize(
+    "path", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in LONG)) for p in FILES]
+)
 def test_both_checkers_agree(path):
     expected = "refuted" if path.stem == "motzkin_not-sos" else "proved"
     ((verdict, _),) = check_files([path]).values()

@@ -45,7 +45,9 @@ def oracle(fault, gains, run, method, rtol, start=(0.0, 0.0)):
 
 
 @pytest.mark.parametrize("method", ADAPTIVE)
-@pytest.mark.parametrize(("scipy_method", "rtol"), [("Radau", 1e-8), ("LSODA", 1e-10)])
+@pytest.mark.parametrize(
+    ("scipy_method", "rtol"), [pytest.param("Radau", 1e-8, marks=pytest.mark.slow), ("LSODA", 1e-10)]
+)
 def test_the_linear_law_agrees_with_scipy(method, scipy_method, rtol):
     controller = published("real-fault")["elqr"]
     run = simulate(REAL, controller, duration=150.0, samples=50, method=method, rtol=1e-11)

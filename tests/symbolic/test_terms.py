@@ -152,7 +152,7 @@ def smooth(draw):
     return Term(coefficient, tuple(draw(st.lists(st.sampled_from("kq"), max_size=1))), tuple(factors))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(smooth(), st.fixed_dictionaries(dict.fromkeys(WEIGHTS, sums())))
 def test_the_derivative_of_terms_is_that_of_their_expressions(function, field):
     found = collected(lie_terms(function, field), list(WEIGHTS))
@@ -160,6 +160,7 @@ def test_the_derivative_of_terms_is_that_of_their_expressions(function, field):
     assert found == to_terms(lie_derivative(from_terms([function], SYMBOLS), rates), STATES)
 
 
+@settings(max_examples=30)
 @given(smooth(), places)
 def test_the_derivative_of_terms_is_a_difference_quotient(function, at):
     """Along the field (1, 0, 0) at 50 digits, on whose states alone the function depends."""

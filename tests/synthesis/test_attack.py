@@ -80,7 +80,9 @@ def random_proofs(name, seed):
             yield certificate_text(certificate)
 
 
-@pytest.mark.parametrize(("name", "wanted"), [("super-twisting", 4), ("cta", 1), ("dia", 1)])
+@pytest.mark.parametrize(
+    ("name", "wanted"), [("super-twisting", 4), ("cta", 1), pytest.param("dia", 1, marks=pytest.mark.slow)]
+)
 def test_random_proofs_withstand(name, wanted):
     assert all(withstands(text, 30_000, trajectories=9, steps=800) for text in islice(random_proofs(name, 5), wanted))
 

@@ -66,7 +66,7 @@ VARIANTS = (
 )  # fmt: skip
 
 
-SHORT = {"cta": {"real", "lab", "ten percent", "stable", "strong weakening"}, "dia": {"strong weakening"}}
+SHORT = {"cta": {"real", "lab", "ten percent", "strong weakening"}, "dia": set()}
 SLIDING = [pytest.param(law, v, marks=() if v in SHORT[law] else pytest.mark.slow) for law in SHORT for v in VARIANTS]
 
 

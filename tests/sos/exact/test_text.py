@@ -203,6 +203,7 @@ def test_hostile_text_is_refused_in_bounded_time(text, message):
     assert len(str(caught.value)) < 250
 
 
+@pytest.mark.slow
 def test_hostile_text_is_refused_in_bounded_memory():
     program = """
 import json, resource, sys

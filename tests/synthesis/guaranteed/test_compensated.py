@@ -141,8 +141,10 @@ def test_with_stick_no_course_leaves_the_bounds(row):
     assert largest[1].max() <= claim.claims.slip_rate_error
 
 
-@pytest.mark.parametrize("row", ["cta", "1/64"])
-@pytest.mark.parametrize("sticks", [False, True])
+@pytest.mark.parametrize(
+    ("row", "sticks"),
+    [("cta", False), ("cta", True), ("1/64", False), pytest.param("1/64", True, marks=pytest.mark.slow)],
+)
 def test_the_worst_found_is_below_the_bound_and_no_less_than_the_attacker_s(row, sticks):
     held, claim = numbers(row)
     found, back = worst_found(claim, sticks=sticks), float(TASK.reference_rates[0]) if sticks else None

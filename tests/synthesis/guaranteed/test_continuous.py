@@ -83,8 +83,14 @@ def test_what_a_search_finds_is_below_and_near(name, kind):
     assert seen.slip_rate_error < found.claims.slip_rate_error < 1.5 * seen.slip_rate_error
 
 
-@pytest.mark.parametrize("box", ["paper", "ten-percent"])
-@pytest.mark.parametrize("name", GAINS)
+@pytest.mark.parametrize(
+    ("name", "box"),
+    [("real-fault", "paper"), ("lab-fault", "ten-percent")]
+    + [
+        pytest.param(*other, marks=pytest.mark.slow)
+        for other in (("real-fault", "ten-percent"), ("lab-fault", "paper"))
+    ],
+)
 def test_gains_with_poles_that_are_far_apart_are_decided_too(name, box):
     """The published integrals are 10^6 times slower than the fastest pole."""
     gains = replace(published(name)["elqr"], feedback="error")

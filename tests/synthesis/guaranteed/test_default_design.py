@@ -101,7 +101,7 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert guarantee(task_of(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
 
 
-@pytest.mark.parametrize("step", ["0.01", "0.02"])
+@pytest.mark.parametrize("step", ["0.01", pytest.param("0.02", marks=pytest.mark.slow)])
 def test_sampled_faster_that_fault_is_guaranteed(step):
     claim = design_held(task_of(SLOW), F(step))
     assert claim.check() is Verdict.PROVED
@@ -129,8 +129,11 @@ def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
 
 @pytest.mark.parametrize(
     "fault",
-    [REAL.with_disturbance(Disturbance()), replace(REAL, sampling_time=1e-9), replace(REAL, damping=5e16)],
-    ids=["quiet", "sampled fast", "overdamped"],
+    [
+        pytest.param(REAL.with_disturbance(Disturbance()), id="quiet", marks=pytest.mark.slow),
+        pytest.param(replace(REAL, sampling_time=1e-9), id="sampled fast", marks=pytest.mark.slow),
+        pytest.param(replace(REAL, damping=5e16), id="overdamped"),
+    ],
 )
 def test_unusual_faults_are_designed_or_refused_with_a_reason(fault):
     found = design_held(task_of(fault), F(repr(fault.sampling_time)))

@@ -215,10 +215,10 @@ UNUSUAL = {
     "undamped": replace(REAL, damping=0.0),
     "laboratory": load_fault("lab-fault"),
 }
-SLOWER = pytest.mark.slow
 
 
-@pytest.mark.parametrize("name", ["sampled every minute", *(pytest.param(n, marks=SLOWER) for n in [*UNUSUAL][1:])])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", UNUSUAL)
 def test_unusual_faults_are_designed_with_a_guarantee_that_holds(unproved, name):
     design = qd.design(UNUSUAL[name], "dia")
     assert isinstance(design.guarantee, Guarantee)

@@ -94,6 +94,7 @@ def test_noise_along_the_nominal_response_comes_close_and_the_worst_found_is_no_
     assert claim.claims.slip_error <= 2 * found.slip_error
 
 
+@pytest.mark.slow
 def test_the_search_uses_the_noise():
     claim = designed("slip alone")
     quiet = replace(claim, held=replace(claim.held, slip_noise=F(0)))

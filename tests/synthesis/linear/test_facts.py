@@ -3,6 +3,8 @@
 import json
 from dataclasses import replace
 
+import pytest
+
 import quakedesign as qd
 from quakedesign.synthesis.linear.analysis.verdict import linear_facts
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
@@ -16,6 +18,7 @@ def facts_of(controller, step="1e-3"):
     return json.loads(json.dumps(linear_facts(LAB, controller, held)))
 
 
+@pytest.mark.slow
 def test_the_facts_of_the_published_gains_can_be_written_as_json():
     facts = facts_of(qd.published("lab-fault")["elqr"])
     assert facts["inverse_optimal"] is True
