@@ -14,6 +14,11 @@ class LinearSlipWeakening(SlipWeakening):
     """μ(slip) = residual + drop · max(0, 1 − slip/critical_slip).
 
     Friction has a kink at the critical slip, and would grow without bound for slip < 0; `extended` holds it there.
+
+    Attributes
+    ----------
+    critical_slip : float
+        Slip at which friction is kinetic d_c [m], positive.
     """
 
     name: ClassVar[str] = "linear-slip-weakening"

@@ -1,7 +1,7 @@
 """A law with a disturbance estimate for the loop as it runs, chosen by what can be guaranteed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import hypot, inf, log10, sqrt
 from typing import Any, Unpack
@@ -44,27 +44,17 @@ def first_held(
     """
     if around.get("delay", 0) > MOST_DELAY * step:
         return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None), near
-    if (none := _unpredictable(task, step)) is not None:
-        return none, near
-    reason = why_no_law(step, measured, around)
-    if reason:
-        return NoGuarantee(reason=reason, small_gain=None), near
-    family, template = _family(task, step, measured, around)
-
-    def cost(x: np.ndarray) -> float:
-        return _peak_cost(_seen(task, family, template, x), family.period)
-
-    question = "peak", task, step, measured, tuple(sorted(around.items()))
-    for start in family.starts if near is None else (near,):
+    laws = _Laws.of(task, step, measured, around)
+    if isinstance(laws, NoGuarantee):
+        return laws, near
+    for start in laws.family.starts if near is None else (near,):
         evaluations = _EVALUATIONS if near is None else _FEW
-        settings = {"enough": _FAILED / 2, "evaluations": evaluations, "far": _far(template)}
-        reached, x = _search_once(question, cost, start, **settings)
+        reached, x = laws.least_peak(start, enough=_FAILED / 2, evaluations=evaluations)
         if reached < _FAILED / 2 or _hopeless(reached):
             break
-    last = _seen(task, family, template, x)
-    if last is not None and isinstance(last.bounds, NoGuarantee) and _hopeless(reached):
-        return last.bounds, x
-    held = replace(template, law=family.law(x))
+    if (none := laws.without_bounds(x)) is not None and _hopeless(reached):
+        return none, x
+    held = laws.held(x)
     # through a layer a guarantee needs a slow input gain; elsewhere one with any gain is much sooner found
     return best_guarantee(task, held) if held.diffusion else guarantee(task, held), x
 
@@ -113,40 +103,77 @@ def design_held(
             f"a design needs a positive step, a delay of 0 to {MOST_DELAY} steps and a lag of 0 or more. Received "
             f"{float(step):.4g} s, {float(delay):.4g} s, {float(lag):.4g} s. Shorten the delay."
         )
-    if (none := _unpredictable(task, step)) is not None:
-        return none
-    reason = why_no_law(step, measured, around)
-    if reason:
-        return NoGuarantee(reason=reason, small_gain=None)
-    family, template = _family(task, step, measured, around)
-
-    def seen(x: np.ndarray) -> Estimate | None:
-        return _seen(task, family, template, x)
-
-    question = task, step, measured, tuple(sorted(around.items()))
-    best = 10 * _FAILED, np.array(family.starts[0])
-    for start in family.starts:
-        reached = _search_once(
-            ("peak", *question), lambda x: _peak_cost(seen(x), family.period), start, far=_far(template)
-        )
-        best = min(best, reached, key=lambda f: f[0])
-        if template.diffusion and _hopeless(best[0]):
+    laws = _Laws.of(task, step, measured, around)
+    if isinstance(laws, NoGuarantee):
+        return laws
+    behind_rock, starts = bool(laws.template.diffusion), laws.family.starts
+    least, x = 10 * _FAILED, np.array(starts[0])
+    for start in starts:
+        least, x = min((least, x), laws.least_peak(start), key=lambda reached: reached[0])
+        if behind_rock and _hopeless(least):
             break
-    found = seen(best[1])
-    if template.diffusion and found is not None and isinstance(found.bounds, NoGuarantee) and _hopeless(best[0]):
-        return found.bounds  # a proof of that takes a minute
-    if objective == "tracking" and found is not None and isinstance(found.bounds, Bounds):
-        limit = (room or family.room) * float(found.bounds.slip_rate_error)
-        starts = (best[1], family.starts[1])
-        drift = ("drift", limit, *question)
-        found_near = (_search_once(drift, lambda x: _drift_cost(seen(x), limit), start) for start in starts)
-        best = min(found_near, key=lambda f: f[0])
-    return best_guarantee(task, replace(template, law=family.law(best[1])))
+    if behind_rock and (none := laws.without_bounds(x)) is not None and _hopeless(least):
+        return none  # a proof of that takes a minute
+    seen = laws.seen(x)
+    if objective == "tracking" and seen is not None and isinstance(seen.bounds, Bounds):
+        limit = (room or laws.family.room) * float(seen.bounds.slip_rate_error)
+        _, x = min((laws.least_drift(start, limit) for start in (x, starts[1])), key=lambda reached: reached[0])
+    return best_guarantee(task, laws.held(x))
 
 
-def _far(held: Held) -> float:
-    """Cost above which a search gives up; through a layer, where every evaluation takes a tenth of a second."""
-    return _FAR * _FAILED if held.diffusion else inf
+@dataclass(frozen=True)
+class _Laws:
+    """Laws among which a search chooses for one loop, and what is seen of each."""
+
+    task: Task
+    family: Family
+    template: Held
+    question: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, task: Task, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
+        """Laws for a T_s [s] and what is around them, or why there are none."""
+        if (none := _unpredictable(task, step)) is not None:
+            return none
+        if reason := why_no_law(step, measured, around):
+            return NoGuarantee(reason=reason, small_gain=None)
+        require_known(measured, MEASURED, "measured")
+        family = family_of(task, step, measured, around)
+        template = Held(law=family.law(np.array(family.starts[0])), step=step, **around)
+        return cls(task, family, template, (task, step, measured, tuple(sorted(around.items()))))
+
+    def held(self, x: np.ndarray) -> Held:
+        """The loop of a law."""
+        return replace(self.template, law=self.family.law(x))
+
+    def seen(self, x: np.ndarray) -> Estimate | None:
+        """What is estimated of a law; None where there is none of these numbers."""
+        judged = slowly_estimated if self.template.diffusion and not self.task.friction.rate_slope else estimated
+        try:
+            return judged(self.task, self.held(x)) if self.family.admits(x) else None
+        except LinAlgError:  # of a Riccati equation
+            return None
+
+    def without_bounds(self, x: np.ndarray) -> NoGuarantee | None:
+        """Why a law has no bounds; None where it has, or is none."""
+        seen = self.seen(x)
+        return seen.bounds if seen is not None and isinstance(seen.bounds, NoGuarantee) else None
+
+    def least_peak(self, start: Sequence[float] | np.ndarray, **settings: Any) -> tuple[float, np.ndarray]:
+        """Smallest cost of a peak near a start, and where; given up where it stays far from a guarantee.
+
+        Through a layer every evaluation takes a tenth of a second.
+        """
+        far = _FAR * _FAILED if self.template.diffusion else inf
+
+        def cost(x: np.ndarray) -> float:
+            return _peak_cost(self.seen(x), self.family.period)
+
+        return _search_once(("peak", *self.question), cost, start, far=far, **settings)
+
+    def least_drift(self, start: Sequence[float] | np.ndarray, limit: float) -> tuple[float, np.ndarray]:
+        """Smallest cost of a drift near a start, and where, within a limit of the slip-rate error [m/s]."""
+        return _search_once(("drift", limit, *self.question), lambda x: _drift_cost(self.seen(x), limit), start)
 
 
 def _hopeless(cost: float) -> bool:
@@ -162,21 +189,6 @@ def _unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
     if growth <= _MOST_GROWTH:
         return None
     return NoGuarantee(reason=f"errors grow by e^{growth:.3g} within T_s = {float(step):.4g} s", small_gain=None)
-
-
-def _family(task: Task, step: Fraction, measured: str, around: Around) -> tuple[Family, Held]:
-    """Laws to choose among, and the loop of the first."""
-    require_known(measured, MEASURED, "measured")
-    family = family_of(task, step, measured, around)
-    return family, Held(law=family.law(np.array(family.starts[0])), step=step, **around)
-
-
-def _seen(task: Task, family: Family, template: Held, x: np.ndarray) -> Estimate | None:
-    judged = slowly_estimated if template.diffusion and not task.friction.rate_slope else estimated
-    try:
-        return judged(task, replace(template, law=family.law(x))) if family.admits(x) else None
-    except LinAlgError:  # of a Riccati equation
-        return None
 
 
 def _search_once(
