@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.cli.hardware import ActuatorOptions, SensorOptions
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, LawOptions, Output, RunOptions
-from quakedesign.cli.shared import Metres, MetresPerSecond, Pascals, Seconds, Whole, app, console, progress
-from quakedesign.cli.state import sliding_law_of
+from quakedesign.cli.shared import Metres, MetresPerSecond, Whole, app, console, progress
+from quakedesign.cli.state import SpreadOptions
 from quakedesign.errors import ParameterError
 from quakedesign.interruption import remedy
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from quakedesign.simulation.campaign import Campaign, Problem
 
 _DIRECT, _EXACT, _LAW, _USUAL = ActuatorOptions(), SensorOptions(), LawOptions(), RunOptions()
+_SAME = SpreadOptions()
 
 
 @app.command
@@ -25,17 +26,12 @@ def campaign(
     samples: Whole,
     law: LawOptions = _LAW,
     run: RunOptions = _USUAL,
-    scheme: str | None = None,
-    method: str = "dormand-prince",
-    plant: str = "smooth",
     box: Box = None,
     actuator: ActuatorOptions = _DIRECT,
     sensors: SensorOptions = _EXACT,
     initial_slip: Metres = 0.0,
     initial_rate: MetresPerSecond = 0.0,
-    spread: str = "0",
-    stress: Pascals | None = None,
-    stress_period: Seconds | None = None,
+    state: SpreadOptions = _SAME,
     seed: Whole = 0,
     search: str | None = None,
     rerun: str | None = None,
@@ -56,24 +52,10 @@ def campaign(
     ----------
     samples
         Number of samples.
-    scheme
-        explicit (unless given), implicit, semi-implicit or compensated (sampled control), or continuous. Designed laws
-        are sampled and have their own.
-    method
-        dormand-prince or rk4; for friction with a state cvodes or idas.
-    plant
-        smooth or coulomb; for friction with a state smooth or quasi-dynamic (without inertia).
     initial_slip
         Largest slip at the start.
     initial_rate
         Largest slip rate at the start.
-    spread
-        Of friction with a state, held in slow sliding by the e-LQR that design finds: by how much of their values a, b
-        and D_c are off, such as 0.1; the effective normal stress, stiffness and damping by the box.
-    stress
-        Of such a fault: bound of a sine of shear stress, such as '25 kPa'; what is proved of the design unless given.
-    stress_period
-        Its period; that of the tide, 12.42 hours, unless given.
     seed
         Of samples and noise.
     search
@@ -88,7 +70,6 @@ def campaign(
         Folder; ./quakedesign-FAULT-campaign unless given.
     """
     from quakedesign.fault import load_fault
-    from quakedesign.loop.schemes import own_way
     from quakedesign.report.figure_files import figure_bytes
     from quakedesign.simulation.campaign import campaign_problem, run_campaign
     from quakedesign.simulation.run import sampled_scheme
@@ -96,27 +77,17 @@ def campaign(
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
     loaded = load_fault(fault, box=box)
-    told: dict[str, Any] = {}
-    if loaded.friction.state_names:
-        controller, told = sliding_law_of(loaded, law, actuator.diffusion, stress, spread)
-        told |= {} if stress_period is None else {"stress_period": stress_period}
-    elif (spread, stress, stress_period) != ("0", None, None):
-        raise ParameterError(
-            f"spread and stress need friction with a state. Received {loaded.friction.name}. Leave them out."
-        )
-    else:
-        chosen = law.choose(loaded)
-        controller = chosen.controller if chosen else None
-    way, step, own = own_way(controller, scheme, run.step)
+    controller, told = state.choose(loaded, law, actuator.diffusion)
+    way, step, own = run.way(controller)
     period = loaded.sampling_time if step is None else step
     problem = campaign_problem(
         loaded,
         controller,
         scheme=sampled_scheme(way, run.substeps, actuator.build(period), sensors.build(period), **own),
         step=step,
-        method=method,
+        method=run.method,
         duration=run.duration,
-        plant=plant,
+        plant=run.plant,
         load=run.load(),
         initial_slip=initial_slip,
         initial_slip_rate=initial_rate,

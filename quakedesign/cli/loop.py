@@ -42,11 +42,8 @@ def simulate(
     law: NoLawOptions = _NONE,
     run: RunOptions = _USUAL,
     start: StartOptions = _REST,
-    scheme: str | None = None,
     weight: float | None = None,
     authority: float | None = None,
-    method: str = "dormand-prince",
-    plant: str = "smooth",
     actuator: ActuatorOptions = _DIRECT,
     sensors: SensorOptions = _EXACT,
     state: StateOptions = NO_STATE,
@@ -61,18 +58,10 @@ def simulate(
 
     Parameters
     ----------
-    scheme
-        continuous (unless given; the law in every stage of the integrator), or sampled and held: explicit, implicit,
-        semi-implicit, compensated. Designed laws are sampled and have their own.
     weight
         Of the estimate of the disturbance in the scheme compensated, above 0, at most 1.
     authority
         B0 of a sampled scheme in m^2/kg; guarantee says weight and authority of the sliding modes that it proves.
-    method
-        dormand-prince or rk4; cvodes or idas for smooth loops; for friction with a state radau, dop853, cvodes or idas.
-    plant
-        smooth (the paper's, for forward slip) or coulomb (set-valued friction: stick, slip, reversal); for friction
-        with a state smooth or quasi-dynamic (without inertia).
     seed
         Of the noise.
     out
@@ -80,7 +69,6 @@ def simulate(
     """
     options = dict(locals())
     from quakedesign.fault import load_fault
-    from quakedesign.loop.schemes import own_way
     from quakedesign.simulation import Load
     from quakedesign.studies.single import run_single
 
@@ -91,7 +79,7 @@ def simulate(
     require_no_state_options(state, loaded)
     loaded = start.task(loaded)
     chosen, load = law.choose(loaded), run.load()
-    way, step, _ = own_way(chosen.controller if chosen else None, scheme, run.step, "continuous")
+    way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
     period = loaded.sampling_time if step is None else step
     chain, told = actuator.build(period), sensors.build(period, seed)
     with progress() as tell:
@@ -104,8 +92,8 @@ def simulate(
             load=load if load != Load() else None,
             step=step,
             scheme=way,
-            method=method,
-            plant=plant,
+            method=run.method,
+            plant=run.plant,
             substeps=run.substeps,
             actuator=chain,
             noise=told,

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from quakedesign.cli.shared import Gains, Metres, MetresPerSecond, Push, Seconds, Whole, hush, print_json, print_lines
 
 if TYPE_CHECKING:
+    from quakedesign.controllers import Controller
     from quakedesign.fault import Fault
     from quakedesign.simulation import Load
     from quakedesign.studies.single import Choice
@@ -133,6 +134,15 @@ class RunOptions:
 
     Parameters
     ----------
+    scheme
+        Sampled and held: explicit, implicit, semi-implicit or compensated; or continuous, the law in every stage of the
+        integrator. Unless given, simulate takes continuous, campaign explicit. Designed laws have their own.
+    method
+        dormand-prince or rk4; for single runs of smooth loops cvodes or idas; for friction with a state cvodes or idas,
+        and for single runs without control radau or dop853.
+    plant
+        smooth (the paper's, for forward slip) or coulomb (set-valued friction: stick, slip, reversal); for friction
+        with a state smooth or quasi-dynamic (without inertia).
     step
         Length of one step; the fault's sampling time unless given.
     duration
@@ -145,11 +155,20 @@ class RunOptions:
         Of the user's in m/s^2, added to the fault's own: an expression of slip, slip_rate and time.
     """
 
+    scheme: str | None = None
+    method: str = "dormand-prince"
+    plant: str = "smooth"
     step: Seconds | None = None
     duration: Seconds | None = None
     substeps: Whole = 1
     drift: MetresPerSecond = 0.0
     perturbation: Push | None = None
+
+    def way(self, law: "Controller | None", usual: str = "explicit") -> "tuple[Any, float | None, dict[str, Any]]":
+        """Scheme, step [s] and settings of a run, see `quakedesign.loop.schemes.own_way`."""
+        from quakedesign.loop.schemes import own_way
+
+        return own_way(law, self.scheme, self.step, usual)
 
     def load(self) -> "Load":
         """What acts on the fault beside its own disturbance."""

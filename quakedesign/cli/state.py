@@ -105,22 +105,53 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
     return 0
 
 
-def sliding_law_of(
-    fault: "Fault", law: "LawOptions", diffusion: float | None, stress: float | None, spread: str
-) -> tuple[Any, dict[str, Any]]:
-    """Law that `design` finds for a fault whose friction has a state, and spread and stress of its campaign.
+@Parameter(name="*", group=_GROUP)
+@dataclass(frozen=True, kw_only=True)
+class SpreadOptions:
+    """What varies in a campaign of such a fault.
 
-    It is designed for the nominal normal stress, stiffness and damping, whatever the box of the campaign.
+    Parameters
+    ----------
+    spread
+        Held in slow sliding by the e-LQR that design finds: by how much of their values a, b and D_c are off, such as
+        0.1; the effective normal stress, stiffness and damping by the box.
+    stress
+        Bound of a sine of shear stress, such as '25 kPa'; what is proved of the design unless given.
+    stress_period
+        Its period; that of the tide, 12.42 hours, unless given.
     """
-    from quakedesign.rationals import rational
-    from quakedesign.synthesis import design
 
-    _require_designed({"controller": law.controller, "gains": law.gains})
-    off = rational(spread, "spread")
-    found = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=stress, spread=off)
-    if found.controller is None or found.sliding is None:
-        raise ParameterError(f"a campaign needs a law. Received none from design: {found.details['reason']}.")
-    return found.controller, {"spread": off, "stress": float(found.sliding.task.stress)}
+    spread: str = "0"
+    stress: Pascals | None = None
+    stress_period: Seconds | None = None
+
+    def choose(self, fault: "Fault", law: "LawOptions", diffusion: float | None) -> tuple[Any, dict[str, Any]]:
+        """Law of a campaign, and what it is told of spread and stress, which friction without a state does not have.
+
+        With a state it is the law that `design` finds for the nominal normal stress, stiffness and damping, whatever
+        the box of the campaign.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if not fault.friction.state_names:
+            if self != SpreadOptions():
+                raise ParameterError(
+                    f"spread and stress need friction with a state. Received {fault.friction.name}. Leave them out."
+                )
+            chosen = law.choose(fault)
+            return chosen and chosen.controller, {}
+        from quakedesign.rationals import rational
+        from quakedesign.synthesis import design
+
+        _require_designed({"controller": law.controller, "gains": law.gains})
+        off = rational(self.spread, "spread")
+        found = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=self.stress, spread=off)
+        if found.controller is None or found.sliding is None:
+            raise ParameterError(f"a campaign needs a law. Received none from design: {found.details['reason']}.")
+        told = {"spread": off, "stress": float(found.sliding.task.stress)}
+        return found.controller, told | ({} if self.stress_period is None else {"stress_period": self.stress_period})
 
 
 def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str]) -> dict[str, Any]:
