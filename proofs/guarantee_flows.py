@@ -7,7 +7,7 @@ from itertools import pairwise
 from math import ceil
 
 from guarantee_loop import Fade, Loop
-from guarantee_numbers import BITS, Fixed, column, exponentials, fixed
+from guarantee_numbers import BITS, Fixed, column, exponentials, fixed, sums_of_product
 from guarantee_reading import Refused, Row, need
 
 DOUBLINGS = 12  # at most 4096 periods are summed
@@ -124,7 +124,7 @@ class Past:
         once = list(dict.fromkeys(map(tuple, rows.rows)))
         different = Fixed([list(line) for line in once], rows.error)
         rest = ((different * self.far).size() * self.left).size()
-        sums = zip((different * self.columns).sums(), rest.rows, strict=True)
+        sums = zip(sums_of_product(different, self.columns), rest.rows, strict=True)
         found = dict(zip(once, (near + far for near, (far,) in sums), strict=True))
         return [found[tuple(line)] for line in rows.rows]
 
@@ -137,12 +137,12 @@ def past(flows: list[Flow], rows: int) -> Past:
         columns, period = columns.beside(pieces(flow, period)), period * flow.whole
     size = len(period.rows)
     place, seen, back = seen_alone(slowest(period), columns.sums())
-    sums = (seen * columns).sums()
+    sums = sums_of_product(seen, columns)
     for _ in range(DOUBLINGS):
         width = len(columns.rows[0])
         need(2 * width * size * (size + rows) <= MAX_WORK, "the loop must forget its past sooner: it takes too long")
         following = period * columns
-        sums = [a + b for a, b in zip(sums, (seen * following).sums(), strict=True)]
+        sums = [a + b for a, b in zip(sums, sums_of_product(seen, following), strict=True)]
         columns, period = columns.beside(following), period * period
         far = period * back
         left = (seen * far).size()

@@ -1,5 +1,6 @@
 """Matrices of integers in units of 2^-BITS, each with a bound of its error, and their exponentials."""
 
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,6 +11,7 @@ from math import factorial, lcm
 from guarantee_reading import Row, need
 
 BITS = 192
+MANY, COARSE, PLACE = 64, 60, 128  # columns that are multiplied at once, bits of their entries and of a product's place
 LARGEST = 1 << 2 * BITS  # entries beyond 2^BITS
 
 
@@ -64,6 +66,47 @@ class Fixed:
     def sums(self) -> list[int]:
         """Upper bounds of the sums of absolute values, row by row."""
         return [sum(map(abs, line)) + self.error * len(line) for line in self.rows]
+
+
+def sums_of_product(left: Fixed, right: Fixed) -> list[int]:
+    """What `(left * right).sums()` bounds, a little above it: many columns at once, side by side in one long integer.
+
+    Entries are cut to 60 bits, those of `left` row by row; a place has 128 bits, of which the upper half is read. With
+    l = l' + d and r = r' + e a sum of |l*r| is at most that of |l'*r'| and |l'| times all e and d times all |r|.
+    """
+    count, cut = len(right.rows[0]), cut_of(right.rows)
+    if count < MANY or not cut:
+        return (left * right).sums()
+    ones = sum_of_places(count)
+    places = [pack([(v >> cut) + (1 << COARSE + 1) for v in line]) - (ones << COARSE + 1) for line in right.rows]
+    whole = sum(sum(map(abs, line)) + right.error * count for line in right.rows)
+    found = []
+    for line in left.rows:
+        own = cut_of([line])
+        near = [v >> own for v in line]
+        signs = ones << PLACE - 1
+        total = sum(map(int.__mul__, near, places)) + signs ^ signs  # every place for itself, in two's complement
+        halves = struct.unpack(f"<{2 * count}q", total.to_bytes(count * PLACE // 8, "little"))[1::2]
+        coarse = sum(map(abs, halves)) + count << PLACE // 2 + own + cut
+        off = count * ((1 << cut) + right.error) * sum(map(abs, near)) << own
+        found.append((coarse + off + ((1 << own) + left.error) * whole >> BITS) + 1)
+    return found
+
+
+def cut_of(rows: list[list[int]]) -> int:
+    """How many bits the largest entry has beyond COARSE."""
+    return max(max(*map(max, rows), ~min(map(min, rows))).bit_length() - COARSE, 0)
+
+
+def pack(values: list[int]) -> int:
+    """Integers of 64 bits, each at the beginning of its place."""
+    return int.from_bytes(struct.pack(f"<{2 * len(values)}Q", *chain.from_iterable((v, 0) for v in values)), "little")
+
+
+@lru_cache(maxsize=64)
+def sum_of_places(count: int) -> int:
+    """1 at every place."""
+    return pack([1] * count)
 
 
 def bounded(value: Fixed) -> Fixed:

@@ -671,3 +671,48 @@ def test_of_a_disturbance_of_bounded_rate_what_the_gains_range_leaves_counts():
     loop = checker.Loop([], [([], one)], [], [[], []], None, one)
     found = [[[one], [zero], [zero]], [[zero], [zero], [zero]]]
     assert checker.of_class(task, loop, found)[0] == [3, 0, 3]
+
+
+def entries(random, height, width, bits):
+    """Signed, some of them extreme."""
+    most = 1 << bits
+    return [
+        [random.choice([random.randint(-most, most), -most, most - 1, 0]) for _ in range(width)] for _ in range(height)
+    ]
+
+
+@pytest.mark.parametrize(("count", "error"), [(63, 0), (64, 0), (64, 1), (200, 5), (200, 1 << 120)])
+@pytest.mark.parametrize("bits", [(2, 190), (59, 60), (60, 61), (150, 100), (190, 192), (200, 191)])
+def test_sums_of_many_columns_at_once_are_above_those_that_are_true_and_just_above(count, error, bits):
+    """Against exact sums for the worst true entries: each entry `error` farther from 0, all products of one sign."""
+    random = Random(count + bits[0])
+    left = checker.Fixed(entries(random, 3, 20, bits[0]), error)
+    right = checker.Fixed(entries(random, 20, count, bits[1]), 2 * error)
+    found = checker.sums_of_product(left, right)
+    for row, value in zip(left.rows, found, strict=True):
+        columns = list(zip(*right.rows, strict=True))
+        plain = sum(abs(sum(map(int.__mul__, row, column))) for column in columns)
+        off = sum(
+            error * abs(v) + 2 * error * abs(u) + 2 * error**2
+            for column in columns
+            for u, v in zip(row, column, strict=True)
+        )
+        assert plain + off <= value << checker.BITS
+        read = sum(max(bits + 1 - 60, 0) for bits in bits)  # what is cut off, with half of every place
+        assert value << checker.BITS <= plain + 2 * off + 64 * count * (1 << 64 + read) + (4 * count << checker.BITS)
+
+
+@pytest.mark.parametrize("states", [1, 100])
+def test_all_that_is_cut_off_counts(states):
+    """Of 100 states what is cut off the entries is most; of one, whose entries lose nothing, half of every place."""
+    random, much = Random(1), (1 << 192) - 1
+    left = [much] * states if states > 1 else [((1 << 60) - 1) << 2]
+    right = [much] * 99 if states > 1 else [random.randint(1 << 59, (1 << 60) - 1) << 132 for _ in range(99)]
+    (found,) = checker.sums_of_product(checker.Fixed([left]), checker.Fixed([right] * states))
+    assert sum(left) * sum(right) <= found << checker.BITS <= sum(left) * sum(right) * F(10**6 + 1, 10**6)
+
+
+def test_columns_that_nothing_is_in_add_nothing():
+    many = checker.Fixed([[0] * 99 for _ in range(3)])
+    assert checker.sums_of_product(checker.Fixed([[1 << 192] * 3]), many) == [99 * 2]
+    assert checker.sums_of_product(checker.Fixed([[0] * 3]), checker.Fixed([[1 << 192] * 99] * 3))[0] < 1 << 20
