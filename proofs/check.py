@@ -34,13 +34,14 @@ IMPORTS = {
         *("guarantee_reading", "guarantee_numbers"),
         *("guarantee_loop", "guarantee_flows", "guarantee_gains"),
     ),
+    "guarantee_layer": ("guarantee_reading", "guarantee_loop", "guarantee_gains", "guarantee_start"),
     "guarantee_slow": (
         *("guarantee_reading", "guarantee_task"),
-        *("guarantee_loop", "guarantee_gains", "guarantee_start"),
+        *("guarantee_loop", "guarantee_gains", "guarantee_layer"),
     ),
     "guarantee_bounds": (
         *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_slow"),
+        *("guarantee_loop", "guarantee_layer", "guarantee_slow"),
     ),
     "guarantee": (
         *("guarantee_reading", "guarantee_task", "guarantee_root"),

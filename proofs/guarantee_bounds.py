@@ -4,10 +4,11 @@ from dataclasses import replace
 from fractions import Fraction
 from math import ceil
 
+from guarantee_layer import loop_gains
 from guarantee_loop import Loop
 from guarantee_numbers import BITS
 from guarantee_reading import Refused, Row, need, upper
-from guarantee_slow import Slow, all_gains, slow_gains
+from guarantee_slow import Slow, slow_gains
 from guarantee_task import Task
 
 ONE_OVER_E = Fraction(3679, 10000)  # from above
@@ -22,7 +23,7 @@ def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fr
     if slow:
         off = (task.beta[1] - task.beta[0]) / (2 * slow.parts) + 2 * task.slope_of_beta * slip
         spread = off, task.slope_of_beta * task.reference_rate * ONE_OVER_E / slow.growth
-    found = slow_gains(task, loop, slow) if slow else all_gains(loop)
+    found = slow_gains(task, loop, slow) if slow else loop_gains(loop, sum(task.beta) / 2)
     proved, refusals = [], []
     for one in [task] if task.change is None else [task, replace(task, change=None)]:
         try:
@@ -59,15 +60,16 @@ def of_class(
     if len(loop.outputs) > 3:  # the last one bounds what the modes of a layer leave out
         shares = [[*share, Fraction(0)] for share in shares]
         if loop.fade:
-            own.append(Fraction(0))
             shares.append([Fraction(0)] * 4)
-        shares[-1 if loop.fade else 0][3] = task.beta[1]
+        shares[-1 if loop.fade else 0][3] = half[2]  # it acts as b(p - p*) does, in the small gain
+        shares += [[*[Fraction(0)] * 3, Fraction(1)]] * 2  # what is awaited, and told of it
+        own += [Fraction(0)] * (len(shares) - len(own))
     if loop.start:
         own.append(Fraction(1))
         shares.append([Fraction(0)] * len(loop.outputs))
     if spread:
         own.append(Fraction(0))
-        shares.append([Fraction(0), Fraction(0), spread[1], *[Fraction(0)] * (len(loop.outputs) - 3)])
+        shares.append([Fraction(0), Fraction(0), *[spread[1]] * (len(loop.outputs) - 2)])
     peaks, small = peaks_of(found, own, shares)
     return [peaks[0], peaks[1], sum(peaks[2:]) + shifted], small
 

@@ -30,6 +30,11 @@ class Fade:
     rate: Fraction
     floor: Fraction
 
+    def weight(self, time: Fraction) -> Fraction:
+        """What is left after a time, at most: e^x is larger than the first terms of its sum."""
+        x = self.rate * time
+        return self.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24) + self.floor
+
 
 @dataclass
 class Loop:
@@ -38,8 +43,8 @@ class Loop:
     The first two inputs flow; those of the implicit step and of the noise, if there are any, enter with the first
     event. `noise` bounds what the measured e1 and e2 are off, an input each where it is not 0. Without events there may
     be two inputs more, the second and third derivatives of the reference.
-    With a layer of rock a fourth output bounds what its modes leave out; where `fade` is given, that is one more
-    input, the last one. `start` has the columns of the box from which it starts, none where that is rest.
+    With a layer of rock, L^2/D = `layer`, a fourth output bounds what its modes leave out; where `fade` is given, that
+    is one more input, the last one. `start` has the columns of the box from which it starts, none where that is rest.
     """
 
     flow: list[Row]
@@ -52,6 +57,7 @@ class Loop:
     cuts: Sequence[Fraction] = field(default_factory=lambda: EVEN)
     past_cuts: Sequence[Fraction] = field(default_factory=lambda: EVEN)
     fade: Fade | None = None
+    layer: Fraction = Fraction(0)
     start: list[Row] = field(default_factory=list)
 
 
@@ -189,7 +195,7 @@ def with_left_out(loop: Loop, law: Held) -> Loop:
     """The loop with a bound of what the modes of a layer leave out: of the well's flow, or fading after its steps."""
     size, time, high = law.size, law.diffusion, abs(mode_share(MODES))
     rate, floor = mode_rate(MODES, time), 6 * MODES * SHORT
-    cut = replace(loop, cuts=BENT, past_cuts=HALVES)
+    cut = replace(loop, cuts=BENT, past_cuts=HALVES, layer=time)
     if law.lag > 0:
         left = (high / rate + floor * time) / law.lag
         return replace(cut, outputs=[*loop.outputs, [left * v for v in unit(size)[law.well]]])

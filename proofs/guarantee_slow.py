@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import chain
 from typing import Any
 
-from guarantee_gains import gains, input_gains
+from guarantee_gains import gains
+from guarantee_layer import loop_gains, without_area
 from guarantee_loop import Loop
 from guarantee_reading import keys, need, number
-from guarantee_start import start_gains
 from guarantee_task import Task
 
 MAX_PARTS = 16  # of the range of a slow input gain
@@ -37,20 +38,13 @@ def with_gain(loop: Loop, gain: Fraction, growth: Fraction) -> Loop:
     return replace(loop, flow=flow)
 
 
-def all_gains(loop: Loop) -> list[list[list[Fraction]]]:
-    """Gains of every input, and of the start where that is not rest."""
-    return [*input_gains(loop), *([start_gains(loop)] if loop.start else [])]
-
-
 def slow_gains(task: Task, loop: Loop, slow: Slow) -> list[list[list[Fraction]]]:
     """Gains of every input, and of one more, the past of what enters as the first, one part after another."""
     width = (task.beta[1] - task.beta[0]) / slow.parts
-    count = len(loop.inputs) + bool(loop.start) + 1
-    total: list[list[list[Fraction]]] = [[[] for _ in loop.outputs] for _ in range(count)]
+    parts = []
     for part in range(slow.parts):
         gain = task.beta[0] + (2 * part + 1) * width / 2
         steady, grown = (with_gain(loop, gain, growth) for growth in (Fraction(0), slow.growth))
-        for whole, found in zip(total, [*all_gains(steady), gains(grown, loop.inputs[0], False)], strict=True):
-            for line, values in zip(whole, found, strict=True):
-                line += values
-    return total
+        grown = without_area(grown, gain)[0] if loop.layer else grown
+        parts.append([*loop_gains(steady, gain), gains(grown, loop.inputs[0], False)])
+    return [[list(chain(*lines)) for lines in zip(*of, strict=True)] for of in zip(*parts, strict=True)]

@@ -11,7 +11,7 @@ from typing import Any
 
 from guarantee_bounds import peaks_of
 from guarantee_gains import gains
-from guarantee_loop import Fade, Loop, read_loop
+from guarantee_loop import Loop, read_loop
 from guarantee_numbers import unit
 from guarantee_reading import Row, exact, inside, keys, lower, need, number, numbers, row, upper
 from guarantee_task import FAULT, Task
@@ -251,12 +251,6 @@ def since_step(loop: Loop) -> Row:
     ]
 
 
-def weight(fade: Fade, time: Fraction) -> Fraction:
-    """What is left of a step after a time."""
-    x = fade.rate * time
-    return fade.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24) + fade.floor
-
-
 def found_gains(loop: Loop, cell: Cell, times: Row, late: Fraction) -> list[list[Row]]:
     """Gains by input, output and piece, with what adds at once, and those before a step soon after it."""
     noisy = len(loop.inputs) - 1 - bool(loop.fade) if cell.path.noise else None
@@ -271,7 +265,7 @@ def found_gains(loop: Loop, cell: Cell, times: Row, late: Fraction) -> list[list
                 lines[k] = [v + once[k] for v in lines[k]]
             if place == fades and loop.fade:
                 size = middle(cell.mu) * once[k]
-                lines[k] = [v + size * weight(loop.fade, t) for v, t in zip(lines[k], times, strict=True)]
+                lines[k] = [v + size * loop.fade.weight(t) for v, t in zip(lines[k], times, strict=True)]
             lines[k] = [lines[k][last] if t < late else v for v, t in zip(lines[k], times, strict=True)]
         found.append(lines)
     return found
@@ -301,7 +295,7 @@ def bounds(plain: Loop, cell: Cell, valve: int) -> tuple[dict[str, Fraction], Fr
     """What follows from the claims on one cell, and the small gain."""
     loop = around(plain, cell, valve)
     times = since_step(loop)
-    late = min((t for t in times if loop.fade and weight(loop.fade, t) <= FADED), default=Fraction(0))
+    late = min((t for t in times if loop.fade and loop.fade.weight(t) <= FADED), default=Fraction(0))
     found, more = found_gains(loop, cell, times, late), cell.soon(late)
     own, shares = shares_of(loop, cell)
     own = [v + sum(c * m for c, m in zip(share, more, strict=False)) for v, share in zip(own, shares, strict=True)]

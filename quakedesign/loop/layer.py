@@ -52,3 +52,13 @@ class Layer:
     def left_out_in_all(self) -> Fraction:
         """Bound of ∫|E| [s]."""
         return abs(self.share(MODES)) / self.rate(MODES) + 6 * MODES * _SHORT * self.time
+
+    @property
+    def area(self) -> Fraction:
+        """A = −∫E [s], exactly; see `known_area`."""
+        return self.time / 2 - sum((self.share(n) / self.rate(n) for n in range(MODES)), Fraction(0))
+
+    @property
+    def awaited_in_all(self) -> Fraction:
+        """Bound of ∫|F| [s²], F(t) = −∫E from t on."""
+        return abs(self.share(MODES)) / self.rate(MODES) ** 2 + 6 * MODES * _SHORT * self.time**2

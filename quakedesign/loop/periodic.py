@@ -55,6 +55,11 @@ class Fading:
     rate: Fraction
     floor: Fraction
 
+    def weight(self, time: Fraction) -> Fraction:
+        """Bound of |w|/W a time θ [s] after the jump: e^x is more than the first terms of its sum."""
+        x = self.rate * time
+        return self.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24) + self.floor
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PeriodicLoop:
@@ -76,6 +81,8 @@ class PeriodicLoop:
         j_i by the name of an input that adds j_i·w_i to the state once a period, with the jump of the first segment.
     fading : dict of str to Fading
         Inputs of which only what a jump leaves is known.
+    at_once : dict of (str, str) to Fraction
+        What an input of size 1 adds to an output at the same instant, besides, at most; by (output, input).
     start : tuple of tuple of Fraction
         Columns s_i of the box from which it starts: x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, before the first jump; none for 0.
     """
@@ -87,6 +94,7 @@ class PeriodicLoop:
     outputs: dict[str, Row]
     sampled: dict[str, Row] = field(default_factory=dict)
     fading: dict[str, Fading] = field(default_factory=dict)
+    at_once: dict[tuple[str, str], Fraction] = field(default_factory=dict)
     start: tuple[Row, ...] = ()
 
     def __hash__(self) -> int:

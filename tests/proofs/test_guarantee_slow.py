@@ -274,26 +274,31 @@ def test_the_spread_is_asked_for_by_hand(monkeypatch):
     task = replace(_task_by_hand(), slope_of_beta=F(5), reference_rate=F(7), beta=(F(1), F(3)), change=None)
     slow, asked = checker.Slow(4, F(1, 11)), []
     monkeypatch.setattr(checker, "slow_gains", lambda *_: "slow")
-    monkeypatch.setattr(checker, "all_gains", lambda _: "jumping")
+    loop = checker.Loop([], [], [], [], None, F(0))
+    monkeypatch.setattr(checker, "loop_gains", lambda _loop, gain: ("jumping", gain))
     monkeypatch.setattr(checker, "of_class", lambda _t, _l, *given: asked.append(given) or ([F(1)] * 3, F(1, 2)))
     for given in ((slow, F(1, 13)), (slow,), ()):
-        assert checker.bounds(task, None, *given) == ([1, 1, 1], F(1, 2))
+        assert checker.bounds(task, loop, *given) == ([1, 1, 1], F(1, 2))
     aged = 5 * 7 * 11 * F(ceil(10**4 * exp(-1)), 10**4)
-    assert asked == [("slow", (F(1, 4) + F(10, 13), aged)), ("slow", (F(1, 4), aged)), ("jumping", None)]
+    assert asked == [("slow", (F(1, 4) + F(10, 13), aged)), ("slow", (F(1, 4), aged)), (("jumping", 2), None)]
 
 
 @pytest.mark.parametrize("outputs", [3, 4])
 @pytest.mark.parametrize("spread", [None, (F(1, 3), F(1, 5))])
 def test_the_inputs_solve_what_the_outputs_make_of_them(outputs, spread):
-    """W = F + S·G·W in floats, for gains by hand; the fourth output is what the modes of a layer leave out."""
+    """W = F + S·G·W in floats, for gains by hand; the fourth output is what the modes of a layer leave out.
+
+    That counts as v does, also in what is past, and wholly in what is awaited of it and told.
+    """
     task, layer = _task_by_hand(), [0] * (outputs - 3)
-    inputs = 2 + (spread is not None)
+    inputs = 2 + (spread is not None) + 2 * len(layer)
     found = [[[F(1, 30 + 7 * k + 3 * y * y)] for y in range(outputs)] for k in range(inputs)]
     gains = np.array([[float(found[k][y][0]) for k in range(inputs)] for y in range(outputs)])
     push = spread[0] if spread else F(1)
-    shares = [[1 / 2, 3 / 2, float(push), *(3 for _ in layer)], [0, 0, 0, *layer]]
-    shares += [[0, 0, float(spread[1]), *layer]] if spread else []
-    own = np.array([2 + 1 / 2, 3, 0][:inputs])
+    shares = [[1 / 2, 3 / 2, float(push), *(float(push) for _ in layer)], [0, 0, 0, *layer]]
+    shares += [[0, 0, 0, 1]] * 2 if layer else []
+    shares += [[0, 0, float(spread[1]), *(float(spread[1]) for _ in layer)]] if spread else []
+    own = np.array([2 + 1 / 2, 3, 0, 0, 0][:inputs])
     peaks = gains @ np.linalg.solve(np.eye(inputs) - np.array(shares, float) @ gains, own)
     loop = checker.Loop([], [([], F(1))], [[]] * outputs, [[]] * 2, None, F(1))
     (slip, rate, total), _ = checker.of_class(task, loop, found, spread)

@@ -29,6 +29,8 @@ the trapezoidal sum. Of the flow since the last jump, a piece that has passed ad
 − α)²/8·Ω·max|cA²e^{Aσ}b| of its chord, and Ω′ times the largest slope; the piece in which θ lies adds at most
 Ω·max|ce^{Aσ}b|. Since e^{−x} ≤ 1/(1 + x + x²/2 + x³/6 + x⁴/24) = E(x), the weight he^{−λθ} + f has Ω = hE(λα)·min(1/λ,
 ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
+
+**At once.** What an input of size 1 adds to an output at the same instant is added to the gain, whatever its weight.
 """
 
 from dataclasses import dataclass, replace
@@ -86,7 +88,7 @@ def _norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
             bounds |= {
                 (output, name): tuple(map(upper, worst)) for output, worst in zip(loop.outputs, gains, strict=True)
             }
-        return bounds
+        return bounds | {key: tuple(v + size for v in bounds[key]) for key, size in loop.at_once.items()}
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.certificates.guarantee.theorem import Bounds, Gains, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.loop import NOISES, LinearLaw, Model, PeriodicLoop, held_loop, starts
+from quakedesign.loop import NOISES, Layer, LinearLaw, Model, PeriodicLoop, held_loop, starts, with_known_area
 from quakedesign.rationals import six_digits
 
 if TYPE_CHECKING:
@@ -129,6 +129,9 @@ class Held:
         """Nominal error loop on a task, of its model or another one."""
         times = {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
         loop = held_loop(self.law, model or task.model, task.authority, self.step, **times, noisy=self.noise)
+        if self.diffusion:
+            gain = (model or task.model).gain / task.authority
+            loop = with_known_area(loop, gain, Layer(time=self.diffusion))
         box = starts(self.law, len(loop.states), self.start, (self.slip_noise, self.rate_noise))
         return replace(loop, start=box)
 

@@ -49,9 +49,12 @@ e^{ασ} times as large. All gains are the largest over the parts. E is the clai
 the bound that follows: e1 is continuous and below E at first, so it never reaches E. ∎
 
 **Layer between well and fault.** Its pressure is that of its modes, v, and what they leave out, R, |R| ≤ sup|y| with
-the output y = ``left_out`` (`quakedesign.loop.layer`), so β(v + R) brings βR into e2′ beside a. Where the well's
-pressure moves, a takes it, with c = max β for y. Where it steps, R fades after every step, and βR is an input of its
-own, at most max β·sup|y| times its weight. ∎
+the output y = ``left_out`` (`quakedesign.loop.layer`). Of β(v + R) the loop has β0·v and what is known of β0·R, with
+x2 = e2 − β0Y in place of e2 (`quakedesign.loop.known_area`). So (β − β0)R comes into x2′ beside a, with the c of v for
+y: where the well's pressure moves, within a; where it steps, R fades after every step and is an input of its own. What
+is past of a slow gain takes R as it takes v, with the same c. Two inputs more, F = 0 and c = 1 for y, are ``awaited``,
+β0Y in e1′ and x2′, and ``awaited_told``, what the law is told of it, as of noise, at the samples: e2 is measured, not
+x2. A bound of e2 is one of x2 and one of β0Y: the gain of ``awaited`` and what that adds at once. ∎
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -79,9 +82,8 @@ _WORDS = {
     ("aged", "push"): "change of the input gain",
     ("drift", "slip_rate_error"): "drift that the input gain makes of the disturbance",
     ("root", "slip_error"): "range of the implicit step's slope",
-    ("acceleration", "left_out"): "what the modes of the layer leave out",
-    ("left_out", "left_out"): "what the modes of the layer leave out",
 }
+_LEFT_OUT = "what the modes of the layer leave out"
 _HALVINGS = 96
 
 
@@ -207,7 +209,8 @@ def bounds_from(
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
     channels = (*channels_of(task, root, step, noise, spread), *_beside(task, {name for _, name in gains}))
-    channels = tuple(_through_layer(task, channels, gains))
+    if ("push", "awaited") in gains:
+        channels = tuple(_through_layer(channels, gains))
     small_gain, found = channel_bounds(channels, gains)
     if found is None:
         return _none(small_gain, channels, gains)
@@ -276,14 +279,17 @@ def _beside(task: Task, names: Collection[str]) -> Iterator[Channel]:
         yield Channel(name=START, own=Fraction(1), shares={})
 
 
-def _through_layer(task: Task, channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
-    """Inputs of a loop through a layer: what its modes leave out, by itself or within the acceleration."""
-    fades, share = ("left_out", "left_out") in gains, {"left_out": task.beta[1]}
+def _through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
+    """Inputs of a loop through a layer: what its modes leave out acts as v does, by itself where it fades."""
+    fades = ("left_out", "left_out") in gains
     for channel in channels:
-        within = channel.name == "acceleration" and not fades and ("left_out", channel.name) in gains
-        yield replace(channel, shares={**channel.shares, **share}) if within else channel
-    if fades:
-        yield Channel(name="left_out", own=_ZERO, shares=share)
+        share = {"left_out": channel.shares["push"]} if "push" in channel.shares else {}
+        if fades and channel.name == "acceleration":
+            yield from (channel, Channel(name="left_out", own=_ZERO, shares=share))
+        else:
+            yield replace(channel, shares={**channel.shares, **share})
+    for name in ("awaited", "awaited_told"):
+        yield Channel(name=name, own=_ZERO, shares={"left_out": Fraction(1)})
 
 
 def spectral_radius(matrix: Sequence[Sequence[Any]]) -> Any:
@@ -348,6 +354,7 @@ def _unshifted(task: Task) -> Fraction:
 def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoGuarantee:
     alone = {(i.name, y): c * max(gains[y, i.name]) for i in channels for y, c in i.shares.items()}
     (name, share), whole = max(alone.items(), key=lambda item: item[1]), UpperBound(small_gain)
+    what = _WORDS.get(name, _LEFT_OUT)
     return NoGuarantee(
-        reason=f"small gain {whole:.3g}: the {_WORDS[name]} alone needs {UpperBound(share):.2g}", small_gain=whole
+        reason=f"small gain {whole:.3g}: the {what} alone needs {UpperBound(share):.2g}", small_gain=whole
     )

@@ -52,7 +52,7 @@ from quakedesign.certificates.guarantee.statement import Held
 from quakedesign.certificates.guarantee.theorem import Channel, Gains, NoGuarantee, channel_bounds
 from quakedesign.certificates.slow_sliding.task import Range, SlidingTask
 from quakedesign.errors import ParameterError
-from quakedesign.loop import Fading, PeriodicLoop, SlidingModel, at_once, sliding_loop
+from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop
 
 _TERMS = 24  # of Taylor's series
 _LARGEST = 3  # logarithm of a ratio: beyond that nothing is slow sliding
@@ -317,13 +317,7 @@ def after_a_step(loop: PeriodicLoop) -> tuple[Fraction, ...]:
 def settled(loop: PeriodicLoop) -> Fraction:
     """The first of these times at which what is left out has faded to a sixteenth [s]; 0 where it does not."""
     times = sorted(after_a_step(loop))
-    return next((t for t in times for fading in loop.fading.values() if _weight(fading, t) <= _FADED), _ZERO)
-
-
-def _weight(fading: Fading, time: Fraction) -> Fraction:
-    """What is left a time [s] after a step."""
-    x = fading.rate * time
-    return fading.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24) + fading.floor
+    return next((t for t in times for fading in loop.fading.values() if fading.weight(t) <= _FADED), _ZERO)
 
 
 def _with_what_adds_at_once(
@@ -335,7 +329,7 @@ def _with_what_adds_at_once(
         if name in loop.inputs:
             found[output, name] = tuple(v + size for v in gains[output, name])
         elif name in loop.fading:
-            weights = (_weight(loop.fading[name], time) for time in phases)
+            weights = (loop.fading[name].weight(time) for time in phases)
             found[output, name] = tuple(v + size * w for v, w in zip(gains[output, name], weights, strict=True))
     return found
 

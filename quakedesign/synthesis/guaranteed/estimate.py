@@ -80,7 +80,7 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
     gains = {name: _of_input(entry, flows, doublings, rows, enters, slowest) for name, entry, enters in _entries(loop)}
     gains |= {START: _free(np.array(loop.start, dtype=float).T, flows, doublings, rows)} if loop.start else {}
     return {
-        (output, name): tuple(map(float, found))
+        (output, name): tuple(float(v + loop.at_once.get((output, name), 0)) for v in found)
         for name, of in gains.items()
         for output, found in zip(loop.outputs, of, strict=True)
     }

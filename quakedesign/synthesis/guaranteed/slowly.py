@@ -12,7 +12,7 @@ from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, Slo
 from quakedesign.loop import PeriodicLoop
 from quakedesign.synthesis.guaranteed.rounding import short
 
-_PARTS, _PARTS_OF_LAYERS = 8, 12  # where a layer leaves little room
+_PARTS = 8
 _SHARE = 0.5  # of the slowest decay, for what is past to grow by
 
 
@@ -42,7 +42,7 @@ def slow_gain(task: Task, held: Held) -> SlowGain | None:
     """Parts and growth for a proof; None where friction depends on the slip rate or a nominal loop is not stable."""
     if task.friction.rate_slope:
         return None
-    parts = SlowGain(parts=_PARTS_OF_LAYERS if held.diffusion else _PARTS, growth=Fraction(1))
+    parts = SlowGain(parts=_PARTS, growth=Fraction(1))
     decay = min(_decay(held.loop(task, model)) for model in parts.models(task))
     return replace(parts, growth=short(_SHARE * decay, 2)) if decay > 0 else None
 

@@ -104,26 +104,48 @@ def test_a_response_that_changes_sign_adds_up_its_size():
 
 @pytest.mark.parametrize("fades", [True, False])
 def test_what_is_left_out_comes_back_through_the_fault_in_both(fades, monkeypatch):
-    """W = F + MW by hand in floats: max β times the output left_out enters by itself, or within the acceleration."""
+    """W = F + MW by hand in floats: half of β's range times the output left_out by itself, or within the acceleration.
+
+    What is awaited and what the law is told of it are at most that output.
+    """
     raw = json.loads(FILE.read_text())
     task, read = parse_guarantee(FILE.read_text()).task, checker.read_task(raw)
     outputs = ("slip_error", "slip_rate_error", "push", "left_out")
     table = {"acceleration": ("1/20", "2/5", 2, "1/4"), "drift": ("1/50", "1/12", "1/2", "1/9")}
     table |= {"left_out": ("1/60", "1/7", "1/3", "1/30")} if fades else {}
+    table |= {"awaited": ("1/9", "1/8", "1/5", "1/11"), "awaited_told": ("1/70", "1/3", "1/40", "1/13")}
     gains = {(y, name): (F(v),) for name, row in table.items() for y, v in zip(outputs, row, strict=True)}
     ours = bounds_from(task, gains, None, F(1))
-    answers, entered = iter([[[F(v)] for v in row] for row in table.values()]), []
-    monkeypatch.setattr(checker, "gains", lambda _loop, _entry, *how: entered.append(how) or next(answers))
     fade = checker.Fade(0, F(1), F(1), F(0)) if fades else None
-    loop = checker.Loop([], [([], F(1))], [[]] * 4, [[]] * len(table), None, F(1), fade=fade)
+    loop = checker.Loop([], [([], F(1))], [[]] * 4, [[]] * (len(table) - 2), None, F(1), fade=fade, layer=F(1))
+    monkeypatch.setattr(checker, "loop_gains", lambda *_: [[[F(v)] for v in row] for row in table.values()])
     (slip, rate, push), _ = checker.bounds(read, loop)
     assert (slip, rate, push) == (ours.slip_error, ours.slip_rate_error, ours.push)
-    assert entered == [(False,), (False,), *[(False, fade)] * fades]
-    half, beta = task.half_ranges, float(task.beta[1])
-    shares = [[float(half[y]) for y in outputs[:3]] + [0.0 if fades else beta], [0.0] * 4]
-    shares += [[0.0, 0.0, 0.0, beta]] if fades else []
+    half = [float(task.half_ranges[y]) for y in outputs[:3]]
+    shares = [[*half, 0.0 if fades else half[2]], [0.0] * 4]
+    shares += [[0.0, 0.0, 0.0, v] for v in ((half[2], 1, 1) if fades else (1, 1))]
     numbers = np.array([[float(F(v)) for v in row] for row in table.values()])
-    own = [float(task.reference_force + task.amplitude), float(task.drift), 0.0][: len(table)]
+    own = [float(task.reference_force + task.amplitude), float(task.drift), 0.0, 0.0, 0.0][: len(table)]
     sizes = np.linalg.solve(np.eye(len(table)) - np.array(shares) @ numbers.T, own)
     peaks = numbers.T @ sizes
     assert np.allclose([float(slip), float(rate), float(push)], [*peaks[:2], peaks[2] + peaks[3]], rtol=1e-9)
+
+
+def test_what_is_awaited_fades_and_counts_at_once_and_what_is_told_is_sampled_in_both(monkeypatch):
+    """Each asks its own gains for the same inputs, in the same order, and adds to that of the slip rate alone."""
+    entered = []
+    monkeypatch.setattr(checker, "gains", lambda *given: entered.append(given[1:]) or [[F(1)]] * 4)
+    flow, rows = checker.zeros(5), checker.unit(5)
+    loop = checker.Loop(
+        flow, [(rows, F(1))], [rows[0], rows[1], rows[2], rows[4]], [rows[1], rows[2], rows[1]], None, F(1),
+        fade=checker.Fade(0, F(1), F(1), F(0)), layer=F(3),
+    )  # fmt: skip
+    found = checker.loop_gains(loop, F(7))
+    moved, awaited = checker.without_area(loop, F(7))
+    assert entered == [
+        (awaited.entry, False, awaited.fade), (awaited.told, True),
+        (rows[1], False), (rows[2], False), (rows[1], False, loop.fade),
+    ]  # fmt: skip
+    assert [[line[0] for line in lines] for lines in found] == [[1] * 4] * 3 + [[1, 1 + awaited.at_once, 1, 1], [1] * 4]
+    assert moved.events[0][0][1] == [0, 1, 0, 0, -7 * checker.area(F(3))]
+    assert awaited.entry == [awaited.at_once, 0, 0, 0, 0]

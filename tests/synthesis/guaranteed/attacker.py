@@ -14,8 +14,9 @@ import numpy as np
 class Held:
     """Numbers of a loop: matrices of the law, b, ranges of s, w and β, T_s, delay, bounds of φ and noise, all in SI.
 
-    For a friction of the slip alone: how much β changes per slip at most, and the reference's rate. The rock's L²/D is
-    zero where the well is at the fault. The law's states begin at 0, or at first times the errors that it is told then.
+    For a friction of the slip alone: how much β changes per slip at most, and the reference's rate. The rock's L²/D, of
+    which so many modes are followed, is zero where the well is at the fault. The law's states begin at 0, or at first
+    times the errors that it is told then.
     """
 
     F: np.ndarray
@@ -34,6 +35,7 @@ class Held:
     slope: float = 0.0
     pace: float = 0.0
     rock: float = 0.0
+    modes: int = 40
     first: object = None
 
 
@@ -60,7 +62,7 @@ def numbers(claim, force=None):
     )
 
 
-def spreading(rock, modes=40):
+def spreading(rock, modes):
     """Rates and shares of the modes of ∂p/∂t = D ∂²p/∂x² with p held at x = 0 and a fault at x = L that nothing passes.
 
     The step response 1 − Σ cₙ exp(−λₙt); what the modes left out would add is there at once.
@@ -87,7 +89,7 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None,
     late = round(held.delay / h)
     e = np.zeros((2, courses)) if start is None else np.array(start, dtype=float)
     z, v = np.zeros((size, courses)), np.zeros(courses)
-    rates, shares = spreading(held.rock) if held.rock else (np.array([np.inf]), np.ones(1))
+    rates, shares = spreading(held.rock, held.modes) if held.rock else (np.array([np.inf]), np.ones(1))
     fade, spread = np.exp(-rates * h / 2)[:, None], np.zeros((len(shares), courses))
     waiting, largest = [], np.abs(e)
     for k in range(periods * pieces):

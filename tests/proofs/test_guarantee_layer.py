@@ -1,0 +1,75 @@
+"""A well behind rock in both checkers: the same gains of the same loop, and claims that are refused by both."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction as F
+from functools import cache
+
+import pytest
+from standalone_guarantee import checker
+
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee import Guarantee, Held, SlowGain, guarantee, task_of
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.guarantee.norms import norms
+from quakedesign.fault import load_fault
+from quakedesign.loop import Prediction, disturbance_estimate
+
+STEP = F("0.184")
+TASK = task_of(load_fault("real-fault"))
+LAW = disturbance_estimate(
+    (F("3.9e8"), F("1.5e8")),
+    F("0.1"),
+    Prediction(of_slip=F("0.07"), of_rate=F("0.752"), of_pushes=(F("0.16"),)),
+    F("2.282e-8"),
+)
+HELD = Held(law=LAW, step=STEP, diffusion=F("0.1"))
+OUTPUTS = ("slip_error", "slip_rate_error", "push", "left_out")
+ORDER = ("acceleration", "drift", "left_out", "awaited", "awaited_told")
+
+
+@cache
+def claim():
+    return guarantee(TASK, HELD, SlowGain(parts=2, growth=F(1, 4)))
+
+
+def document(held=None):
+    one = claim() if held is None else Guarantee(task=TASK, held=held, claims=claim().claims)
+    return json.loads(guarantee_text(one))
+
+
+@pytest.mark.parametrize("around", [{"delay": F("0.03")}, {"lag": F("0.02")}], ids=["delay", "lag"])
+def test_both_find_the_same_gains_through_rock(around):
+    held = replace(HELD, **around)
+    ours = norms(held.loop(TASK))
+    read = checker.read_task(document())
+    theirs = checker.loop_gains(checker.read_loop(document(held)["loop"], read), sum(read.beta) / 2)
+    names = [name for name in ORDER if (OUTPUTS[0], name) in ours]
+    assert len(names) == len(theirs) == len(ours) / len(OUTPUTS) == 5 - ("lag" in around)
+    for name, lines in zip(names, theirs, strict=True):
+        for output, line in zip(OUTPUTS, lines, strict=True):
+            assert [float(v) for v in line] == pytest.approx([float(v) for v in ours[output, name]], rel=1e-6)
+
+
+def test_both_prove_a_loop_through_rock_and_refuse_what_does_not_follow(monkeypatch):
+    """Gains are found once for all claims: they depend on none."""
+    kept, find = [], checker.slow_gains
+    monkeypatch.setattr(checker, "slow_gains", lambda *given: kept[0] if kept else find(*given))
+    raw = document()
+    kept.append(find(task := checker.read_task(raw), checker.read_loop(raw["loop"], task), checker.Slow(2, F(1, 4))))
+    assert claim().check() is Verdict.PROVED
+    assert "rock of distance^2/diffusivity = 1/10 s" in checker.verify(raw)[2]
+    for key in raw["claims"]:
+        forged = document()
+        forged["claims"][key] = str(F(raw["claims"][key]) * F(99, 100))
+        with pytest.raises(checker.Refused, match=rf"the claim {key} must follow|must stay below its claim"):
+            checker.verify(forged)
+        assert parse_guarantee(json.dumps(forged)).check() is Verdict.UNDECIDED
+
+
+def test_a_well_that_is_farther_away_than_the_proof_says_is_refused_by_both():
+    raw = document()
+    raw["loop"]["diffusion"] = "3/10"
+    with pytest.raises(checker.Refused, match=r"the small gain must be below 1|claim"):
+        checker.verify(raw)
+    assert parse_guarantee(json.dumps(raw)).check() is Verdict.UNDECIDED
