@@ -15,7 +15,7 @@ from quakedesign.sos.solve.arrays import Arrays
 from quakedesign.sos.solve.faces import simplest
 from quakedesign.sos.solve.inside import by_value, inwards, lowest_samples
 
-_SEED = 20240607
+_SEED, _STARTS = 20240607, 24
 _FAR = 1e6  # from there on a minimum is taken to be at infinity
 _SIMPLE = (Fraction(0), Fraction(1), Fraction(-1), Fraction(1, 2), Fraction(2))
 
@@ -35,21 +35,19 @@ def polished_zeros(statement: Statement, candidates: Sequence[Sequence[float]]) 
     return zeros
 
 
-def local_minima(
-    statement: Statement, hints: Sequence[Sequence[float]] = (), starts: int = 24
-) -> Iterator[list[float]]:
+def local_minima(statement: Statement, hints: Sequence[Sequence[float]] = ()) -> Iterator[list[float]]:
     """Local minima of the polynomial on the set, from seeded starts; floating point, on ℝⁿ also towards infinity.
 
     On ℝⁿ and orthants the homogenised polynomial is minimised on the sphere (x_i = v_i² where x_i ≥ 0); with other
     constraints SLSQP works in the variables themselves.
     """
     if statement.dense:
-        yield from _on_sphere(statement, hints, starts)
+        yield from _on_sphere(statement, hints)
     else:
-        yield from _constrained(statement, hints, starts)
+        yield from _constrained(statement, hints)
 
 
-def _on_sphere(statement: Statement, hints: Any, starts: int) -> Iterator[list[float]]:
+def _on_sphere(statement: Statement, hints: Any) -> Iterator[list[float]]:
     size = len(statement.variables)
     p = statement.polynomial
     top = degree(p)
@@ -74,7 +72,7 @@ def _on_sphere(statement: Statement, hints: Any, starts: int) -> Iterator[list[f
     random = np.random.default_rng(_SEED)
     begin = [*(_lifted(h, signed, homogeneous) for h in hints)]
     count = size if homogeneous else size + 1
-    begin += [random.standard_normal(count) for _ in range(starts)]
+    begin += [random.standard_normal(count) for _ in range(_STARTS)]
     for v in begin:
         if not float(np.linalg.norm(v)) > 0:
             continue
@@ -103,7 +101,7 @@ def _unit(size: int, index: int) -> Exponents:
     return tuple(int(i == index) for i in range(size))
 
 
-def _constrained(statement: Statement, hints: Any, starts: int) -> Iterator[list[float]]:
+def _constrained(statement: Statement, hints: Any) -> Iterator[list[float]]:
     size = len(statement.variables)
     p = Arrays(statement.polynomial, size)
     limits = [("ineq", Arrays(g, size)) for g in statement.inequalities]
@@ -114,7 +112,7 @@ def _constrained(statement: Statement, hints: Any, starts: int) -> Iterator[list
     yield from lowest
     begin = [
         *map(np.asarray, (*hints, *lowest)),
-        *(random.standard_normal(size) * s for s in (0.3, 1.0, 3.0) for _ in range(starts // 3)),
+        *(random.standard_normal(size) * s for s in (0.3, 1.0, 3.0) for _ in range(_STARTS // 3)),
     ]
     for v in begin:
         try:

@@ -9,10 +9,9 @@ from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
 from quakedesign.controllers import LoopField, Subject, law, model_of
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational, to_sympy
-from quakedesign.sos.solve.joint import Proposal
 from quakedesign.symbolic.terms import Term
-from quakedesign.synthesis.analysis.parametric_program import Sweep
-from quakedesign.synthesis.lyapunov.search import candidate_degrees, find_certificate, finished, refute
+from quakedesign.synthesis.analysis.parametric_program import Sweep, prove
+from quakedesign.synthesis.lyapunov.search import candidate_degrees, find_certificate, refute
 
 Number = str | float | Fraction
 
@@ -70,8 +69,7 @@ def _swept(loop: Loop, subject: Subject) -> Certificate | None:
         except CertificateError:  # no candidates of this degree, or numbers too far apart
             continue
         if answer is not None and answer.found:
-            proposal = Proposal(answer.decision, answer.margin)
-            certificate = finished(loop, sweep.family(answer.frame), proposal, answer.frame.scale, subject)
+            certificate = prove(sweep, loop, answer, subject)
             if certificate is not None:
                 return certificate
     return None

@@ -11,8 +11,8 @@ from quakedesign.certificates.claim import root_enclosure
 from quakedesign.controllers import Subject
 from quakedesign.errors import CertificateError
 from quakedesign.sos.solve.conic import handing_back
-from quakedesign.synthesis.analysis.margins import necessary_limit, prove
-from quakedesign.synthesis.analysis.parametric_program import CLEAR, Sweep
+from quakedesign.synthesis.analysis.margins import necessary_limit
+from quakedesign.synthesis.analysis.parametric_program import CLEAR, Sweep, prove
 from quakedesign.workers import Processes
 
 Place = tuple[int, int]

@@ -9,13 +9,12 @@ from quakedesign.certificates import Certificate, Loop
 from quakedesign.controllers import LoopField, Subject, law
 from quakedesign.errors import ParameterError
 from quakedesign.rationals import rational
-from quakedesign.sos.solve.joint import Proposal
 from quakedesign.symbolic.terms import value as coefficient
 from quakedesign.synthesis.analysis.certify import Number, closed_loop
 from quakedesign.synthesis.analysis.falsification import escape
-from quakedesign.synthesis.analysis.parametric_program import Screened, Sweep
+from quakedesign.synthesis.analysis.parametric_program import Screened, Sweep, prove
 from quakedesign.synthesis.analysis.root_bracketing import TOLERANCE, Bracket, first_below, last_success
-from quakedesign.synthesis.lyapunov.search import candidate_degrees, finished, refute
+from quakedesign.synthesis.lyapunov.search import candidate_degrees, refute
 
 _STEPS_BACK = (Fraction(0), TOLERANCE / 4, TOLERANCE / 2, 10 * TOLERANCE, 100 * TOLERANCE)
 _FAR = Fraction(10) ** 12
@@ -292,12 +291,6 @@ class _Search:
                 if certificate is not None:
                     return x, certificate
         return None
-
-
-def prove(sweep: Sweep, loop: Loop, answer: Screened, subject: Subject | None = None) -> Certificate | None:
-    """Certificate of a screened point, checked in exact arithmetic; None when none could be finished."""
-    family, proposal = sweep.family(answer.frame), Proposal(answer.decision, answer.margin)
-    return finished(loop, family, proposal, answer.frame.scale, subject)
 
 
 def _chosen(degrees: int | Iterable[int] | None, loop: Loop) -> tuple[int, ...]:

@@ -15,14 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from quakedesign.certificates import Loop
+from quakedesign.certificates import Certificate, Loop
+from quakedesign.controllers import Subject
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.polynomial import monomial
+from quakedesign.sos.solve.joint import Proposal
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.synthesis.analysis.parametric_cones import Cones
 from quakedesign.synthesis.lyapunov.balancing import balance, exponents_of, lifted_scale
 from quakedesign.synthesis.lyapunov.parametric_forms import ends_of, rows_of, values_of
-from quakedesign.synthesis.lyapunov.search import Family
+from quakedesign.synthesis.lyapunov.search import Family, finished
 
 ACCURACY = 1e-10
 """What the solver is asked for unless told."""
@@ -176,6 +178,12 @@ class Sweep:
             for i, name in enumerate(names):
                 slopes[name] += slope * _product(values, (*names[:i], *names[i + 1 :]))
         return slopes
+
+
+def prove(sweep: Sweep, loop: Loop, answer: Screened, subject: Subject | None = None) -> Certificate | None:
+    """Certificate of a screened point, checked in exact arithmetic; None when none could be finished."""
+    family, proposal = sweep.family(answer.frame), Proposal(answer.decision, answer.margin)
+    return finished(loop, family, proposal, answer.frame.scale, subject)
 
 
 class _Numbers:

@@ -22,6 +22,8 @@ from quakedesign.synthesis.gains.setting import Setting, State
 from quakedesign.synthesis.lyapunov.balancing import balance
 from quakedesign.synthesis.lyapunov.decay_rate import box, on_box, pace_of
 
+_ROUNDS = 100  # programmes of steps to solve at most
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrustRegion:
@@ -87,7 +89,7 @@ def _digits(number: float) -> Fraction:
     return Fraction(f"{number:.4g}")
 
 
-def climb(setting: Setting, state: State, *, free: bool = True, until: float | None = None, rounds: int = 100) -> Any:
+def climb(setting: Setting, state: State, *, free: bool = True, until: float | None = None) -> Any:
     """States in the order in which they were found, each better than the one before; the given one first.
 
     Parameters
@@ -98,8 +100,6 @@ def climb(setting: Setting, state: State, *, free: bool = True, until: float | N
         Whether the gains may move.
     until : float, optional
         Level at which to stop.
-    rounds : int
-        Programmes of steps to solve at most.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def climb(setting: Setting, state: State, *, free: bool = True, until: float | N
     """
     states, share, centred = [state], TRUST.initial, None
     objective = setting.objective
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         if until is not None and not objective.better(until, state.level):
             break
         if share < TRUST.least:

@@ -141,9 +141,7 @@ def sampling(
     )
 
 
-def synthesise_sampled(
-    trial: Sampling, *, degrees: Iterable[int] | None = None, rounds: int = 80, compare: bool = True
-) -> Synthesis | None:
+def synthesise_sampled(trial: Sampling, *, degrees: Iterable[int] | None = None, rounds: int = 80) -> Synthesis | None:
     """Find base gains with a proof for |h'| ≤ 1 and a range of β whose sampled run errs least.
 
     By the method of Nelder and Mead on the logarithms of the gains, from the gains of the smallest norm and from the
@@ -157,8 +155,6 @@ def synthesise_sampled(
         Of V, as for `synthesise`; the search itself uses the last.
     rounds : int
         Simulations at most.
-    compare : bool
-        Whether to tell the errors of the gains from the literature, too.
 
     Returns
     -------
@@ -189,7 +185,7 @@ def synthesise_sampled(
             certificate=certificate,
             value=error,
             norm=scaled_norm(loop, asked.setting.exponents),
-            compared=tuple(replace(c, ratio=c.value and c.value / error) for c in known) if compare else (),
+            compared=tuple(replace(c, ratio=c.value and c.value / error) for c in known),
         )
     return None
 

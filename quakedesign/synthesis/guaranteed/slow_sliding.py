@@ -49,25 +49,25 @@ _DIGITS, _SHORT = 6, 3
 _AXES = ("direct_effect", "evolution_effect", "critical_slip")
 
 
-def proved_sliding(task: SlidingTask, held: Held, log_rate: Fraction = LOG_RATE) -> SlidingGuarantee | NoGuarantee:
+def proved_sliding(task: SlidingTask, held: Held) -> SlidingGuarantee | NoGuarantee:
     """Cells and claims for a law, or why there are none."""
-    claims = _claims(worst_corner(task), held, log_rate)
+    claims = _claims(worst_corner(task), held)
     if claims is None:
-        return NoGuarantee(reason=_too_much(task, log_rate), small_gain=None)
+        return NoGuarantee(reason=_too_much(task), small_gain=None)
     try:
         cuts = _cut(task, held, claims, [MOST_CELLS])
     except ParameterError:
-        return NoGuarantee(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box", small_gain=None)
+        return NoGuarantee(reason=f"{_too_much(task)} in {MOST_CELLS} cells of the box", small_gain=None)
     return SlidingGuarantee(task=task, held=held, cuts=cuts, claims=claims)
 
 
-def largest_stress(task: SlidingTask, held: Held, log_rate: Fraction = LOG_RATE) -> Fraction:
+def largest_stress(task: SlidingTask, held: Held) -> Fraction:
     """About the largest stress [Pa] for which `proved_sliding` may succeed, with two digits; 0 for none."""
     corner = worst_corner(task)
-    claims, some = _guess(corner, log_rate), _SMALL * corner.ranges["normal_stress"][0]
+    claims, some = _guess(corner), _SMALL * corner.ranges["normal_stress"][0]
     found = [_estimate(replace(corner, stress=stress), held, claims) for stress in (Fraction(0), some)]
     rest, more = (0.0 if one is None else float(one["log_rate"]) for one in found)
-    room = (1 if corner == task else _NEAR) * _NEAR * float(log_rate) - rest
+    room = (1 if corner == task else _NEAR) * _NEAR * float(LOG_RATE) - rest
     if None in found or room <= 0:
         return Fraction(0)
     return two_digits(Fraction(float(some) * room / (more - rest)))
@@ -79,12 +79,10 @@ def two_digits(value: Fraction) -> Fraction:
     return floor(value / scale) * scale
 
 
-def designed_sliding(
-    task: SlidingTask, step: Fraction, *, log_rate: Fraction = LOG_RATE, **around: Unpack[Around]
-) -> Held | NoGuarantee:
+def designed_sliding(task: SlidingTask, step: Fraction, **around: Unpack[Around]) -> Held | NoGuarantee:
     """The law whose estimated bounds are smallest at the most unstable corner of the box."""
     corner = worst_corner(task)
-    claims = _guess(corner, log_rate)
+    claims = _guess(corner)
 
     def held(x: np.ndarray) -> Held | None:
         law = _law(corner, task, step, around, x)
@@ -99,7 +97,7 @@ def designed_sliding(
         if radius > _FORGETTING:
             return _FAILED + radius
         found = _estimate(corner, tried, claims)
-        return _FAILED / 2 if found is None else float(found["log_rate"] / log_rate)
+        return _FAILED / 2 if found is None else float(found["log_rate"] / LOG_RATE)
 
     best = min((np.array(start) for start in _STARTS), key=cost)
     simplex = np.vstack([best, best + np.diag(_SIMPLEX)])
@@ -159,13 +157,13 @@ def _forgetting(held: Held, model: SlidingModel, task: SlidingTask) -> float:
     return float(max(abs(np.linalg.eigvals(period))))
 
 
-def _guess(task: SlidingTask, log_rate: Fraction) -> SlidingClaims:
-    pressure = 2 * task.ranges["direct_effect"][1] * task.ranges["normal_stress"][0] * log_rate
+def _guess(task: SlidingTask) -> SlidingClaims:
+    pressure = 2 * task.ranges["direct_effect"][1] * task.ranges["normal_stress"][0] * LOG_RATE
     return _as_claims(
         {
-            "log_rate": log_rate,
-            "log_state": _GUESSES["log_state"] * float(log_rate),
-            "slip_error": task.ranges["critical_slip"][1] * log_rate,
+            "log_rate": LOG_RATE,
+            "log_state": _GUESSES["log_state"] * float(LOG_RATE),
+            "slip_error": task.ranges["critical_slip"][1] * LOG_RATE,
             "push": _GUESSES["push"] * float(pressure),
             "asked": _GUESSES["asked"] * float(pressure),
         }
@@ -176,9 +174,9 @@ def _as_claims(values: Mapping[str, Any]) -> SlidingClaims:
     return SlidingClaims(**{name: UpperBound(short(float(v), _SHORT)) for name, v in values.items()})
 
 
-def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims | None:
+def _claims(task: SlidingTask, held: Held) -> SlidingClaims | None:
     """Claims that follow from themselves, by the estimate, with the bound of y as told; None for none."""
-    claims = _guess(task, log_rate)
+    claims = _guess(task)
     for _ in range(_TURNS):
         found = _estimate(task, held, claims)
         if found is None:
@@ -187,12 +185,12 @@ def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims 
         if min(float(getattr(claims, k)) / v for k, v in wider.items() if k != "log_rate") >= 1 / _ROOM:
             break
         try:
-            claims = _as_claims({**wider, "log_rate": log_rate})
+            claims = _as_claims({**wider, "log_rate": LOG_RATE})
         except ParameterError:  # larger than claims may be
             return None
     else:
         return None
-    return claims if float(found["log_rate"]) < float(log_rate) else None
+    return claims if float(found["log_rate"]) < float(LOG_RATE) else None
 
 
 def _estimate(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
@@ -248,8 +246,8 @@ def _excess(task: SlidingTask, held: Held, claims: SlidingClaims) -> float:
     return max(float(found[k]) / float(getattr(claims, k)) for k in SlidingClaims.__dataclass_fields__)
 
 
-def _too_much(task: SlidingTask, log_rate: Fraction) -> str:
+def _too_much(task: SlidingTask) -> str:
     return (
-        f"a stress of {float(task.stress):.3g} Pa is not shown to leave |ln(v/V)| below {float(log_rate):.3g} with the "
+        f"a stress of {float(task.stress):.3g} Pa is not shown to leave |ln(v/V)| below {float(LOG_RATE):.3g} with the "
         "laws that were tried"
     )

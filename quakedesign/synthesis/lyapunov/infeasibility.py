@@ -79,7 +79,7 @@ class Dual:
         return bool(self.atoms and monomials) and not any(totals)
 
 
-def dual(loop: Loop, degree: int, *, seed: int = 0) -> Dual | None:
+def dual(loop: Loop, degree: int) -> Dual | None:
     """Exact proof that no V of a degree serves a loop, or None when none is found.
 
     None says nothing. None also for nested powers of positive exponents, whose cells hold few rational points, and for
@@ -91,8 +91,6 @@ def dual(loop: Loop, degree: int, *, seed: int = 0) -> Dual | None:
         On `cells`.
     degree : int
         Of V in the weights of the loop.
-    seed : int
-        Of the points that are tried.
     """
     monomials = signed_monomials(loop.states, degree, loop.domain)
     try:
@@ -101,7 +99,7 @@ def dual(loop: Loop, degree: int, *, seed: int = 0) -> Dual | None:
         return None
     if not rows or not _sharp(loop) or any(row[0].equalities for row in rows):
         return None
-    return _Search(loop, degree, monomials, rows, seed).result()
+    return _Search(loop, degree, monomials, rows).result()
 
 
 def _sharp(loop: Loop) -> bool:
@@ -139,12 +137,12 @@ class _Search:
     """Points at which a linear programme over V fails, collected until it has no solution."""
 
     def __init__(
-        self, loop: Loop, degree: int, monomials: Sequence[Term], rows: Sequence[tuple[Obligation, ...]], seed: int
+        self, loop: Loop, degree: int, monomials: Sequence[Term], rows: Sequence[tuple[Obligation, ...]]
     ) -> None:
         self.loop, self.degree, self.rows = loop, degree, rows
         self.scale = balance(loop)
         self.sizes = [monomial(self.scale, exponents_of(t, loop.states)) for t in monomials]
-        self.random = np.random.default_rng(seed)
+        self.random = np.random.default_rng(0)
         self.places: list[tuple[int, tuple[Fraction, ...]]] = []
         self.lines: list[list[float]] = []
 

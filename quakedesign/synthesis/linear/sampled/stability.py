@@ -31,6 +31,7 @@ from quakedesign.synthesis.linear.sampled.zero_order_hold import (
 
 Range = tuple[Fraction, Fraction]
 _DOUBLINGS, _CELLS = 24, 4000
+_TOLERANCE = 0.01  # relative width at which the bisection stops
 _BITS = (53, 400)
 _SHARES = tuple(Fraction(n, 100) for n in (100, 98, 95, 90, 80, 60, 40, 20, 5))
 
@@ -188,14 +189,9 @@ class LargestStep:
 
 
 def largest_step(
-    problem: LinearProblem, gains: Sequence[Fraction], *, integration: str = "exact", tolerance: float = 0.01
+    problem: LinearProblem, gains: Sequence[Fraction], *, integration: str = "exact"
 ) -> LargestStep | None:
     """Largest admissible sampling period: bisection on verdicts, then one proof for all shorter periods.
-
-    Parameters
-    ----------
-    tolerance : float
-        Relative width at which the bisection stops.
 
     Returns
     -------
@@ -214,7 +210,7 @@ def largest_step(
         if low < first / 2**12:
             return None
         verdict = judged(low)
-    while high / low > 1 + tolerance:
+    while high / low > 1 + _TOLERANCE:
         middle = (low + high) / 2
         verdict = judged(middle)
         low, high = (middle, high) if verdict is Verdict.PROVED else (low, middle)
