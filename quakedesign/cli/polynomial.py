@@ -37,7 +37,8 @@ def sos(
     on
         A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat for more. All of ℝⁿ unless given.
     multiplier
-        Positive polynomial to multiply with, or auto to try powers of 1 + x² + y² + … (x² + y² + … for forms).
+        Positive polynomial to multiply with, or auto to search one, and to try powers of 1 + x² + y² + … (x² + y² + …
+        for forms).
     margin
         Decide polynomial − margin·(1 + Σ x_i^degree) instead (without the 1 for forms).
     degree

@@ -1,6 +1,6 @@
 """Questions about positivity, answered with a proof or with ``undecided``."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from importlib.metadata import version
@@ -24,8 +24,10 @@ from quakedesign.sos.exact.reading import read
 from quakedesign.sos.exact.statement import Statement, statement
 from quakedesign.sos.solve.decide import block_sizes
 from quakedesign.sos.solve.methods import methods
+from quakedesign.sos.solve.multipliers import searched
 
 _GROWTH = (0, 2)
+_SEARCHED = (2, 4)  # degrees of searched multipliers
 _LARGEST_RETRY = 60  # monomials in a basis, so that a second attempt ends in seconds
 
 
@@ -50,7 +52,7 @@ def prove(
     multiplier : str, SymPy expression or mapping, optional
         multiplier · polynomial is decided instead; ``"auto"`` tries powers of 1 + Σx_i² (of Σx_i² for forms, of Σx_i
         for forms on the orthant) up to the third; on ℝⁿ for what is left of the polynomial beside squares, in its
-        variables.
+        variables, and before the first and the second power a sum of squares of that degree that is searched for it.
     variables : sequence of str or Symbol, optional
         Their order; in order of appearance unless given.
     margin : rational, optional
@@ -76,7 +78,7 @@ def prove(
     exact = _with_margin(given, margin, len(names))
     growth = _GROWTH if (inequalities or equalities) and degree_bound is None else (0,)
     answer: Answer | None = None
-    for chosen in _multipliers(exact, factor, inequalities, equalities, len(names)):
+    for chosen in _multipliers(names, exact, factor, inequalities, equalities):
         for more in growth:
             asked = statement(
                 names,
@@ -101,10 +103,13 @@ def prove(
 def _largest_basis(asked: Statement) -> int:
     """Monomials up to half the degree; on ℝⁿ only of what is left beside squares, in its variables."""
     if asked.inequalities or asked.equalities or not asked.target:
-        return comb(asked.degree // 2 + len(asked.variables), len(asked.variables))
+        return _basis_size(asked.degree, len(asked.variables))
     rest = square_factor(asked.target, len(asked.variables))[1]
-    used = sum(any(powers) for powers in zip(*rest, strict=True))
-    return comb(degree(rest) // 2 + used, used)
+    return _basis_size(degree(rest), sum(any(powers) for powers in zip(*rest, strict=True)))
+
+
+def _basis_size(top: int, variables: int) -> int:
+    return comb(top // 2 + variables, variables)
 
 
 def decide(asked: Statement) -> Answer:
@@ -152,11 +157,13 @@ def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:
     return combination([(Fraction(1), polynomial), (-amount, powers)])
 
 
-def _multipliers(polynomial: Any, factor: Any, inequalities: Any, equalities: Any, size: int) -> Any:
-    """Multipliers to try: the given one, or one and growing powers."""
+def _multipliers(names: Any, polynomial: Any, factor: Any, inequalities: Any, equalities: Any) -> Iterator[Any]:
+    """Multipliers to try: the given one, or one, then searched ones and powers of growing degree."""
     if factor != "auto":
-        return [factor]
-    if not inequalities and not equalities and polynomial:
+        yield factor
+        return
+    size, free = len(names), not inequalities and not equalities and polynomial
+    if free:
         polynomial = square_factor(polynomial, size)[1]
     top = degree(polynomial)
     form = all(sum(e) == top for e in polynomial)
@@ -166,7 +173,11 @@ def _multipliers(polynomial: Any, factor: Any, inequalities: Any, equalities: An
     base: dict[Any, Any] = {tuple(step * (i == j) for j in range(size)): Fraction(1) for i in range(size) if used[i]}
     if not form or not base:
         base[(0,) * size] = Fraction(1)
-    return [product(size, [base] * k) for k in range(4)]
+    for k in range(4):
+        if free and 2 * k in _SEARCHED and _basis_size(top + 2 * k, sum(used)) <= _LARGEST_RETRY:
+            own = searched(names, polynomial, 2 * k)
+            yield from () if own is None else (own,)
+        yield product(size, [base] * k)
 
 
 def _squares_of_multiplier(asked: Statement) -> Any:
