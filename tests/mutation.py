@@ -228,6 +228,12 @@ def apply(mutant: Mutant, functions: list[types.FunctionType], modules: list[typ
                         setattr(module, name, new)
 
 
+def living() -> list[object]:
+    """All objects that the garbage collector knows, those that `conftest.py` has frozen among them."""
+    gc.unfreeze()
+    return gc.get_objects()
+
+
 def caches_in(objects: list[object], folder: Path) -> list[functools._lru_cache_wrapper]:
     """Caches of functions of a folder: what they hold since the tests were collected knows no mutation."""
     caches = [entry for entry in objects if isinstance(entry, functools._lru_cache_wrapper)]
@@ -355,7 +361,7 @@ class Mutation:
         for path in self.paths:
             if path.is_relative_to(ROOT / "quakedesign"):
                 importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
-        objects = gc.get_objects()
+        objects = living()
         by_path = defaultdict(list)
         for entry in objects:
             if isinstance(entry, types.FunctionType):

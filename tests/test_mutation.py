@@ -1,6 +1,7 @@
 """The tool that mutates the deciding rooms changes one place at a time, and neither texts nor messages."""
 
 import ast
+import gc
 import importlib.util
 import re
 import sys
@@ -100,6 +101,14 @@ def test_defaults_of_fields_and_methods_are_changed_in_place(tmp_path):
     (cache,) = tool.caches_in([module.half, module.half.__wrapped__, tool.fnmatch.translate, size], tmp_path)
     cache.cache_clear()
     assert module.half() == 8
+
+
+def test_functions_are_found_after_they_were_frozen():
+    """`conftest.py` freezes what lives when tests are collected: a tool that overlooks it changes nothing."""
+    gc.freeze()
+    found = tool.living()
+    assert any(entry is tool.living for entry in found)
+    gc.freeze()
 
 
 def test_a_rule_explains_what_tests_hold_and_leaves_no_check_out():
