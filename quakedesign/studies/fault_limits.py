@@ -1,5 +1,6 @@
 """What no controller can do with a fault, beside what a designed one is proved to do."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -28,6 +29,15 @@ _POINTS = 24  # of the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
 WAITING = "all controllers, linear or not, all-knowing from the first sample after the disturbance begins"
+QUANTITIES = {
+    "peak_slip_rate_error": ("slip-rate error", "m/s"),
+    "largest_step": ("T_s", "s"),
+    "largest_delay": ("delay", "s"),
+    "largest_diffusion_time": ("diffusion time L^2/D", "s"),
+    "farthest_well": ("distance of the well", "m"),
+    "smallest_pressure": ("withdrawal", "Pa"),
+}
+"""Title and unit of every limit, by the name of its field."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,15 +119,7 @@ class Limits:
 
     def named(self) -> dict[str, Limit]:
         """All limits by name."""
-        names = (
-            "peak_slip_rate_error",
-            "largest_step",
-            "largest_delay",
-            "largest_diffusion_time",
-            "farthest_well",
-            "smallest_pressure",
-        )
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in QUANTITIES}
 
     @property
     def natural_peak(self) -> float | None:
@@ -238,35 +240,52 @@ def limits(
     withdrawal, spread = _given(fault, pressure, diffusivity)
     held = _proved_steps(task, step) if prove else ()
     own = next((g for g in held if g.held.step == step), None)
-    delay = _proved_delay(task, step) if own is not None else None
-    peak, reaction = smallest_peak(task, step), longest_reaction(task, withdrawal)
-    path = longest_diffusion(task, withdrawal, step)
-    well = None if path is None else farthest_well(path, spread)
-    late = None if reaction is None else UpperBound(max(reaction - step, Fraction(0)))
+    peak, proved = smallest_peak(task, step), dict[str, Bound | None]()
+    if held:
+        proved["largest_step"] = LowerBound(held[-1].held.step)
+    if own is not None:
+        proved["peak_slip_rate_error"] = own.claims.slip_rate_error
+        proved["largest_delay"] = _proved_delay(task, step)
+        proved["smallest_pressure"] = UpperBound(max(-own.claims.least_pressure, Fraction(0)))
     return Limits(
         fault=fault,
         withdrawal=withdrawal,
         diffusivity=spread,
         slip_error=peak.slip_error if peak else None,
-        peak_slip_rate_error=Limit(
-            title="slip-rate error",
-            unit="m/s",
-            impossible_beyond=peak.slip_rate_error if peak else None,
-            proved_up_to=own.claims.slip_rate_error if own else None,
-            holds_for=KNOWING,
-        ),
-        largest_step=_limit("T_s", "s", reaction, LowerBound(held[-1].held.step) if held else None),
-        largest_delay=_limit("delay", "s", late, delay),
-        largest_diffusion_time=_limit("diffusion time L^2/D", "s", path, None),
-        farthest_well=_limit("distance of the well", "m", well, None),
-        smallest_pressure=_limit(
-            "withdrawal",
-            "Pa",
-            smallest_withdrawal(task, step),
-            UpperBound(max(-own.claims.least_pressure, Fraction(0))) if own else None,
-        ),
+        **_limits(_impossible(task, withdrawal, step, spread, peak.slip_rate_error if peak else None), proved),
         proved=held,
     )
+
+
+def _impossible(
+    push: Task | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
+) -> dict[str, Bound | None]:
+    """What no controller can do, by name; nothing where no limit is known."""
+    reaction, path = longest_reaction(push, withdrawal), longest_diffusion(push, withdrawal, step)
+    return {
+        "peak_slip_rate_error": peak,
+        "largest_step": reaction,
+        "largest_delay": None if reaction is None else UpperBound(max(reaction - step, Fraction(0))),
+        "largest_diffusion_time": path,
+        "farthest_well": None if path is None else farthest_well(path, diffusivity),
+        "smallest_pressure": smallest_withdrawal(push, step),
+    }
+
+
+def _limits(
+    impossible: Mapping[str, Bound | None], proved: Mapping[str, Bound | None], plant: str = ""
+) -> dict[str, Limit]:
+    """Limits by name, of a plant that is not the fault itself if one is named."""
+    return {
+        name: Limit(
+            title=title,
+            unit=unit,
+            impossible_beyond=impossible[name],
+            proved_up_to=proved.get(name),
+            holds_for=(KNOWING if name == "peak_slip_rate_error" else WAITING) + plant,
+        )
+        for name, (title, unit) in QUANTITIES.items()
+    }
 
 
 def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fraction, Fraction]:
@@ -295,43 +314,28 @@ def _sliding_limits(
             "was found that stands any. Give --stress, such as '25 kPa'."
         )
     push = SlidingPush(model=model, amplitude=amplitude)
-    reaction, path = longest_reaction(push, withdrawal), longest_diffusion(push, withdrawal, step)
-    near = None if found is None else LowerBound(found.held.diffusion)
+    proved: dict[str, Bound | None] = {}
+    if found is not None:
+        proved["peak_slip_rate_error"] = _above_the_reference(found)
+        proved["largest_step"] = LowerBound(step)
+        proved["largest_diffusion_time"] = LowerBound(found.held.diffusion)
+        proved["smallest_pressure"] = found.claims.push
+    impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
+    known = _limits(impossible, proved, ", of the linearised plant")
     return SlidingLimits(
         fault=fault,
         withdrawal=withdrawal,
         diffusivity=spread,
         slip_error=None,
-        peak_slip_rate_error=Limit(
-            title="slip-rate error",
-            unit="m/s",
-            impossible_beyond=push.smallest_rate_error(step),
-            proved_up_to=None if found is None else _above_the_reference(found),
-            holds_for=f"{KNOWING}, of the linearised plant",
-        ),
-        largest_step=_linear("T_s", "s", reaction, None if found is None else LowerBound(step)),
-        largest_delay=_linear("delay", "s", reaction and UpperBound(max(reaction - step, Fraction(0))), None),
-        largest_diffusion_time=_linear("diffusion time L^2/D", "s", path, near),
-        farthest_well=_linear("distance of the well", "m", path and farthest_well(path, spread), None),
-        smallest_pressure=_linear(
-            "pressure", "Pa", smallest_withdrawal(push, step), None if found is None else found.claims.push
-        ),
+        **known | {"smallest_pressure": replace(known["smallest_pressure"], title="pressure")},
         proved=(),
         push=push,
         guarantee=found,
     )
 
 
-def _linear(title: str, unit: str, beyond: Bound | None, proved: Bound | None) -> Limit:
-    return replace(_limit(title, unit, beyond, proved), holds_for=f"{WAITING}, of the linearised plant")
-
-
 def _above_the_reference(found: SlidingGuarantee) -> UpperBound:
     return UpperBound(found.peak_slip_rate - found.task.rate)
-
-
-def _limit(title: str, unit: str, beyond: Bound | None, proved: Bound | None) -> Limit:
-    return Limit(title=title, unit=unit, impossible_beyond=beyond, proved_up_to=proved, holds_for=WAITING)
 
 
 def _proved_steps(task: Task, step: Fraction) -> tuple[Guarantee, ...]:
