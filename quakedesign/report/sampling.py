@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from rich.table import Table
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.figure_files import write_figures
 from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells
+from quakedesign.report.terminal import table
 from quakedesign.simulation import Study
 from quakedesign.simulation.sensitivity import QUANTITIES
 from quakedesign.studies.needed_pressure import pressure_extremes
@@ -83,14 +85,8 @@ def print_sampling(report: SamplingReport, console: Any) -> None:
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], widths: tuple[int, ...]) -> Table:
     """Table whose columns of text, the first one or two, have the widths given; so have others as far as given."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
-    texts = min(len(widths), 2)
-    for i, column in enumerate(head):
-        width = widths[i] if i < len(widths) else None
-        table.add_column(column, justify="left" if i < texts else "right", width=width)
-    for row in rows:
-        table.add_row(*row)
-    return table
+    sides = "l" * min(len(widths), 2) + "r" * len(head)
+    return table(zip_longest(head, widths, sides[: len(head)]), rows)
 
 
 def row_outcome(row: Row) -> tuple[str, ...]:

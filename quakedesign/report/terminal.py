@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from quakedesign.certificates.premises import Premise
     from quakedesign.fault import Fault
     from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Entry
 
 
 def print_comparison(comparison: Comparison, console: Any) -> None:
@@ -56,7 +55,8 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
         if entry.design.domain is not None:
             console.print(f"  {domain_sentence(entry.design.domain)}")
         if entry.variants:
-            _print_feedforward(entry, console)
+            known = zip(FEEDFORWARD_COLUMNS, (None,) * len(FEEDFORWARD_COLUMNS), "lrrrr", strict=True)
+            console.print(table(known, feedforward_rows(entry.variants), indent=2))
     console.print()
     console.print("outcome", style="bold", end=", ")
     console.print("peak slip rate of the whole run, and its share of the natural earthquake's")
@@ -71,24 +71,14 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
     console.print(f"{scheme_sentence(comparison)}.")
 
 
-def table(columns: Iterable[tuple[str, int, str]], rows: Iterable[Sequence[str]]) -> Table:
+def table(columns: Iterable[tuple[str, int | None, str]], rows: Iterable[Sequence[str]], indent: int = 0) -> Table:
     """Table of columns with heading, width and side (l or r); within 80 places no number is cut or broken."""
-    made = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    made = Table(box=None, pad_edge=False, padding=(0, 1, 0, indent))
     for heading, width, side in columns:
         made.add_column(heading, justify="left" if side == "l" else "right", width=width)
     for row in rows:
         made.add_row(*row)
     return made
-
-
-def _print_feedforward(entry: "Entry", console: Any) -> None:
-    """What the same gains are certified for with every named feed-forward."""
-    found = Table(box=None, pad_edge=False, padding=(0, 1, 0, 2))
-    for i, column in enumerate(FEEDFORWARD_COLUMNS):
-        found.add_column(column, justify="left" if i < 1 else "right")
-    for row in feedforward_rows(entry.variants):
-        found.add_row(*row)
-    console.print(found)
 
 
 def _line(premise: "Premise") -> str:
