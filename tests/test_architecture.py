@@ -385,3 +385,27 @@ def test_what_tools_read_of_the_face_is_what_it_loads():
     assert sorted(stated) == sorted(quakedesign.__all__)
     for name, (module, there) in stated.items():
         assert getattr(importlib.import_module(module), there) is getattr(quakedesign, name)
+
+
+LONGEST_BODY = 60
+
+
+def long_bodies(text):
+    """Functions whose statements, docstring left out, take more lines than are read at once."""
+    functions = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef))
+    for function in functions:
+        told = function.body[0] if ast.get_docstring(function) is not None else None
+        said = told.end_lineno - told.lineno + 1 if told else 0
+        if function.end_lineno - function.lineno + 1 - said > LONGEST_BODY:
+            yield function.name
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=module_name)
+def test_no_function_is_longer_than_what_is_read_at_once(path):
+    assert list(long_bodies(path.read_text(encoding="utf-8"))) == []
+
+
+def test_a_long_function_is_found():
+    line = "    x = 1\n"
+    assert list(long_bodies(f'def f():\n    """{line * 60}"""\n{line}')) == []
+    assert list(long_bodies(f"def f():\n{line * 60}")) == ["f"]
