@@ -48,12 +48,12 @@ def in_lines(text: str) -> list[str]:
 
 def _divisions(text: str) -> list[tuple[int, int]]:
     """Places behind the marks of a text that stand outside of brackets, and how much each divides."""
-    found, depth = [], 0
+    divisions, depth = [], 0
     for mark in _MARKS.finditer(text):
         depth += (mark[0] in "([") - (mark[0] in ")]")
         if depth <= 0 and mark[0].endswith(" "):
-            found.append((mark.start() + 1, _STRENGTH.index(mark[0][0])))
-    return found
+            divisions.append((mark.start() + 1, _STRENGTH.index(mark[0][0])))
+    return divisions
 
 
 def _place(division: tuple[int, int]) -> int:

@@ -125,10 +125,10 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
         f"friction.{name}": (_friction_unit(field.metadata), getattr(law, name))
         for name, field in law.quantities().items()
     }
-    found = {n: Quantity(name=n, unit=u, value=rational(v, n)) for n, (u, v) in named.items()}
+    quantities = {n: Quantity(name=n, unit=u, value=rational(v, n)) for n, (u, v) in named.items()}
     if not stretches(law):
-        found[_UNIT_FRICTION] = Quantity(name=_UNIT_FRICTION, unit=_FRICTION, value=Fraction(1))
-    return found
+        quantities[_UNIT_FRICTION] = Quantity(name=_UNIT_FRICTION, unit=_FRICTION, value=Fraction(1))
+    return quantities
 
 
 def _number(fault: Fault, dotted: str) -> float | None:

@@ -35,15 +35,15 @@ class Table:
         self, units: Mapping[str, str], *, optional: bool = False, read: Reader = si_value
     ) -> dict[str, float | None]:
         """Values in SI units by name; None for one that is wrong, nothing for an optional one that is not given."""
-        found: dict[str, float | None] = {}
+        quantities: dict[str, float | None] = {}
         for key, unit in units.items():
             if self._given(key, optional):
-                found[key] = None
+                quantities[key] = None
                 with self.problems.collected():
-                    found[key] = read(self.entries[key], unit, self._name(key))
+                    quantities[key] = read(self.entries[key], unit, self._name(key))
             elif not optional:
-                found[key] = None
-        return found
+                quantities[key] = None
+        return quantities
 
     def spelling(self, name: str, symbol: str) -> str:
         """How the file spells an entry: by its name, or by its symbol, as ``Dc`` or ``d_c`` for :math:`d_c`."""

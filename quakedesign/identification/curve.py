@@ -34,8 +34,8 @@ class Curve:
     def slopes(self, slip: "np.ndarray", fitted: "np.ndarray") -> "np.ndarray":
         """Derivatives in the logarithms, shape (slips, names)."""
         rows = self._rows(self._expressions[2:], slip, fitted)
-        found: np.ndarray = np.array(rows).T * np.exp(fitted[: len(self.names)])
-        return found
+        slopes: np.ndarray = np.array(rows).T * np.exp(fitted[: len(self.names)])
+        return slopes
 
     def _rows(self, expressions: Any, slip: "np.ndarray", fitted: "np.ndarray") -> "list[np.ndarray]":
         values = dict(zip(self._symbols, np.exp(fitted[: len(self.names)]), strict=True))

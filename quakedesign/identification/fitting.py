@@ -71,8 +71,8 @@ class Fit:
     @cached_property
     def residuals(self) -> "np.ndarray":
         """Measured less simulated friction [-] at every sample."""
-        found: np.ndarray = self.measured - self.experiment.friction(self.fitted)
-        return found
+        residuals: np.ndarray = self.measured - self.experiment.friction(self.fitted)
+        return residuals
 
     @property
     def squares(self) -> float:
@@ -133,8 +133,8 @@ class Fit:
         weights = np.where(np.abs(turn) > 1e-9, np.abs(turn), 0)
         with np.errstate(invalid="ignore"):
             spread = np.where(weights > 0, weights * inverse[:, None], 0)
-        found: np.ndarray = np.sqrt(np.sum(spread**2, axis=0)) / scale * self.noise * np.sqrt(self.correlation)
-        return found
+        deviations: np.ndarray = np.sqrt(np.sum(spread**2, axis=0)) / scale * self.noise * np.sqrt(self.correlation)
+        return deviations
 
 
 def fit(experiment: Experiment, measured: "np.ndarray", *, seed: int, search: Search | None = None) -> Fit:

@@ -110,7 +110,7 @@ def read_record(path: str | Path, *, normal_stress: float | None = None) -> Reco
 
 def _headings(cells: Sequence[str]) -> dict[str, float]:
     """SI value of one unit of every column, by name."""
-    found: dict[str, float] = {}
+    headings: dict[str, float] = {}
     for cell in cells:
         match = _HEADING.fullmatch(cell)
         name, unit = match.groups() if match else (cell.strip(), None)
@@ -119,7 +119,7 @@ def _headings(cells: Sequence[str]) -> dict[str, float]:
                 f"a column must be one of {', '.join(COLUMNS)}. Received {shown(name)}."
                 f"{nearest_name(name, COLUMNS) or ' Remove it, or rename it.'}"
             )
-        if name in found:
+        if name in headings:
             raise RecordError(f"a column must be there once. Received {name} twice. Remove one.")
         if unit is None and COLUMNS[name]:
             raise RecordError(
@@ -127,8 +127,8 @@ def _headings(cells: Sequence[str]) -> dict[str, float]:
                 f"Write {name} [{COLUMNS[name]}], say."
             )
         plain = not unit or unit.strip() in ("-", "1")
-        found[name] = 1.0 if plain and not COLUMNS[name] else si_value(f"1 {unit}", COLUMNS[name], f"column {name}")
-    return found
+        headings[name] = 1.0 if plain and not COLUMNS[name] else si_value(f"1 {unit}", COLUMNS[name], f"column {name}")
+    return headings
 
 
 def _values(lines: Sequence[tuple[int, str]], names: Sequence[str]) -> "np.ndarray":

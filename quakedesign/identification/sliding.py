@@ -84,8 +84,8 @@ class Sliding(Experiment):
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
         """Friction coefficient [-] at every sample, sliding steadily at the first."""
         states = self._states(fitted)[:, self._sampled]
-        found: np.ndarray = self._readings["friction"](states, np.asarray(fitted)).full().ravel()
-        return found
+        friction: np.ndarray = self._readings["friction"](states, np.asarray(fitted)).full().ravel()
+        return friction
 
     def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
         """Derivatives from the variational equations of the steps themselves: exact for what `friction` computes."""
@@ -98,8 +98,8 @@ class Sliding(Experiment):
 
     def rates(self, fitted: "np.ndarray") -> "np.ndarray":
         """Slip rate [m/s] at every sample."""
-        found: np.ndarray = np.exp(self._states(fitted)[0, self._sampled])
-        return found
+        rates: np.ndarray = np.exp(self._states(fitted)[0, self._sampled])
+        return rates
 
     def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
         """The mass from which on inertia would have been seen."""
@@ -154,12 +154,12 @@ class Sliding(Experiment):
     @cached_property
     def _readings(self) -> dict[str, Any]:
         """Functions of all samples at once, the coordinates shared."""
-        found = {}
+        readings = {}
         for name in ("friction", "slopes"):
             one = self._build[f"{name}_of_state"]
             states, q = ca.MX.sym("states", one.size1_in(0), len(self._sampled)), ca.MX.sym("q", one.size1_in(1))
-            found[name] = ca.Function(name, [states, q], [one.map(len(self._sampled))(states, q)])
-        return found
+            readings[name] = ca.Function(name, [states, q], [one.map(len(self._sampled))(states, q)])
+        return readings
 
     @cached_property
     def _build(self) -> dict[str, Any]:

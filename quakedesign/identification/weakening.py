@@ -87,8 +87,8 @@ class Drawn(Experiment):
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
         """Shear over normal force [-] at every sample."""
         slip, _ = self._slip(fitted)
-        found: np.ndarray = self._held(fitted) - self._softness(fitted) * slip
-        return found
+        friction: np.ndarray = self._held(fitted) - self._softness(fitted) * slip
+        return friction
 
     def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
         """Derivatives, those of slip from the balance at the sample where it was reached."""
@@ -100,8 +100,8 @@ class Drawn(Experiment):
         per_slip = self._curve.friction(slip[since], fitted)[1]
         moved = (at_fixed_slip[since] - laws) / (softness[since] + per_slip)[:, None]
         moved[slip == 0] = 0
-        found: np.ndarray = at_fixed_slip - softness[:, None] * moved
-        return found
+        slopes: np.ndarray = at_fixed_slip - softness[:, None] * moved
+        return slopes
 
     def slip(self, fitted: "np.ndarray") -> "np.ndarray":
         """Slip [m] at every sample."""
@@ -121,11 +121,11 @@ class Drawn(Experiment):
         return held
 
     def _held_slopes(self, fitted: "np.ndarray", slip: "np.ndarray") -> "np.ndarray":
-        found = np.zeros((len(slip), len(fitted)))
-        found[:, -1] = self.normal[0] / self.normal
+        held_slopes = np.zeros((len(slip), len(fitted)))
+        held_slopes[:, -1] = self.normal[0] / self.normal
         if self.stiffness is None:
-            found[:, -2] = self._softness(fitted) * (self.load_point - slip)
-        return found
+            held_slopes[:, -2] = self._softness(fitted) * (self.load_point - slip)
+        return held_slopes
 
     def _slip(self, fitted: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
         """Slip [m] at every sample, and the sample at which it was reached."""

@@ -52,10 +52,10 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
     stored : bool
         Name the files of certificates; None stands for them where nothing is written.
     """
-    found = {"fault": fault_dict(comparison.fault), **comparison.to_dict()}
+    results = {"fault": fault_dict(comparison.fault), **comparison.to_dict()}
     for origin, group in (("designed", "controllers"), ("published", "published")) if stored else ():
         for entry in comparison.of(origin):
-            told = found[group][entry.design.name]
+            told = results[group][entry.design.name]
             if entry.design.certificate is not None:
                 told["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
             if entry.guaranteed is not None:
@@ -64,8 +64,8 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
                 told["certificate"] = told["certificate"] or path
             for kind in entry.peaks:
                 told["peaks"][kind]["certificate"] = f"certificates/{entry.design.name}-peaks-{kind}.json"
-    found["versions"] = versions()
-    return found
+    results["versions"] = versions()
+    return results
 
 
 def study_results(study: "PaperStudy", formats: Sequence[str] = DEFAULT) -> dict[str, Any]:

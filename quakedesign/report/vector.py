@@ -47,15 +47,15 @@ def _shorter(number: re.Match[str]) -> str:
 
 def _axes(drawing: Any, height: float) -> list[dict[str, Any]]:
     """Place in the picture and scales of every axis that carries labels."""
-    found = []
+    axes = []
     for axis in drawing.axes:
         low, high = axis.get_window_extent().get_points() * 72 / drawing.dpi
         box = [float(v) for v in (low[0], height - high[1], high[0], height - low[1])]
         siblings = axis.get_shared_x_axes().get_siblings(axis)
         across = next((label for other in siblings if (label := other.get_xlabel())), "x")
         sides = {"x": _side(axis.xaxis, across), "y": _side(axis.yaxis, axis.get_ylabel())}
-        found.append({"box": [round(v, 2) for v in box], **sides})
-    return found
+        axes.append({"box": [round(v, 2) for v in box], **sides})
+    return axes
 
 
 def _side(axis: Any, label: str) -> dict[str, Any]:

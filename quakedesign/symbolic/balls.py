@@ -101,12 +101,12 @@ def _worked(results: list[Any], work: Work) -> list[Any]:
 
 
 def _depending(work: Work, index: int) -> Work:
-    known, found = {index}, []
+    known, depending = {index}, []
     for step in work:
         if not known.isdisjoint(step[2]):
             known.add(step[0])
-            found.append(step)
-    return found
+            depending.append(step)
+    return depending
 
 
 def _number(e: sp.Expr) -> Any:

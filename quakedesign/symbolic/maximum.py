@@ -131,14 +131,14 @@ class _Form:
         """
         if not regular(self.expression, box):
             return box
-        found = dict(box)
+        risen = dict(box)
         for symbol, (low, high) in box.items():
-            falls, rises = self.slope(symbol, found)
+            falls, rises = self.slope(symbol, risen)
             end = low if rises <= 0 else high if falls >= 0 else None
             if end is not None and not isinstance(end, float):
                 inner = _middle((low, high)) if self.jumps else end
-                found[symbol] = (min(inner, end), max(inner, end))
-        return found
+                risen[symbol] = (min(inner, end), max(inner, end))
+        return risen
 
     def halves(self, box: Box) -> list[Box]:
         """Both halves of a box, across the side whose halves have the smaller largest enclosure."""

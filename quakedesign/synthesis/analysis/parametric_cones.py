@@ -66,12 +66,12 @@ class Cones:
 
 def means(monomials: Sequence[Term], weights: Mapping[str, int]) -> list[float]:
     """Mean of every V_j over all cells and Σu_i = 1, that of u^m being one; zero where signs alternate."""
-    found = []
+    means = []
     for term in monomials:
         even = all(kind == "a" for _, _, kind in term.factors)
         powers = exponents_of(term, weights)
-        found.append(prod(map(factorial, powers)) / factorial(sum(powers)) if even else 0.0)
-    return found
+        means.append(prod(map(factorial, powers)) / factorial(sum(powers)) if even else 0.0)
+    return means
 
 
 def _template(row: Row, loop: Loop, scale: Sequence[Fraction]) -> Statement:
