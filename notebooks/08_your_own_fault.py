@@ -121,13 +121,13 @@ figure.savefig(folder / "gouge.pdf")
 plt.show()
 
 # %% [markdown]
-# **The answer:** an e-LQR that reads the slip every 400 s and sets the pressure of a well near the fault lets it slip 20 mm in 20 days; the slip rate never exceeds 1.65 times that of
-# the plan, proved for every friction that the record allows, where the fault left alone makes earthquakes of magnitude 3.5 at decimetres per second.
+# **The answer:** an e-LQR that reads the slip every 400 s and sets the pressure of a well near the fault lets it slip 20 mm in 20 days; the slip rate never exceeds that of the
+# plan by more than a quarter, proved for every friction that the record allows, where the fault left alone makes earthquakes of magnitude 3.5 at decimetres per second.
 
 # %%
 guarantee = design.guarantee
 assert all(e.least < truth[name] < e.most for name, e in found.estimates.items() if name in truth)
 assert str(guarantee.check()) == "proved" and all(low <= truth[name] <= high for name, (low, high) in guarantee.task.ranges.items() if name in truth)
 assert natural.outcome.kind == "earthquake" and limits.peak_slip_rate_error.impossible_beyond < guarantee.peak_slip_rate
-assert set(campaign.kinds["tracked"]) == set(range(16)) and fastest < guarantee.peak_slip_rate < 1e-7 < natural.natural_peak
+assert set(campaign.kinds["tracked"]) == set(range(16)) and fastest < guarantee.peak_slip_rate < 1.25 * guarantee.task.rate < natural.natural_peak
 assert all((folder / name).read_bytes().startswith(b"%PDF") for name in ("record.pdf", "gouge.pdf"))
