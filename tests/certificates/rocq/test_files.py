@@ -296,12 +296,35 @@ def test_coqc_accepts_what_holds_and_no_changed_digit(tmp_path):
 
 
 @needs_coqc
-def test_the_comparison_step_is_proved_from_the_same_axioms(tmp_path):
-    text = (CERTIFICATES.parent / "rocq" / "comparison.v").read_text(encoding="utf-8")
-    code, out, err = compiled(text, tmp_path, "comparison")
+@pytest.mark.parametrize(
+    ("name", "axioms"),
+    [("comparison", ANALYSIS), ("small_gain", ANALYSIS - {"Classical_Prop.classic"})],
+)
+def test_steps_of_the_argument_are_proved_from_the_same_axioms(name, axioms, tmp_path):
+    text = (CERTIFICATES.parent / "rocq" / f"{name}.v").read_text(encoding="utf-8")
+    code, out, err = compiled(text, tmp_path, name)
     assert (code, err) == (0, "")
-    assert axioms_of(out) == ANALYSIS
+    assert axioms_of(out) == axioms
     assert "Admitted" not in text
+
+
+@needs_coqc
+@pytest.mark.parametrize(
+    ("stated", "wrong"),
+    [
+        ("0 < p -> solved (map", "p < 0 -> solved (map"),
+        (
+            "Forall (fun v => 0 <= v) (fst g)) gains ->\n  (forall",
+            "Forall (fun v => v <= 0) (fst g)) gains ->\n  (forall",
+        ),
+        ("(b - dot r y) / p :: y", "(b + dot r y) / p :: y"),
+    ],
+    ids=["pivots", "signs of M", "solution"],
+)
+def test_another_statement_of_the_small_gain_is_refused(stated, wrong, tmp_path):
+    text = (CERTIFICATES.parent / "rocq" / "small_gain.v").read_text(encoding="utf-8")
+    assert text.count(stated) == 1
+    assert compiled(text.replace(stated, wrong), tmp_path, "small_gain")[0] != 0
 
 
 @needs_coqc
