@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from quakedesign.fault import Fault
+from quakedesign.report.drawing import scaled
 from quakedesign.studies.stability_regions import Plane, StabilityRegions, stability_regions
 from quakedesign.symbolic.stability import StabilityVerdict
 
 _COLOURS = {"stable": "#BFD9EC", "unstable": "#F3C6B2"}
-_SIZES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
 
 
 def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True) -> Any:
@@ -46,7 +46,7 @@ def _drawn(regions: StabilityRegions) -> Any:
     drawing = Figure(figsize=(10, 4.8), layout="constrained", dpi=150)
     left, right = drawing.subplots(1, 2, sharey=True)
     normal = regions.fault.effective_normal_stress
-    (size, unit), (high, stiff) = _size(normal), _size(regions.stiffness.max())
+    (size, unit), (high, stiff) = scaled(normal, "Pa"), scaled(regions.stiffness.max(), "Pa")
     label = f"{regions.fault.name}: {regions.verdict.outcome.name.lower()}"
     for axis, plane in ((left, regions.over_stress), (right, regions.over_pressure)):
         _region(axis, plane, regions.stiffness)
@@ -57,7 +57,8 @@ def _drawn(regions: StabilityRegions) -> Any:
     right.set_xlabel(f"injected pressure p [{unit}] (σ' = {normal / size:.4g} {unit}; p < 0 is withdrawal)")
     left.set_ylabel(f"stiffness per area k/A [{stiff}/m]")
     _annotate(left, regions)
-    drawing.legend(*_unique(left, right), loc="outside lower center", ncols=4, fontsize=9)
+    once = {label: handle for axis in (left, right) for handle, label in _legend(axis)}
+    drawing.legend(once.values(), once.keys(), loc="outside lower center", ncols=4, fontsize=9)
     drawing.suptitle(_title(regions.fault, regions.verdict))
     return drawing
 
@@ -74,7 +75,7 @@ def _title(fault: Fault, verdict: StabilityVerdict) -> str:
 def _region(axis: Any, plane: Plane, stiffness: np.ndarray) -> None:
     """Colour one panel by what is stable, and draw the critical stiffness."""
     across, stable, curve = plane.across, plane.stable, plane.critical
-    wide, high = _size(np.abs(across).max() / 2)[0], _size(stiffness.max())[0]
+    wide, high = scaled(np.abs(across).max() / 2, "Pa")[0], scaled(stiffness.max(), "Pa")[0]
     axis.contourf(
         across / wide, stiffness / high, stable.astype(float), levels=[-0.5, 0.5, 1.5],
         colors=[_COLOURS["unstable"], _COLOURS["stable"]],
@@ -91,12 +92,12 @@ def _region(axis: Any, plane: Plane, stiffness: np.ndarray) -> None:
 def _annotate(axis: Any, regions: StabilityRegions) -> None:
     said = "no critical stiffness"
     if regions.nucleation_length is not None:
-        size, unit = _size(regions.critical)
+        size, unit = scaled(regions.critical, "Pa")
         said = (
             f"critical stiffness per area {regions.critical / size:.4g} {unit}/m\n"
             f"nucleation length {_metres(regions.nucleation_length)}\nfault length {_metres(regions.fault.side)}"
         )
-        wide, high = _size(regions.over_stress.own)[0], _size(regions.stiffness.max())[0]
+        wide, high = scaled(regions.over_stress.own, "Pa")[0], scaled(regions.stiffness.max(), "Pa")[0]
         axis.plot(regions.over_stress.own / wide, regions.critical / high, "kx", label="critical here")
     axis.text(
         0.03, 0.97, said, transform=axis.transAxes, va="top", fontsize=9,
@@ -105,20 +106,9 @@ def _annotate(axis: Any, regions: StabilityRegions) -> None:
 
 
 def _metres(length: float) -> str:
-    for size, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm")):
-        if length >= size:
-            return f"{length / size:.4g} {unit}"
-    return f"{length:.3g} m"
+    size, unit = scaled(length, "m")
+    return f"{length / size:.4g} {unit}"
 
 
-def _size(largest: float) -> tuple[float, str]:
-    return next(((s, u) for s, u in _SIZES if largest >= s), _SIZES[-1])
-
-
-def _unique(*axes: Any) -> tuple[list[Any], list[str]]:
-    """Legend entries of several axes, each label once."""
-    handles: dict[str, Any] = {}
-    for axis in axes:
-        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    return list(handles.values()), list(handles)
+def _legend(axis: Any) -> Any:
+    return zip(*axis.get_legend_handles_labels(), strict=True)
