@@ -12,8 +12,10 @@ from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, Held, SlowGain, guarantee, task_of
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
 from quakedesign.certificates.guarantee.norms import norms
+from quakedesign.certificates.guarantee.slow_gain import grown
 from quakedesign.fault import load_fault
 from quakedesign.loop import Prediction, disturbance_estimate
+from quakedesign.synthesis.guaranteed.estimate import gains_of
 
 STEP = F("0.184")
 TASK = task_of(load_fault("real-fault"))
@@ -42,6 +44,10 @@ def document(held=None):
 def test_both_find_the_same_gains_through_rock(around):
     held = replace(HELD, **around)
     ours = norms(held.loop(TASK))
+    estimated = gains_of(held.loop(TASK))
+    assert max(estimated["slip_rate_error", "awaited"]) == pytest.approx(
+        float(max(ours["slip_rate_error", "awaited"])), rel=0.02
+    )
     read = checker.read_task(document())
     theirs = checker.loop_gains(checker.read_loop(document(held)["loop"], read), sum(read.beta) / 2)
     names = [name for name in ORDER if (OUTPUTS[0], name) in ours]
@@ -49,6 +55,23 @@ def test_both_find_the_same_gains_through_rock(around):
     for name, lines in zip(names, theirs, strict=True):
         for output, line in zip(OUTPUTS, lines, strict=True):
             assert [float(v) for v in line] == pytest.approx([float(v) for v in ours[output, name]], rel=1e-6)
+
+
+def test_both_have_the_same_loop_in_every_part_of_a_slow_gain(monkeypatch):
+    """The one that is asked for the gains of what is past, and all others: matrices, in rationals."""
+    asked, raw = [], document()
+    monkeypatch.setattr(checker, "gains", lambda loop, *_: asked.append((loop.flow, loop.events)) or [[F(1)]] * 4)
+    task = checker.read_task(raw)
+    checker.slow_gains(task, checker.read_loop(raw["loop"], task), checker.Slow(2, F(1, 4)))
+    ours = []
+    for model in claim().slow_gain.models(TASK):
+        loop = HELD.loop(TASK, model)
+        ours += [*[loop] * 5, grown(loop, F(1, 4))]
+    expected = [
+        ([list(v) for v in one.flow], [([list(v) for v in part.jump], part.duration) for part in one.segments])
+        for one in ours
+    ]
+    assert asked == expected
 
 
 def test_both_prove_a_loop_through_rock_and_refuse_what_does_not_follow(monkeypatch):
