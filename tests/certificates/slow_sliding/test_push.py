@@ -1,5 +1,6 @@
 """What no controller can do with a linearised fault in slow sliding: closed forms, and no guarantee against it."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
 
@@ -76,3 +77,28 @@ def test_a_fault_that_creeps_has_a_smallest_rate_error_and_no_other_limit():
     assert found.largest_step.impossible_beyond is found.farthest_well.impossible_beyond is None
     assert found.smallest_pressure.impossible_beyond is None
     assert len(found.smallest_peaks()) > 10
+
+
+@pytest.mark.parametrize(
+    ("kappa", "beta", "grows"),
+    [
+        (1, 4, True),  # s² − 2s + 1: both roots are 1
+        (1, F("3.999"), False),  # they are complex
+        (4, 7, False),  # s² − 2s + 4
+        (4, 10, True),  # s² − 5s + 4
+        (F(1, 4), F(1, 8), False),  # s² + (9/8)s + 1/4: both are negative
+        (4, F(1, 2), False),  # s² + (9/2)s + 4: both are negative, with κ > 1
+        (F(1, 4), F(5, 4), False),  # s² + 1/4: imaginary
+        (F(1, 100), F("1.1"), False),  # s² − 0.09s + 0.01
+        (F(1, 100), F("1.21"), True),  # s² − 0.2s + 0.01: both are 0.1
+        (0, 1, False),  # s²: no λ above 0
+    ],
+)
+def test_a_push_grows_exactly_where_an_eigenvalue_is_real_and_positive(kappa, beta, grows):
+    model = PUSH.model
+    stiffness = kappa * model.state_rate * model.strength / model.rate
+    push = replace(PUSH, model=replace(model, stiffness=stiffness, weakening=beta * model.strength))
+    assert push.grows is grows
+    if grows:
+        root = (beta - 1 - kappa + ((beta - 1 - kappa) ** 2 - 4 * kappa) ** 0.5) / 2
+        assert float(push.pole) == pytest.approx(float(model.state_rate) * float(root), rel=1e-12)
