@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flint import arb
 from scipy.linalg import expm
 from standalone_guarantee import checker
 
@@ -42,7 +43,7 @@ def peaks(flow, jumps, durations, starts, row):
     flows, outputs = [list(line) for line in loop.flow], [list(loop.outputs["y"])]
     theirs = checker.Loop(flows, events, outputs, [], None, loop.period, start=[list(s) for s in loop.start])
     (found,) = checker.start_gains(theirs)
-    assert np.allclose(ours, np.array(found, float), rtol=1e-9)
+    assert np.allclose(ours, np.array(found, float), rtol=1e-9, atol=1e-25)
     return ours
 
 
@@ -67,6 +68,40 @@ def test_what_the_slowest_mode_does_much_later_counts():
     q = 1 - 2.0**-15
     found = peaks([[0, 0], [0, 0]], [[["32767/32768", 0], ["1/32768", "1/2"]]], [1], [[1, 0]], [0, 1])
     assert just_above(found, [max((1 - q) * (q**k - 0.5**k) / (q - 0.5) for k in range(64))] * 8, share=1e-5)
+
+
+def test_what_comes_after_all_periods_that_are_looked_at_counts():
+    """x → qx, y → (1 − q)x + ry, q = 1 − 2⁻³⁰, r = 3/5: largest after forty periods, when thirty-two are looked at."""
+    q, r = F(2**30 - 1, 2**30), F(3, 5)
+    found = peaks([[0, 0], [0, 0]], [[[q, 0], [1 - q, r]]], [1], [[1, 0]], [0, 1])
+    exact = [(1 - q) * (q**k - r**k) / (q - r) for k in range(64)]
+    assert max(exact[:33]) < max(exact) * (1 - F(1, 10**8))
+    assert just_above(found, [float(max(exact))] * 8, share=1e-4)
+
+
+@pytest.mark.parametrize(("grows", "falls"), [("2", "1/2"), ("1/2", "2"), ("1000001/1000000", "1/2")])
+def test_modes_that_do_not_all_fall_leave_nothing_bounded(monkeypatch, grows, falls):
+    """Both checkers, asked without what asks for stability before them."""
+    jump = tuple(tuple(map(F, line)) for line in ((grows, 0), (0, falls)))
+    flow, start = ((F(0),) * 2,) * 2, ((F(1), F(0)), (F(0), F(1)))
+    part = Segment(jump=jump, duration=F(1))
+    loop = PeriodicLoop(
+        states=("x", "y"), flow=flow, segments=(part,), inputs={}, outputs={"y": (F(0), F(1))}, start=start
+    )
+    rows = lambda table: [list(line) for line in table]  # noqa: E731
+    theirs = checker.Loop(rows(flow), [(rows(jump), F(1))], [[F(0), F(1)]], [], None, F(1), start=rows(start))
+    for seen in (None, [arb(1), arb(0)]):  # and without its floats, which look for the slowest mode
+        if seen:
+            monkeypatch.setattr("quakedesign.certificates.guarantee.free_response.slowest", lambda _, seen=seen: seen)
+        with pytest.raises(ParameterError, match="stable"):
+            free_peaks(loop)
+    with pytest.raises(checker.Refused, match="must be stable"):
+        checker.start_gains(theirs)
+
+
+def test_sums_of_the_standalone_checker_are_rounded_up():
+    one = 1 << checker.BITS
+    assert checker.sums([3, one - 1, 5, 7], [one // 2, 1]) == [3, 3]  # 5/2 less a little, and more
 
 
 def test_a_box_counts_all_of_its_corners():
