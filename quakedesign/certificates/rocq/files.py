@@ -1,11 +1,11 @@
 """Self-contained files that Rocq's compiler verifies: the library of ``proofs/rocq``, a statement and its proof."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from quakedesign.certificates.claim import Evidence
+from quakedesign.certificates.claim import Evidence, Witness
 from quakedesign.certificates.files import evidence_of, read_json
 from quakedesign.certificates.obligations import claimed, different
 from quakedesign.certificates.rocq import gallina
@@ -15,6 +15,9 @@ from quakedesign.certificates.rocq.multipliers import reason
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.output import write_whole
+from quakedesign.sos.exact.attraction import LyapunovProof
+from quakedesign.sos.exact.attraction_files import is_about_attraction
+from quakedesign.sos.exact.attraction_files import read as read_attraction_file
 from quakedesign.sos.exact.files import is_about_polynomial
 from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.polynomial import evaluate
@@ -22,6 +25,7 @@ from quakedesign.sos.exact.proofs import Point, SumOfSquares
 from quakedesign.sos.exact.statement import Statement
 
 _LIBRARY = ("squares.v", "positivity.v", "loops.v")
+_KINDS = "a certificate for coqc must be sos, negative or a proof for a closed loop or a region of attraction."
 _DATA = "(* " + "=" * 16 + " the certificate *)\n\nLocal Open Scope nat_scope.\n"
 
 
@@ -40,6 +44,8 @@ def rocq_text(raw: Any) -> str:
 
 def statement_text(raw: Any) -> str:
     """Statement, data and theorem, without the library. Raises as `rocq_text`."""
+    if is_about_attraction(raw):
+        return "\n".join(_attraction(raw)) + "\n"
     return "\n".join(_polynomial(raw) if is_about_polynomial(raw) else _loop(raw)) + "\n"
 
 
@@ -119,9 +125,7 @@ def _polynomial(raw: Any) -> Iterator[str]:
     elif isinstance(proof, SumOfSquares):
         yield from _nonnegative(asked, proof)
     else:
-        raise UnsupportedError(
-            "a certificate for coqc must be sos, negative or a proof for a closed loop. Received not-sos. Use check.py."
-        )
+        raise UnsupportedError(f"{_KINDS} Received not-sos. Use check.py.")
 
 
 def _negative(asked: Statement, proof: Point) -> Iterator[str]:
@@ -147,23 +151,58 @@ def _nonnegative(asked: Statement, proof: SumOfSquares) -> Iterator[str]:
     )
 
 
+def _attraction(raw: Any) -> Iterator[str]:
+    claim = read_attraction_file(raw)
+    if not isinstance(claim.proof, LyapunovProof):
+        raise UnsupportedError(f"{_KINDS} Received a point that refutes an attraction. Use check.py.")
+    yield f"(* variables 0, 1, ...: {', '.join(claim.variables)} *)"
+    yield "(* V, and minus its derivative where V is at most the level *)"
+    parts = ((claim.positive, claim.proof.positive), (claim.decrease, claim.proof.decrease))
+    for number, (asked, proof) in enumerate(parts):
+        why = f" ({gallina.reason(reason(asked, proof.multiplier))})"
+        yield _part(asked, proof, "nonnegative", why).replace("@", str(number))
+    yield from _everywhere(range(len(parts)))
+
+
+def _everywhere(numbers: Sequence[int]) -> Iterator[str]:
+    """That all questions hold, each on its set."""
+    yield f"Definition questions : list question := {gallina.listed(f'asked_{n}' for n in numbers)}."
+    holds = "Forall (fun q => forall x, within x q -> (0 <= at_point x (target q))%R)"
+    yield f"Theorem certificate : {holds} questions.\nProof. exact ({_all(numbers)}). Qed."
+    yield "Print Assumptions certificate."
+
+
+def _all(numbers: Sequence[int]) -> str:
+    return f"{''.join(f'Forall_cons _ holds_{n} (' for n in numbers)}Forall_nil _{')' * len(numbers)}"
+
+
+def _part(asked: Statement, proof: SumOfSquares | Witness, check: str, tail: str = "") -> str:
+    """One question with its proof, with @ for its number."""
+    data = in_integers(asked, proof.squares, proof.cofactors)
+    return "\n".join(
+        [
+            f"Definition asked_@ : question := {gallina.question(asked)}.",
+            f"Definition proof_@ : witness := {gallina.witness(data)}.",
+            gallina.accepted(f"{check} asked_@ proof_@{tail}", "accepted_@"),
+            f"Definition holds_@ := {check}_sound asked_@ proof_@{tail} accepted_@.\n",
+        ]
+    )
+
+
 def _loop(raw: Any) -> Iterator[str]:
     if isinstance(raw, dict) and ("kind" in raw or "refutation" in raw):
-        raise UnsupportedError(
-            "a certificate for coqc must be sos, negative or a proof for a closed loop. "
-            f"Received a {raw.get('kind', 'refutation')}. Use check.py."
-        )
+        raise UnsupportedError(f"{_KINDS} Received a {raw.get('kind', 'refutation')}. Use check.py.")
     evidence = evidence_of(raw)
     names = []
     for number, (name, text) in enumerate(_obligations(evidence)):
         names.append(number)
         yield f"(* {name} *)\n{text.replace('@', str(number))}"
-    on_cells = evidence.loop.domain == "cells"
+    if evidence.loop.domain == "reals":
+        yield from _everywhere(names)
+        return
     yield f"Definition questions : list question := {gallina.listed(f'asked_{n}' for n in names)}."
-    everywhere = "Forall (fun q => forall x, within x q -> (0 <= at_point x (target q))%R)"
-    proof = f"{''.join(f'Forall_cons _ holds_{n} (' for n in names)}Forall_nil _{')' * len(names)}"
-    yield (f"Theorem certificate : {'all_hold' if on_cells else everywhere} questions.\nProof. exact ({proof}). Qed.")
-    yield from loop_theorems(evidence) if on_cells else ["Print Assumptions certificate."]
+    yield f"Theorem certificate : all_hold questions.\nProof. exact ({_all(names)}). Qed."
+    yield from loop_theorems(evidence)
 
 
 def _obligations(evidence: Evidence) -> Iterator[tuple[str, str]]:
@@ -172,19 +211,5 @@ def _obligations(evidence: Evidence) -> Iterator[tuple[str, str]]:
     for one in different(claimed(evidence.loop, evidence.lyapunov, evidence.claims)):
         given = evidence.witnesses[one.name]
         asked = statement_of(one, domain, given.multiplier)
-        proof = in_integers(asked, given.squares, given.cofactors)
-        check, sound = ("on_cell", "on_cell_sound asked_@ proof_@ accepted_@")
-        if domain == "reals":
-            check, sound = "nonnegative", "nonnegative_sound asked_@ proof_@ Terms accepted_@"
-        tail = " Terms" if domain == "reals" else ""
-        yield (
-            one.name,
-            "\n".join(
-                [
-                    f"Definition asked_@ : question := {gallina.question(asked)}.",
-                    f"Definition proof_@ : witness := {gallina.witness(proof)}.",
-                    gallina.accepted(f"{check} asked_@ proof_@{tail}", "accepted_@"),
-                    f"Definition holds_@ := {sound}.\n",
-                ]
-            ),
-        )
+        how = ("nonnegative", " Terms") if domain == "reals" else ("on_cell",)
+        yield one.name, _part(asked, given, *how)

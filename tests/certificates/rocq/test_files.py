@@ -121,12 +121,30 @@ def loop_file():
     return raw
 
 
+# x' = -x + x³ and V = x² below 3/4: V = (x)², −V̇ = 2x² − 2x⁴ = x²/2 + (3/4 − x²)·2x²
+ATTRACTION = {
+    "format": 1,
+    "kind": "attraction",
+    "variables": ["x"],
+    "field": [{"1": "-1", "3": "1"}],
+    "V": {"2": "1"},
+    "level": ["3/4"],
+    "multiplier": {"0": "1"},
+    "positive": {"squares": [square([[1]], "1")], "cofactors": [], "multiplier": []},
+    "decrease": {
+        "squares": [square([[1]], "1/2"), square([[1]], "2", product=[0])],
+        "cofactors": [],
+        "multiplier": [],
+    },
+}
+
 BY_HAND = {
     "Loop": loop_file(),
     "Constrained": CONSTRAINED,
     "Thin": THIN,
     "ThinSquare": THIN_SQUARE,
     "Negative": NEGATIVE,
+    "Attraction": ATTRACTION,
 }
 
 
@@ -215,6 +233,12 @@ def test_a_kind_without_theorem_is_refused(name, kind):
         rocq_text(read_json(CERTIFICATES / f"{name}.json"))
 
 
+def test_a_point_that_refutes_an_attraction_is_refused():
+    refuted = {key: ATTRACTION[key] for key in ("format", "kind", "variables", "field", "V")}
+    with pytest.raises(UnsupportedError, match="Received a point that refutes"):
+        rocq_text(refuted | {"level": ["2"], "negative": {"point": ["1"]}})
+
+
 def test_names_are_those_of_modules():
     assert module_name("cta_7_5_2.3_1.1") == "cta_7_5_2_3_1_1"
     assert module_name("2-cta") == "certificate_2_cta"
@@ -291,7 +315,7 @@ def test_coqc_accepts_what_holds_and_no_changed_digit(tmp_path):
     assert (code, err) == (0, "")
     loop, *others = out.split("Axioms:")[1:]
     assert axioms_of(loop) == ANALYSIS
-    assert [axioms_of(other) for other in others] == [REALS] * 4
+    assert [axioms_of(other) for other in others] == [REALS] * 5
     assert len(changed) > 250
 
 

@@ -7,6 +7,7 @@ import pytest
 from quakedesign import sos
 from quakedesign.sos.exact.files import load, text
 from quakedesign.sos.exact.text import parse
+from quakedesign.sos.solve import multipliers
 from quakedesign.sos.solve.multipliers import searched
 
 MOTZKIN = "{x}^4*{y}^2 + {x}^2*{y}^4 + {z}^6 - 3*{x}^2*{y}^2*{z}^2"
@@ -57,3 +58,17 @@ def test_what_is_not_a_form_has_multipliers_with_a_constant():
     multiplier = searched(names, polynomial, 2)
     assert multiplier[0, 0] > F(0)
     assert str(sos.prove(polynomial, variables=names, multiplier=multiplier).verdict) == "sos"
+
+
+@pytest.mark.parametrize("values", [[0.0] * 3, [1.0, 1.0, -0.5], [1.0, 1.0, 1e-9]])
+def test_what_rounds_to_no_sum_of_squares_is_no_multiplier(values, monkeypatch):
+    monkeypatch.setattr(multipliers, "_centred", lambda *_: values)
+    names, form = parse(MOTZKIN.format(x="x", y="y", z="z"))
+    found = searched(names, form, 2)
+    assert found is None or str(sos.prove(found, variables=names).verdict) == "sos"
+    assert (found is None) == (min(values) < 0 or not any(values))
+
+
+def test_forms_in_many_variables_are_not_searched():
+    names, form = parse(" + ".join(f"v{i}^2" for i in range(13)) + " + v0*v1 + v2*v3*0")
+    assert searched(names, form, 4) is None
