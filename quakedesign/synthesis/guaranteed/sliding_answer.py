@@ -1,7 +1,9 @@
 """What is guaranteed of a law that holds a rate-and-state fault in slow sliding, as `guarantee` says it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
+from functools import cached_property
+from math import exp
 from typing import Any, ClassVar, Unpack
 
 from quakedesign.certificates.guarantee import Held, NoGuarantee
@@ -10,6 +12,7 @@ from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask,
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
+from quakedesign.synthesis.guaranteed.sliding_adversary import WorstSliding, worst_sliding
 from quakedesign.synthesis.guaranteed.slow_sliding import (
     designed_sliding,
     largest_stress,
@@ -42,10 +45,17 @@ class SlidingAnswer:
         """Whether there is a guarantee."""
         return isinstance(self.found, SlidingGuarantee)
 
+    @cached_property
+    def worst(self) -> WorstSliding | None:
+        """The worst that a search finds, beside a guarantee; some tenths of a second for every corner of the box."""
+        return worst_sliding(self.found) if isinstance(self.found, SlidingGuarantee) else None
+
     def lines(self) -> list[str]:
         """For people."""
-        sentence = self.found.sentence()
-        return [f"proved: {sentence}" if self.proved else sentence]
+        if self.worst is None:
+            return [self.found.sentence()]
+        seen = f"slip error {self.worst.slip_error:.3g} m, slip rate {exp(self.worst.log_rate):.4g} V"
+        return [f"proved: {self.found.sentence()}", f"worst found without inertia: {seen}"]
 
     def limit_lines(self) -> list[str]:
         """What no controller can do at the same T_s; none is known."""
@@ -66,6 +76,7 @@ class SlidingAnswer:
             "delay": str(held.delay),
             "slip_noise": str(held.slip_noise),
             "measured": "slip",
+            "worst_found": self.worst and asdict(self.worst),
         }
 
 
