@@ -34,7 +34,7 @@ def conditions_figure(findings: Sequence["Finding"], title: str, note: str) -> A
         axis.plot([], [], _MARKS[kind], color="#444444", label=kind)
     axis.set(xscale="log", xlim=(_LEAST / 1.5, _MOST), yticks=range(len(names)), xlabel="largest slip error [m]")
     axis.set_yticklabels(names)
-    axis.invert_yaxis()
+    axis.set_ylim(len(names) - 0.5, -0.5)
     return finish(drawing, title, [], note, legend=axis)
 
 
@@ -43,14 +43,14 @@ def runs_figure(runs: Mapping[str, Mapping[str, "Trajectory"]], title: str, note
     drawing, axes = figure(3, 5.0, len(runs), sharex=True, sharey="row")
     for column, (condition, laws) in zip(axes.T, runs.items(), strict=True):
         named(column[0], condition)
-        for law, run in laws.items():
+        for behind, (law, run) in enumerate(laws.items()):
             minutes = run.time / 60
             values = (run.slip - known(run.reference)) * 1e3, run.slip_rate * 1e3, run.pressure / 1e3
             for axis, value in zip(column, values, strict=True):
-                axis.plot(minutes, value, color=colour(law), linewidth=0.8, label=law)
+                axis.plot(minutes, value, color=colour(law), linewidth=0.8, label=law, zorder=2 - behind / 10)
         column[-1].set_xlabel("time [min]", fontsize=SMALL)
     for axis, label in zip(axes[:, 0], ("slip error [mm]", "slip rate [mm/s]", "pressure [kPa]"), strict=True):
         axis.set_ylabel(label, fontsize=SMALL)
     for axis, width in zip(axes[:, 0], (1e-3, 1e-2, 10.0), strict=True):
         axis.set_yscale("symlog", linthresh=width)
-    return finish(drawing, title, [run for laws in runs.values() for run in laws.values()], note, legend=axes[0, 0])
+    return finish(drawing, title, [run for laws in runs.values() for run in laws.values()], note, legend=axes[0, -1])

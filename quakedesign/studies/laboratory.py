@@ -18,10 +18,10 @@ from quakedesign.controllers import Controller, published
 from quakedesign.fault import Disturbance, Fault, load_fault
 from quakedesign.loop.actuators import Actuator, Delay, Lag, Saturation, Stage
 from quakedesign.loop.running import SampledController
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.schemes import own_way, simulation_scheme
 from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Sensor, SlipStage, Transducer
 from quakedesign.loop.sensing.measurement import Measurement
-from quakedesign.simulation import Load
+from quakedesign.simulation import Load, natural_earthquake
 from quakedesign.simulation.campaign import Campaign, Problem, SerialExecutor, Space, campaign_problem, run_campaign
 from quakedesign.simulation.lanes import LANES
 from quakedesign.simulation.outcome import KINDS
@@ -34,12 +34,12 @@ _WAVES = 3
 _START = 1e-6  # m, within which specimens start
 _DECADE = 0.7  # of wavelengths, from that of the grains on
 _LARGEST_RATE = 0.4  # of a substep times η̂, from which on more substeps are taken
-_SURROUNDINGS = (
-    (1, 0, 1, "amplitude"),
-    (1, 1, 1, "amplitude"),
-    (1, 1, 1, "rate"),
-    (2, 0, 1, "rate"),
-    (2, 1, 1, "rate"),
+_SURROUNDINGS = (  # ms of delay, ms of lag, nm of the readings' error, class of the disturbance
+    (1, 0, 500, "amplitude"),
+    (1, 1, 500, "amplitude"),
+    (1, 1, 500, "rate"),
+    (2, 0, 500, "amplitude"),
+    (2, 1, 500, "rate"),
 )
 _SPREAD = MappingProxyType(
     {"stiffness": (0.95, 1.05), "damping": (0.8, 1.2), "authority": (0.95, 1.05), "weakening": (0.9, 1.0)}
@@ -116,6 +116,16 @@ class Apparatus:
             disturbance=Disturbance(constant=-self.deficit * base.authority / self.mass),
         )
 
+    def response(self) -> tuple[float, float]:
+        """Slip [m] of the natural earthquake, and the time [s] from a tenth to nine tenths of it; 0 if it is stable."""
+        fault = self.fault()
+        if not fault.rest_slip:
+            return 0.0, 0.0
+        event = natural_earthquake(fault)
+        slip = float(event.slip[-1])
+        first, last = np.interp((0.1 * slip, 0.9 * slip), np.maximum.accumulate(event.slip), event.time)
+        return slip, float(last - first)
+
     def load(self, seed: int) -> Load:
         """Roughness of one pair of surfaces: waves in slip of random length and phase, at nominal normal stress."""
         if not self.roughness:
@@ -156,13 +166,19 @@ class Apparatus:
             In place of LVDT and differentiator.
         """
         fault = self.fault()
-        step = fault.sampling_time
+        name, own, numbers = own_way(law, None, None)
+        step = fault.sampling_time if own is None else own
         substeps = max(2, math.ceil(step * fault.specific_damping / _LARGEST_RATE))
-        seen = measurement or self.sensor(step)
-        scheme = simulation_scheme("explicit", substeps=substeps, actuator=self.actuator(), measurement=seen)
-        plant = "coulomb" if self.stick else "smooth"
+        around = {"substeps": substeps, "actuator": self.actuator(), "measurement": measurement or self.sensor(step)}
         whole = campaign_problem(
-            fault, law, scheme=scheme, duration=duration, settled_from=0.0, plant=plant, load=self.load(seed), seed=seed
+            fault,
+            law,
+            scheme=simulation_scheme(str(name), **around, **numbers),
+            duration=duration,
+            settled_from=0.0,
+            plant="coulomb" if self.stick else "smooth",
+            load=self.load(seed),
+            seed=seed,
         )
         start = {"initial_slip": (self.initial_slip, self.initial_slip + _START)}
         return replace(whole, space=Space(MappingProxyType({**whole.space.ranges, **_SPREAD, **start})))
@@ -246,7 +262,7 @@ def conditions() -> dict[str, Apparatus]:
     every |= {
         f"quick λ_d, {name}": replace(smooth, **single[name]) for name in ("as printed", "mass x5", "damping x10")
     }
-    every |= {f"stick, λ_d {bound:g} m/s³": replace(stick, bound=bound) for bound in (1e-3, 10.0)}
+    every |= {f"stick, λ_d {bound:g} m/s³": replace(stick, bound=bound) for bound in (1e-4, 1e-3, 10.0)}
     return every | {"apparatus": known, "apparatus, λ_d 10 m/s³": replace(known, bound=10.0)}
 
 
@@ -290,17 +306,23 @@ def guarantees() -> dict[str, Answer]:
     """What is guaranteed of an e-LQR of the slip alone, in less and more of the apparatus, by its conditions."""
     fault = load_fault(PRESET)
     return {
-        f"{delay} ms late, lag {lag} ms, readings off by {noise} um, {kind}": answer(
+        f"{delay} ms late, lag {lag} ms, readings off by {noise} nm, {kind}": answer(
             fault,
             controller="elqr",
             measured="slip",
             delay=Fraction(delay, 1000),
             lag=Fraction(lag, 1000),
-            slip_noise=Fraction(noise, 10**6),
+            slip_noise=Fraction(noise, 10**9),
             disturbance_class=kind,
         )
         for delay, lag, noise, kind in _SURROUNDINGS
     }
+
+
+def as_proved(one: Apparatus, proof: Guarantee) -> Apparatus:
+    """An apparatus with the delay and the lag of a proof, without jitter."""
+    held = proof.held
+    return replace(one, delay=int(held.delay / held.step), jitter=0, lag=float(held.lag))
 
 
 def guaranteed_in(
