@@ -73,7 +73,8 @@ class Compensation:
         root = self.found.held.law.root
         low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
         if low == high == 1 and not root.remainder:
-            return "; its implicit step is deadbeat, e1 + T_s·w = 0, for all errors that are claimed"
+            deadbeat = "; its implicit step is deadbeat, e1 + T_s·w = 0, for all errors that are claimed"
+            return f"{deadbeat}, so it answers as any other law whose step is"
         return (
             f"; its implicit step ends at w = -γ·e1/T_s with γ from {low:.3g} to {high:.3g}, up to "
             f"{UpperBound(root.remainder):.2g} m/s, for all errors that are claimed"
