@@ -47,9 +47,9 @@ class Membership:
         size = max((abs(float(c)) for c in asked.values()), default=0.0)
         if size == 0 or not self._program.covers(asked):
             return 0.0 if size == 0 else float("-inf")
-        solution = self._program.solve({e: float(c) / size for e, c in asked.items()}, accuracy=1e-8)
+        margin = self._program.margin({e: float(c) / size for e, c in asked.items()}, 1e-8)
         self.solver_seconds = self._program.solver_seconds
-        return float("nan") if solution is None else solution.margin * size
+        return float("nan") if margin is None else margin * size
 
     def prove(self, polynomial: Mapping[Exponents, Fraction]) -> Answer:
         """Exact answer for one of the polynomials."""

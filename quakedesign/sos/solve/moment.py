@@ -90,7 +90,7 @@ class MomentProgram:
         )
         self.relation_count = len(relations)
         self._solver: Any = None
-        self._accuracy = 0.0
+        self._chosen: tuple[float, bool] | None = None
         self.solver_seconds = 0.0
 
     def covers(self, target: Mapping[Exponents, Any]) -> bool:
@@ -102,23 +102,34 @@ class MomentProgram:
 
         On a set without interior the largest margin may not be attained. Then a smaller one is asked for.
         """
-        return next(filter(None, (self._solve(target, accuracy, most) for most in _LARGEST_MARGINS)), None)
+        answers = (self._answer(target, (accuracy, True), most) for most in _LARGEST_MARGINS)
+        return next((self._solution(answer) for answer in answers if answer is not None), None)
 
-    def _solve(self, target: Mapping[Exponents, float], accuracy: float, most: float) -> Solution | None:
+    def margin(self, target: Mapping[Exponents, float], accuracy: float) -> float | None:
+        """The margin of `solve` alone, first without refinement of the linear systems, in two thirds of the time."""
+        quick = self._answer(target, (accuracy, False), _LARGEST_MARGINS[0])
+        if quick is not None:
+            return -float(quick.z[0])
+        solution = self.solve(target, accuracy)
+        return None if solution is None else solution.margin
+
+    def _answer(self, target: Mapping[Exponents, float], chosen: tuple[float, bool], most: float) -> Any:
+        """What the solver says; None if that is not worth looking at."""
         cost = np.append(self.vector(target), most)
-        if self._solver is None or self._accuracy != accuracy:
+        if self._solver is None or self._chosen != chosen:
             slack = [(0, len(self.keys), 1.0), (1 + self.relation_count, len(self.keys), -1.0)]
             A, b = self._matrix(slack, equations=1 + self.relation_count, limits=1)
             cones = [clarabel.ZeroConeT(1 + self.relation_count), clarabel.NonnegativeConeT(1), *self._cones()]
-            self._solver = clarabel.DefaultSolver(_zero(len(cost)), cost, A, b, cones, settings(accuracy))
-            self._accuracy = accuracy
+            self._solver = clarabel.DefaultSolver(_zero(len(cost)), cost, A, b, cones, settings(*chosen))
+            self._chosen = chosen
         else:
             self._solver.update(q=cost)
         answer = self._solver.solve()
         self.solver_seconds = answer.solve_time
+        return answer if useful(answer) else None
+
+    def _solution(self, answer: Any) -> Solution:
         x, z, s = (np.array(v) for v in (answer.x, answer.z, answer.s))
-        if not useful(answer):
-            return None
         count = 1 + self.relation_count
         margin = -z[0]
         grams, moments, start = [], [], count + 1
@@ -244,10 +255,11 @@ def options(accuracy: float) -> dict[str, Any]:
     return {"presolve_enable": False, "chordal_decomposition_enable": False, "max_iter": 100, **exact}
 
 
-def settings(accuracy: float) -> Any:
+def settings(accuracy: float, refined: bool = True) -> Any:
     """Settings of Clarabel with these values."""
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    settings.iterative_refinement_enable = refined
     for name, value in options(accuracy).items():
         setattr(settings, name, value)
     return settings
