@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -43,7 +43,18 @@ class SampleResult:
 
 
 class Program(Protocol):
-    """What a worker needs; it can be sent anywhere."""
+    """What a worker needs; it can be sent anywhere.
+
+    Attributes
+    ----------
+    lanes : int
+        Samples that are stepped at once.
+    batch_steps : int
+        Of all samples of a batch together: what is lost when a worker dies, some half a minute.
+    """
+
+    lanes: ClassVar[int]
+    batch_steps: ClassVar[int]
 
     @property
     def fingerprint(self) -> str:

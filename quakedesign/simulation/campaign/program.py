@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
 from quakedesign.simulation.backend import Backend, compiler, ladder, shared_library
 from quakedesign.simulation.instructions import expanded
-from quakedesign.simulation.lanes import LANE_FLAGS, lanes_c, processor_flags
+from quakedesign.simulation.lanes import LANE_FLAGS, LANES, lanes_c, processor_flags
 from quakedesign.simulation.stepping import Advancer
 from quakedesign.temporary import temporary_folder
 
@@ -76,6 +76,9 @@ class CompiledProgram:
     library : Library or None
         Where somebody has compiled the source already.
     """
+
+    lanes: ClassVar[int] = LANES
+    batch_steps: ClassVar[int] = 80_000_000
 
     source: str
     function: str

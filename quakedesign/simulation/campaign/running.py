@@ -26,7 +26,6 @@ from quakedesign.simulation.campaign.space import Sample, Space, require_count, 
 from quakedesign.simulation.campaign.stepped import SteppedProblem
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.integrators.dormand_prince import DormandPrince
-from quakedesign.simulation.lanes import LANES
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.sliding_conditions import TIDE
@@ -36,7 +35,6 @@ from quakedesign.workers import Crew, Processes
 if TYPE_CHECKING:
     import numpy as np
 
-BATCH_STEPS = 80_000_000  # of all samples of a batch together: what is lost when a worker dies, some half a minute
 LARGEST_BATCH = 64
 BATCHES_PER_WORKER = 8
 ROUNDS = 12
@@ -248,9 +246,9 @@ class _Runner:
         if self._batch is not None:
             require_count(self._batch)
             return self._batch
-        width, steps = self._crew.width, self._problem.setting.steps
-        wished = min(LARGEST_BATCH, -(-count // (BATCHES_PER_WORKER * width)), BATCH_STEPS // steps)
-        return max(1, min(-(-count // width), max(LANES, wished // LANES * LANES)))
+        width, steps, lanes = self._crew.width, self._problem.setting.steps, self._program.lanes
+        wished = min(LARGEST_BATCH, -(-count // (BATCHES_PER_WORKER * width)), self._program.batch_steps // steps)
+        return max(1, min(-(-count // width), max(lanes, wished // lanes * lanes)))
 
     def search(self, results: Sequence[SampleResult | None], metric: str, rounds: int) -> Worst | None:
         """Worst sample by a metric, from the worst one known and the corners on; None where all failed."""

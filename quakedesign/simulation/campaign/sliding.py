@@ -8,7 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -60,6 +60,9 @@ class SlidingProgram:
     settled_from : float
         [s].
     """
+
+    lanes: ClassVar[int] = 1
+    batch_steps: ClassVar[int] = 10_000
 
     fault: Fault
     law: LinearLaw

@@ -19,6 +19,7 @@ from quakedesign.loop import LinearLaw
 from quakedesign.simulation import Actuator, Lag, Load, Measurement, Tide, simulation_scheme
 from quakedesign.simulation.campaign import Campaign, SerialExecutor, campaign_problem, run_campaign, running
 from quakedesign.simulation.campaign.crews import Given
+from quakedesign.simulation.campaign.ledger import Ledger
 from quakedesign.simulation.sliding_conditions import SlidingVariation
 from quakedesign.synthesis.linear.plant.sliding_model import sliding_model
 from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
@@ -69,6 +70,15 @@ def test_processes_have_the_same_digits_and_files_answer(serial, tmp_path):
     more = run_campaign(PROBLEM, 7, folder, executor=SerialExecutor())
     assert (more.resumed, more.results[:6]) == (6, found.results)
     assert more.metrics == PROBLEM.metrics
+
+
+def test_a_batch_over_a_whole_task_is_a_few_samples(tmp_path):
+    """Some seconds each, all of which a worker that dies loses; of a short run as many as for other faults."""
+    for duration, most in ((1e6, 3), (30000.0, 64)):
+        problem = campaign_problem(PATCH, CONTROLLER, duration=duration)
+        with Given(SerialExecutor(), width=1) as crew:
+            runner = running._Runner(problem, Ledger(tmp_path, ""), problem.program, crew, None, lambda *_: None)
+            assert runner._batch_size(2000) == most
 
 
 def test_the_search_finds_the_largest_share_of_the_stress(tmp_path):
