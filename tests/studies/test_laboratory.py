@@ -141,7 +141,7 @@ def test_stick_and_a_quick_differentiator_explain_it_together_and_not_alone():
     quick = replace(stick, bound=KNOWN.bound)
     chosen = {"stick": stick, "both": quick, "quick": replace(quick, stick=0)}
     found: dict[tuple[str, str], Finding] = {}
-    for one in explain(chosen, specimens=4, duration=400.0):
+    for one in explain(chosen, specimens=4, duration=600.0):
         found[one.condition, one.law] = one
     assert {f.harmless for (name, _), f in found.items() if name == "both"} == {4}
     assert {f.harmless for (name, _), f in found.items() if name == "stick"} == {0}
