@@ -1,9 +1,11 @@
 """The command about the loop that runs."""
 
 import json
+from dataclasses import replace
 from fractions import Fraction as F
 from importlib import import_module
 
+import numpy as np
 import pytest
 
 from quakedesign.certificates.command import check_files
@@ -59,6 +61,28 @@ def test_given_gains_for_people(call):
     assert "worst found with stick" in out
     assert "of the box: the slip rate never exceeds" in " ".join(out.split())
     assert max(map(len, out.splitlines())) <= 200
+
+
+def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks(call):
+    """Of the design one period late, run on a fault at rest whatever it asks for: its own recursion, by hand."""
+    _, out, _ = call("real-fault", "--delay", "184 ms", "--json")
+    found = json.loads(out)
+    rows, seen = (
+        np.array([[float(F(v)) for v in row] for row in found["law"][name]]) for name in ("update", "measured")
+    )
+    states, sizes = np.zeros(len(rows)), []
+    for _ in range(200):
+        states = rows @ states + seen @ np.array([1e-6, 0.0])
+        sizes.append(np.abs(states).max())
+    assert found["grows_at_rest"] == pytest.approx(0.184 * 20 / np.log(sizes[-1] / sizes[-21]), rel=1e-6)
+    held = answer(load_fault("real-fault"))
+    assert held.proved
+    assert held.grows_at_rest is None  # it has an integral, and grows no faster than a line
+    law = replace(held.found.held.law, update=((F(1), F(0)), (F(0), F(-11, 10))))
+    wild = replace(held, found=replace(held.found, held=replace(held.found.held, law=law)))
+    assert wild.grows_at_rest == pytest.approx(0.184 / np.log(1.1))
+    assert wild.lines()[1].startswith("NOT for a fault that sticks: by itself the law is unstable")
+    assert not any("NOT" in line for line in held.lines())
 
 
 def test_gains_that_are_not_guaranteed_say_what_fails(call):

@@ -1,7 +1,10 @@
 """What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds."""
 
 from dataclasses import dataclass, replace
+from math import log
 from typing import Any
+
+import numpy as np
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Verdict
@@ -12,6 +15,8 @@ from quakedesign.loop import LinearLaw
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
 from quakedesign.synthesis.guaranteed.families import MEASURED
+
+_GROWS = 1 + 1e-6  # a factor per sample; eigenvalues that are 1 twice are rounded by less
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +54,7 @@ class Answer:
             if self.shorter is not None:
                 said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             return [*said, "the command limits tells for which T_s, delays and wells designs of this fault have one"]
-        said = [f"proved: {self.found.sentence()}"]
+        said = [f"proved: {self.found.sentence()}", *self._at_rest()]
         for name, seen in (("worst found", self.worst), ("worst found with stick", self.worst_with_stick)):
             if seen is not None:
                 said.append(
@@ -59,6 +64,29 @@ class Answer:
         if self.leaves_with_stick:
             said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
         return said if self.compensation is None else [*said, self.compensation.sentence()]
+
+    @property
+    def grows_at_rest(self) -> float | None:
+        """Time [s] in which the law's states grow e-fold while friction holds the fault at rest; None if they do not.
+
+        Then what is measured no longer answers to the pressure, and the law is left to itself.
+        """
+        if not isinstance(self.found, Guarantee):
+            return None
+        held = self.found.held
+        own = np.array(held.law.update, dtype=float)
+        growth = float(np.max(np.abs(np.linalg.eigvals(own)), initial=0.0))
+        return float(held.step) / log(growth) if growth > _GROWS else None
+
+    def _at_rest(self) -> list[str]:
+        """For people; nothing of a law that does not grow."""
+        time = self.grows_at_rest
+        if time is None:
+            return []
+        return [
+            "NOT for a fault that sticks: by itself the law is unstable, and while friction holds the fault at rest "
+            f"its pressure grows e-fold in {time:.3g} s"
+        ]
 
     def limit_lines(self) -> list[str]:
         """What no controller can do at the same T_s, for people; empty where that is not known."""
@@ -118,6 +146,7 @@ class Answer:
             "small_gain": small,
             "worst_found": _seen(self.worst),
             "worst_found_with_stick": _seen(self.worst_with_stick),
+            "grows_at_rest": self.grows_at_rest,
             "limit": _limit(self.limit),
             "step": str(self.found.held.step),
             "measured": MEASURED[self.found.held.law.of_slip_alone],
