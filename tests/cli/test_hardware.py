@@ -44,7 +44,7 @@ def test_an_actuator_in_units_gives_volume_and_flow_rate_in_units(run, tmp_path)
     assert code == 0
     told = answer["run"]["actuator"]
     for stage in (
-        "Delay(samples=2)",
+        "Delay(samples=2, jitter=0, seed=0)",
         "Quantisation(quantum=1.0)",
         "Saturation(lowest=-5000.0, highest=20000.0)",
         "RateLimit(rate=1000000.0)",
