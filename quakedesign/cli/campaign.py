@@ -77,7 +77,7 @@ def campaign(
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
     loaded = load_fault(fault, box=box)
-    controller, told = state.choose(loaded, law, actuator.diffusion)
+    controller, told = state.choose(loaded, law, actuator.told()["diffusion"])
     way, step, own = run.way(controller)
     period = loaded.sampling_time if step is None else step
     problem = campaign_problem(

@@ -1,72 +1,57 @@
 """Options about what lies around a controller: actuator and sensors, the same for every command that runs one."""
 
 import math
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, make_dataclass
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Group, Parameter
 
 from quakedesign.cli.shared import (
-    CubicMetresPerPascal,
     Hertz,
     Metres,
     MetresPerSecond,
-    Pascals,
-    PascalsPerSecond,
-    Seconds,
     Whole,
     in_unit,
+    quantity,
+    whole,
 )
 from quakedesign.errors import ParameterError
+from quakedesign.loop.actuators import Actuator, Stage, stages
+from quakedesign.loop.actuators.base import Option
 
 if TYPE_CHECKING:
-    from quakedesign.loop.actuators import Stage
-    from quakedesign.simulation import Actuator, Sensor
-
-_SAME = 1e-9  # of a sampling period
+    from quakedesign.simulation import Sensor
 
 _ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
 _SENSORS = Group("Sensors (schemes that sample)")
+Options = TypeVar("Options")
+
+
+def _asks_every_stage(options: type[Options]) -> type[Options]:
+    """Frozen dataclass with the options that the stages of the package declare."""
+    asked = [option for stage in stages().values() for option in stage.options]
+    fields = [(option.name, _annotation(option), option.default) for option in asked]
+    doc = {"__doc__": options.__doc__, "__module__": options.__module__}
+    return make_dataclass(options.__name__, fields, bases=(options,), namespace=doc, frozen=True, kw_only=True)
+
+
+def _annotation(option: Option) -> Any:
+    read: Any = quantity(option.unit) if option.unit else whole
+    kind: Any = float if option.unit else int
+    return Annotated[kind if option.default is not None else kind | None, Parameter(converter=read, help=option.help)]
 
 
 @Parameter(name="*", group=_ACTUATOR)
-@dataclass(frozen=True, kw_only=True)
+@_asks_every_stage
 class ActuatorOptions:
-    """Stages between law and fault, for schemes that sample.
+    """Stages between law and fault, for schemes that sample: what each declares where it is defined."""
 
-    Parameters
-    ----------
-    delay
-        Time that the computation takes, a whole number of steps, such as '2 ms'.
-    quantum
-        Resolution of the pressure, such as '1 kPa'.
-    saturation
-        Largest pressure, such as '20 MPa', and largest withdrawal unless that is given.
-    withdrawal
-        Largest decrease of the pressure; 0 for a pump that only injects.
-    rate_limit
-        Fastest change of the pressure, such as '1 MPa/s'.
-    lag
-        Time constant of pump and pipe, such as '1 s'.
-    diffusion
-        L^2/D of the rock between well and fault, such as '100 s'; the smaller, the more substeps it needs.
-    storage
-        Fluid that this rock takes up per pressure, such as '1e-4 m^3/Pa'; gives injected volume and flow rate.
-    cells
-        Of the model of this rock.
-    """
+    def told(self) -> dict[str, Any]:
+        """Values in SI units, by the names of the options."""
+        return dict(vars(self))
 
-    delay: Seconds = 0.0
-    quantum: Pascals | None = None
-    saturation: Pascals | None = None
-    withdrawal: Pascals | None = None
-    rate_limit: PascalsPerSecond | None = None
-    lag: Seconds | None = None
-    diffusion: Seconds | None = None
-    storage: CubicMetresPerPascal | None = None
-    cells: Whole = 16
-
-    def build(self, step: float) -> "Actuator":
+    def build(self, step: float) -> Actuator:
         """Stages of an actuator in the order of the signal, for a sampling period [s].
 
         Raises
@@ -74,35 +59,22 @@ class ActuatorOptions:
         ParameterError
             For values that a stage refuses, or for a part of a stage that is not there.
         """
-        from quakedesign.simulation import Actuator, Delay, Diffusion, Lag, Quantisation, RateLimit, Saturation
+        chosen = (_stage(stage, self.told(), step) for stage in stages().values() if stage.options)
+        return Actuator(stages=tuple(stage for stage in chosen if stage is not None))
 
-        if self.storage is not None and self.diffusion is None:
-            raise ParameterError(f"a storage belongs to a diffusion. Received {self.storage:g} m³/Pa alone. Give both.")
-        if self.withdrawal is not None and self.saturation is None:
+
+def _stage(stage: type[Stage], told: Mapping[str, Any], step: float) -> Stage | None:
+    """One stage; None where it is not asked for."""
+    first, *others = stage.options
+    if told[first.name] != first.default:
+        return stage.asked(step, **{option.name: told[option.name] for option in stage.options})
+    for other in others:
+        if told[other.name] is not None and other.default is None:
             raise ParameterError(
-                f"a withdrawal belongs to a saturation. Received {self.withdrawal:g} Pa alone. Give both."
+                f"a {other.name} belongs to a {first.name}. Received {told[other.name]:g} {other.unit} alone. "
+                "Give both."
             )
-        stages: list[Stage] = [Delay(samples=_periods(self.delay, step))] if self.delay else []
-        stages += [] if self.quantum is None else [Quantisation(quantum=self.quantum)]
-        if self.saturation is not None:
-            least = 0.0 - (self.saturation if self.withdrawal is None else self.withdrawal)
-            stages.append(Saturation(lowest=least, highest=self.saturation))
-        stages += [] if self.rate_limit is None else [RateLimit(rate=self.rate_limit)]
-        stages += [] if self.lag is None else [Lag(time_constant=self.lag)]
-        if self.diffusion is not None:
-            stages.append(Diffusion.of_time(self.diffusion, storage=self.storage, cells=self.cells))
-        return Actuator(stages=tuple(stages))
-
-
-def _periods(delay: float, step: float) -> int:
-    """Number of sampling periods in a delay [s]."""
-    count = round(delay / step) if step > 0 and 0 <= delay < 1e9 * step else -1
-    if count < 0 or abs(delay - count * step) > _SAME * step:
-        raise ParameterError(
-            f"delay must be a whole number of sampling periods of {step:g} s, since p is held over each. "
-            f"Received {delay:g} s. Change the delay or the step."
-        )
-    return count
+    return None
 
 
 @Parameter(name="*", group=_SENSORS)

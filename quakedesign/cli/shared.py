@@ -36,7 +36,7 @@ def _gains(_type: Any, tokens: Sequence[Any]) -> tuple[str, ...]:
 Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_gains)]
 
 
-def _reader(unit: str) -> Callable[[Any, Sequence[Any]], float]:
+def quantity(unit: str) -> Callable[[Any, Sequence[Any]], float]:
     """Converter of an option's text, with a unit or a bare number in the SI unit."""
 
     def read(_type: Any, tokens: Sequence[Any]) -> float:
@@ -53,7 +53,8 @@ def in_unit(text: str, unit: str, name: str) -> float:
         return _with_unit(text, unit, name)
 
 
-def _whole(_type: Any, tokens: Sequence[Any]) -> int:
+def whole(_type: Any, tokens: Sequence[Any]) -> int:
+    """Whole number of an option's text."""
     text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
     try:
         return int(text)
@@ -83,20 +84,18 @@ def _with_unit(text: str, unit: str, name: str) -> float:
     return si_value(text, unit, name)
 
 
-Seconds = Annotated[float, Parameter(converter=_reader("s"))]
-Hertz = Annotated[float, Parameter(converter=_reader("Hz"))]
-Metres = Annotated[float, Parameter(converter=_reader("m"))]
-MetresPerSecond = Annotated[float, Parameter(converter=_reader("m/s"))]
-MetresPerSecondSquared = Annotated[float, Parameter(converter=_reader("m/s^2"))]
-Pascals = Annotated[float, Parameter(converter=_reader("Pa"))]
-PascalsPerSecond = Annotated[float, Parameter(converter=_reader("Pa/s"))]
-SquareMetresPerSecond = Annotated[float, Parameter(converter=_reader("m^2/s"))]
-CubicMetresPerPascal = Annotated[float, Parameter(converter=_reader("m^3/Pa"))]
+Seconds = Annotated[float, Parameter(converter=quantity("s"))]
+Hertz = Annotated[float, Parameter(converter=quantity("Hz"))]
+Metres = Annotated[float, Parameter(converter=quantity("m"))]
+MetresPerSecond = Annotated[float, Parameter(converter=quantity("m/s"))]
+MetresPerSecondSquared = Annotated[float, Parameter(converter=quantity("m/s^2"))]
+Pascals = Annotated[float, Parameter(converter=quantity("Pa"))]
+SquareMetresPerSecond = Annotated[float, Parameter(converter=quantity("m^2/s"))]
 ExactSeconds = Annotated[str, Parameter(converter=_exact_reader("s"))]
 ExactPascals = Annotated[str, Parameter(converter=_exact_reader("Pa"))]
 ExactMetres = Annotated[str, Parameter(converter=_exact_reader("m"))]
 ExactMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m/s"))]
-Whole = Annotated[int, Parameter(converter=_whole)]
+Whole = Annotated[int, Parameter(converter=whole)]
 Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)

@@ -1,5 +1,11 @@
 """Actuators as the command line makes them."""
 
+import dataclasses
+import json
+import re
+import subprocess
+import sys
+
 import pytest
 
 from quakedesign.cli.hardware import ActuatorOptions
@@ -70,3 +76,74 @@ def test_a_delay_is_a_whole_number_of_periods(delay):
 def test_what_a_stage_refuses_is_refused(more, said):
     with pytest.raises(ParameterError, match=said):
         actuator(0.1, **more)
+
+
+OPTIONS = [option for stage in stages().values() for option in stage.options]
+
+
+def test_every_stage_of_the_package_has_options_that_no_other_has():
+    assert all(stage.options for stage in stages().values())
+    assert [field.name for field in dataclasses.fields(ActuatorOptions)] == [option.name for option in OPTIONS]
+    assert len({option.name for option in OPTIONS}) == len(OPTIONS)
+
+
+@pytest.mark.parametrize("option", OPTIONS, ids=lambda option: option.name)
+def test_an_option_says_in_a_sentence_what_it_is(option):
+    assert option.name.isidentifier()
+    assert re.fullmatch(r"[A-Z].*\.", option.help)
+
+
+@pytest.mark.parametrize("name", stages())
+def test_a_stage_is_made_of_its_own_options_alone(name):
+    stage = stages()[name]
+    (found,) = actuator(1.0, **{stage.options[0].name: 2.0}).stages
+    assert type(found) is stage
+
+
+LEAK = '''
+"""A well that leaks."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from quakedesign.loop.actuators.base import Option, SampledStage
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leak(SampledStage):
+    """Takes a pressure away."""
+
+    name: ClassVar[str] = "leak"
+    place: ClassVar[int] = 0
+    options: ClassVar[tuple[Option, ...]] = (Option(name="leak", unit="Pa", help="What is lost."),)
+
+    leak: float
+
+    @property
+    def numbers(self):
+        """What is lost [Pa]."""
+        return (self.leak,)
+
+    def apply(self, numbers, memory, pressure, step):
+        """What is left."""
+        return pressure - numbers[0], memory
+'''
+
+
+def test_an_actuator_is_one_file_its_option_included(tmp_path):
+    """Beside the others, with nothing else changed: told by the help, read in units, put in its place and run."""
+    (tmp_path / "leak.py").write_text(LEAK)
+    run = ("simulate", "lab-fault", "--controller", "cta", "--duration", "20 ms", "--scheme", "explicit")
+    for arguments, said in (
+        (("simulate", "--help"), r"--leak FLOAT +What is lost\."),
+        ((*run, "--leak", "2 kPa", "--delay", "2 ms", "--json"), r"Leak\(leak=2000\.0\), Delay\(samples=2"),
+    ):
+        lines = (
+            "import quakedesign.loop.actuators as folder",
+            f"folder.__path__.append({str(tmp_path)!r})",
+            "from quakedesign.cli import main",
+            f"main({json.dumps(arguments)})",
+        )
+        done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert re.search(said, done.stdout)

@@ -1,7 +1,30 @@
 """What every stage of an actuator offers."""
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Option:
+    """What a command line asks about a stage.
+
+    Attributes
+    ----------
+    name : str
+        As an identifier of Python.
+    unit : str
+        SI; empty for a whole number.
+    help : str
+        A sentence.
+    default : float or None
+        What it is unless given; None where it is left out.
+    """
+
+    name: str
+    unit: str
+    help: str
+    default: float | None = None
 
 
 class Stage(ABC):
@@ -16,10 +39,21 @@ class Stage(ABC):
     limits : bool
         Whether an output that differs from the input means that the law asked for more than there is, so that its
         integral states must not wind up.
+    options : tuple of Option
+        Of the command line; a stage is there where the first is not its default. None: only Python has the stage.
+    place : int
+        Where the command line puts it, along the signal: behind what acts as it does and has a smaller one.
     """
 
     name: ClassVar[str]
     limits: ClassVar[bool] = False
+    options: ClassVar[tuple[Option, ...]] = ()
+    place: ClassVar[int] = 100
+
+    @classmethod
+    def asked(cls, step: float, **values: Any) -> Self:
+        """Stage from the values of its `options`, for a sampling period [s]; those are its fields unless overridden."""
+        return cls(**values)
 
     @property
     def numbers(self) -> tuple[float, ...]:

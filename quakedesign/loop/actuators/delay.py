@@ -1,15 +1,16 @@
 """Time that the computation takes."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import casadi as ca
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop.actuators.base import SampledStage
+from quakedesign.loop.actuators.base import Option, SampledStage
 from quakedesign.loop.sensing.measurement import Measurement, generator, uniform
 
 MOST_SAMPLES = 100
+_SAME = 1e-9  # of a sampling period
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +33,15 @@ class Delay(SampledStage):
     """
 
     name: ClassVar[str] = "delay"
+    place: ClassVar[int] = 1
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(
+            name="delay",
+            unit="s",
+            help="Time that the computation takes, a whole number of steps, such as '2 ms'.",
+            default=0.0,
+        ),
+    )
 
     samples: int
     jitter: int = 0
@@ -42,6 +52,23 @@ class Delay(SampledStage):
             if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_SAMPLES:
                 raise ParameterError(f"{name} must be a whole number, 0 to {MOST_SAMPLES}. Received {value!r}.")
         Measurement(seed=self.seed)
+
+    @classmethod
+    def asked(cls, step: float, *, delay: float) -> Self:  # type: ignore[override]
+        """See `Stage.asked`.
+
+        Raises
+        ------
+        ParameterError
+            For a delay that is no whole number of periods.
+        """
+        count = round(delay / step) if step > 0 and 0 <= delay < 1e9 * step else -1
+        if count < 0 or abs(delay - count * step) > _SAME * step:
+            raise ParameterError(
+                f"delay must be a whole number of sampling periods of {step:g} s, since p is held over each. "
+                f"Received {delay:g} s. Change the delay or the step."
+            )
+        return cls(samples=count)
 
     @property
     def start(self) -> tuple[float, ...]:

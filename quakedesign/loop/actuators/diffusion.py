@@ -4,11 +4,11 @@ import cmath
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault.checks import require_positive
-from quakedesign.loop.actuators.base import FlowStage
+from quakedesign.loop.actuators.base import FlowStage, Option
 
 MOST_CELLS = 200
 
@@ -46,6 +46,21 @@ class Diffusion(FlowStage):
     """
 
     name: ClassVar[str] = "diffusion"
+    place: ClassVar[int] = 6
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(
+            name="diffusion",
+            unit="s",
+            help="L^2/D of the rock between well and fault, such as '100 s'; the smaller, the more substeps it needs.",
+        ),
+        Option(
+            name="storage",
+            unit="m^3/Pa",
+            help="Fluid that this rock takes up per pressure, such as '1e-4 m^3/Pa'; gives injected volume and flow "
+            "rate.",
+        ),
+        Option(name="cells", unit="", help="Of the model of this rock.", default=16),
+    )
 
     length: float
     diffusivity: float
@@ -61,7 +76,7 @@ class Diffusion(FlowStage):
             raise ParameterError(f"cells must be a whole number, 1 to {MOST_CELLS}. Received {self.cells!r}.")
 
     @classmethod
-    def of_time(cls, time: float, *, storage: float | None = None, cells: int = 16) -> "Diffusion":
+    def of_time(cls, time: float, *, storage: float | None = None, cells: int = 16) -> Self:
         """Layer of which only τ = L²/D [s] is known; it is given the length of 1 m, which changes nothing.
 
         Raises
@@ -70,6 +85,11 @@ class Diffusion(FlowStage):
         """
         require_positive(time=time)
         return cls(length=1.0, diffusivity=1.0 / time, storage=storage, cells=cells)
+
+    @classmethod
+    def asked(cls, step: float, *, diffusion: float, **values: Any) -> Self:  # type: ignore[override]
+        """See `Stage.asked`."""
+        return cls.of_time(diffusion, **values)
 
     @property
     def time(self) -> float:

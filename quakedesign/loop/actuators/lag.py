@@ -1,10 +1,10 @@
 """Inertia of pump and pipe."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from quakedesign.fault.checks import require_positive
-from quakedesign.loop.actuators.base import FlowStage
+from quakedesign.loop.actuators.base import FlowStage, Option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,11 +22,20 @@ class Lag(FlowStage):
     """
 
     name: ClassVar[str] = "lag"
+    place: ClassVar[int] = 5
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(name="lag", unit="s", help="Time constant of pump and pipe, such as '1 s'."),
+    )
 
     time_constant: float
 
     def __post_init__(self) -> None:
         require_positive(time_constant=self.time_constant)
+
+    @classmethod
+    def asked(cls, step: float, *, lag: float) -> Self:  # type: ignore[override]
+        """See `Stage.asked`."""
+        return cls(time_constant=lag)
 
     @property
     def numbers(self) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from quakedesign.fault.checks import require_positive
-from quakedesign.loop.actuators.base import SampledStage
+from quakedesign.loop.actuators.base import Option, SampledStage
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +24,10 @@ class Quantisation(SampledStage):
     """
 
     name: ClassVar[str] = "quantisation"
+    place: ClassVar[int] = 2
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(name="quantum", unit="Pa", help="Resolution of the pressure, such as '1 kPa'."),
+    )
 
     quantum: float
 

@@ -1,12 +1,12 @@
 """Fastest change of pressure that the pump can make."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import casadi as ca
 
 from quakedesign.fault.checks import require_positive
-from quakedesign.loop.actuators.base import SampledStage
+from quakedesign.loop.actuators.base import Option, SampledStage
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,11 +25,20 @@ class RateLimit(SampledStage):
 
     name: ClassVar[str] = "rate-limit"
     limits: ClassVar[bool] = True
+    place: ClassVar[int] = 4
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(name="rate_limit", unit="Pa/s", help="Fastest change of the pressure, such as '1 MPa/s'."),
+    )
 
     rate: float
 
     def __post_init__(self) -> None:
         require_positive(rate=self.rate)
+
+    @classmethod
+    def asked(cls, step: float, *, rate_limit: float) -> Self:  # type: ignore[override]
+        """See `Stage.asked`."""
+        return cls(rate=rate_limit)
 
     @property
     def numbers(self) -> tuple[float, ...]:

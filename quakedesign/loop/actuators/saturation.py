@@ -2,12 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import casadi as ca
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop.actuators.base import SampledStage
+from quakedesign.loop.actuators.base import Option, SampledStage
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +26,15 @@ class Saturation(SampledStage):
 
     name: ClassVar[str] = "saturation"
     limits: ClassVar[bool] = True
+    place: ClassVar[int] = 3
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(
+            name="saturation",
+            unit="Pa",
+            help="Largest pressure, such as '20 MPa', and largest withdrawal unless that is given.",
+        ),
+        Option(name="withdrawal", unit="Pa", help="Largest decrease of the pressure; 0 for a pump that only injects."),
+    )
 
     lowest: float
     highest: float
@@ -37,6 +46,11 @@ class Saturation(SampledStage):
                 "lowest and highest pressure must be finite, with 0 between them. "
                 f"Received {self.lowest!r} Pa and {self.highest!r} Pa."
             )
+
+    @classmethod
+    def asked(cls, step: float, *, saturation: float, withdrawal: float | None) -> Self:  # type: ignore[override]
+        """See `Stage.asked`."""
+        return cls(lowest=0.0 - (saturation if withdrawal is None else withdrawal), highest=saturation)
 
     @property
     def numbers(self) -> tuple[float, ...]:
