@@ -74,8 +74,7 @@ class Answer:
         if not isinstance(self.found, Guarantee):
             return None
         held = self.found.held
-        own = np.array(held.law.update, dtype=float)
-        growth = float(np.max(np.abs(np.linalg.eigvals(own)), initial=0.0))
+        growth = float(np.max(np.abs(held.law.own_poles), initial=0.0))
         return float(held.step) / log(growth) if growth > _GROWS else None
 
     def _at_rest(self) -> list[str]:

@@ -27,6 +27,7 @@ MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
 _MOST_GROWTH = 50.0  # logarithm; no law of samples answers that, and predictions far beyond it overflow
 _FAILED = 1e6
 _HOPELESS = 1.2  # small gain of a whole search after which no other start is tried
+_SETTLES = 0.9  # per period of the family, of what a law does by itself while the fault sticks, but for its integral
 _FAR, _ENOUGH = 3.0, 40  # small gain that a search gives up at after so many evaluations
 
 
@@ -167,13 +168,25 @@ class _Laws:
         far = _FAR * _FAILED if self.template.diffusion else inf
 
         def cost(x: np.ndarray) -> float:
-            return _peak_cost(self.seen(x), self.family.period)
+            return self.quiet(x, _peak_cost(self.seen(x), self.family.period))
 
         return _search_once(("peak", *self.question), cost, start, far=far, **settings)
 
     def least_drift(self, start: Sequence[float] | np.ndarray, limit: float) -> tuple[float, np.ndarray]:
         """Smallest cost of a drift near a start, and where, within a limit of the slip-rate error [m/s]."""
-        return _search_once(("drift", limit, *self.question), lambda x: _drift_cost(self.seen(x), limit), start)
+
+        def cost(x: np.ndarray) -> float:
+            return self.quiet(x, _drift_cost(self.seen(x), limit))
+
+        return _search_once(("drift", limit, *self.question), cost, start)
+
+    def quiet(self, x: np.ndarray, cost: float) -> float:
+        """The cost of a law; that of none where the law, left to itself while the fault sticks, settles too slowly."""
+        if cost >= 10 * _FAILED:
+            return cost
+        slowest = _SETTLES ** float(self.template.step / self.family.period)
+        over = float(np.abs(self.family.law(x).own_poles[1:]).max(initial=0)) / slowest
+        return cost if over <= 1 else max(cost, min(over, 9.0) * _FAILED)
 
 
 def _hopeless(cost: float) -> bool:

@@ -17,6 +17,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.synthesis import Design
 from quakedesign.synthesis.guaranteed import Answer, design_held, worst_found
+from quakedesign.synthesis.guaranteed.adversary import WorstFound
 from quakedesign.synthesis.guaranteed.design import first_held
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
@@ -114,15 +115,27 @@ def test_courses_along_the_nominal_response_come_close_and_stay_below(row):
 
 
 def test_where_stick_leaves_the_bounds_the_answer_says_so():
-    """One period late the slip error of the sticking fault exceeds what is proved of the continued one."""
-    claim = designed("real one period late")
-    seen = worst("real one period late", sticks=True)
-    assert seen.slip_error > claim.claims.slip_error
-    found = Answer(fault=load_fault("real-fault"), found=claim, worst_with_stick=seen)
+    claim = designed("real peak")
+    beyond = WorstFound(slip_error=1.01 * float(claim.claims.slip_error), slip_rate_error=0.0)
+    found = Answer(fault=load_fault("real-fault"), found=claim, worst_with_stick=beyond)
     assert found.lines()[-1].startswith("with stick a course was found that leaves the bounds")
+    within = replace(found, worst_with_stick=replace(beyond, slip_error=0.99 * float(claim.claims.slip_error)))
+    assert not within.leaves_with_stick
 
 
-@pytest.mark.parametrize("row", [row for row in ROWS if row not in DELAYS])
+@pytest.mark.parametrize("row", ROWS)
+def test_a_designed_law_left_to_itself_settles_but_for_its_integral(row):
+    """On a fault that rests whatever the pressure, the pressure that is asked for grows evenly, and no faster."""
+    law = designed(row).held.law
+    rows, seen, output = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output))
+    states, asked = np.zeros(len(output)), []
+    for _ in range(260):
+        asked.append(output @ states)
+        states = rows @ states + seen @ [1e-6, -1e-6]
+    assert np.abs(np.diff(asked, 2)[-60:]).max() < 1e-8 * np.abs(asked).max()
+
+
+@pytest.mark.parametrize("row", ROWS)
 def test_with_stick_no_course_leaves_the_bounds(row):
     """The reference moves at its largest rate; the fault never slides backward."""
     claim = designed(row)
