@@ -10,18 +10,17 @@ from quakedesign.certificates import guarantee, slow_sliding
 from quakedesign.certificates.certificate import Certificate
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.files import evidence_of, read_json
-from quakedesign.certificates.kinds import is_guarantee, is_sliding
+from quakedesign.certificates.kinds import ATTRACTION, GUARANTEE, LOOP, SLOW_SLIDING, kind_of
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.sos.exact.answer import Answer, Positivity
-from quakedesign.sos.exact.attraction_files import is_about_attraction
 from quakedesign.sos.exact.attraction_files import read as read_attraction
 from quakedesign.sos.exact.attraction_words import claim_words
-from quakedesign.sos.exact.files import is_about_polynomial
 from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.words import sentences
 from quakedesign.symbolic.terms import written
 
 if TYPE_CHECKING:
+    from quakedesign.certificates.guarantee.files import Claim
     from quakedesign.fault import Fault
 
 
@@ -48,15 +47,11 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
         raise CertificateError(f"certificate file must exist. Received {path}. Check the path.")
     try:
         raw = read_json(path)
-        if is_guarantee(raw):
-            return _guarantee(raw, fault)
-        if is_about_attraction(raw):
-            verdict_of, said = _attraction(raw)
-            return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
-        if is_sliding(raw):
-            return _sliding(raw, fault)
-        if is_about_polynomial(raw):
-            verdict_of, said = _polynomial(raw)
+        kind = kind_of(raw)
+        if kind in (GUARANTEE, SLOW_SLIDING):
+            return _running(raw, fault)
+        if kind != LOOP:
+            verdict_of, said = _attraction(raw) if kind == ATTRACTION else _polynomial(raw)
             return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
         certificate = Certificate.of(evidence_of(raw))
         verdict = certificate.check()
@@ -68,38 +63,35 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
     return str(verdict), [*statement(certificate), *more]
 
 
-def _guarantee(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
+def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     """Verdict on a file about a loop that runs, and whether its data are those of a fault."""
     claim = guarantee.read_guarantee(raw)
     if claim.check() is not Verdict.PROVED:
         raise CertificateError("the claims do not follow from the loop and the fault's data")
     lines = [f"fault {claim.task.name}, by the data in the file", claim.sentence()]
     if fault is not None:
-        if claim.task != guarantee.task_of(fault, rate_limited=claim.task.change is not None):
+        if claim.task != _task(claim, fault):
             raise CertificateError(f"the data are not those of {fault.name}")
-        lines.append(f"the data are those of {fault.name}, box {fault.box.name}{_other_step(claim, fault)}")
+        lines.append(f"the data are those of {fault.name}{_other_step(claim, fault)}")
     return str(Verdict.PROVED), lines
 
 
-def _other_step(claim: "guarantee.Guarantee | guarantee.ContinuousPeaks", fault: "Fault") -> str:
-    """That a loop is not sampled as the fault is, where it is so."""
-    if isinstance(claim, guarantee.ContinuousPeaks) or float(claim.held.step) == fault.sampling_time:
+def _task(claim: "Claim", fault: "Fault") -> "guarantee.Task | slow_sliding.SlidingTask":
+    """What a claim of the kind would be about on a fault."""
+    if not isinstance(claim, slow_sliding.SlidingGuarantee):
+        return guarantee.task_of(fault, rate_limited=claim.task.change is not None)
+    low, high = claim.task.ranges["direct_effect"]
+    return slow_sliding.sliding_task(fault, claim.task.stress, (high - low) / (high + low))
+
+
+def _other_step(claim: "Claim", fault: "Fault") -> str:
+    """The box, and that a loop is not sampled as the fault is, where it is so."""
+    if isinstance(claim, slow_sliding.SlidingGuarantee):
         return ""
-    return f"; NOT at its T_s = {fault.sampling_time:g} s, but at {float(claim.held.step):.4g} s"
-
-
-def _sliding(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
-    """Verdict on a file about slow sliding, and whether its data are those of a fault."""
-    claim = slow_sliding.read_sliding(raw)
-    if claim.check() is not Verdict.PROVED:
-        raise CertificateError("the claims do not follow from the loop and the fault's data")
-    lines = [f"fault {claim.task.name}, by the data in the file", claim.sentence()]
-    if fault is not None:
-        low, high = claim.task.ranges["direct_effect"]
-        if claim.task != slow_sliding.sliding_task(fault, claim.task.stress, (high - low) / (high + low)):
-            raise CertificateError(f"the data are not those of {fault.name}")
-        lines.append(f"the data are those of {fault.name}")
-    return str(Verdict.PROVED), lines
+    said = f", box {fault.box.name}"
+    if isinstance(claim, guarantee.ContinuousPeaks) or float(claim.held.step) == fault.sampling_time:
+        return said
+    return f"{said}; NOT at its T_s = {fault.sampling_time:g} s, but at {float(claim.held.step):.4g} s"
 
 
 def _polynomial(raw: Any) -> tuple[str, list[str]]:

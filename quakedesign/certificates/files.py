@@ -11,22 +11,25 @@ from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Witness
 from quakedesign.certificates.term_files import LIMITS, plain_terms, read_terms, texts
 from quakedesign.errors import CertificateError, UnsupportedError
 from quakedesign.input import read_text
-from quakedesign.output import write_whole
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.exact.strict import (
     LARGEST_FILE,
     NAME,
     common_grid,
+    headed,
     listed,
     need,
     objected,
     parse,
     polynomial_text,
+    read_ends,
     read_exponents,
     read_polynomial,
     read_rational,
     read_rationals,
+    read_row,
     with_keys,
+    write_readable,
 )
 
 _LAW = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -60,17 +63,16 @@ def evidence_of(raw: Any) -> Evidence:
             "longer read. Make the new file with certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE."
         )
     refutes = isinstance(raw, dict) and "refutation" in raw
-    return _evidence(with_keys(raw, _REFUTATION if refutes else _PROOF))
+    return _evidence(headed(raw, _REFUTATION if refutes else _PROOF))
 
 
-_COMMON = {"format", "law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field"}
+_COMMON = {"law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field"}
 _WITNESS = {"obligation", "multiplier", "squares", "equalities", "inequalities"}
 _PROOF = _COMMON | {"V", "claims", "witnesses"}
 _REFUTATION = _COMMON | {"refutation"}
 
 
 def _evidence(raw: dict[str, Any]) -> Evidence:
-    need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
     loop = _loop(raw)
     if "refutation" in raw:
         return Evidence(loop=loop, refutation=_equilibrium(raw["refutation"]))
@@ -103,7 +105,7 @@ def _loop(raw: dict[str, Any]) -> Loop:
     need(all(type(w) is int and 1 <= w <= top for w in states.values()), f"weights must be integers from 1 to {top}")
     ranges: dict[str, tuple[Fraction, Fraction]] = {}
     for name, ends in uncertain.items():
-        low, high = (read_rational(v) for v in listed(ends, "a range", length=2))
+        low, high = read_ends(ends, "a range")
         need(low <= high, f"the range of {name} is not ordered")
         ranges[name] = (low, high)
     known = {**gains, **constants}
@@ -153,7 +155,7 @@ def _squares(raw: Any, variables: int, loop: Loop, condition: tuple[int, ...]) -
     for entry in listed(raw, "squares", 1 << variables):
         square = with_keys(entry, {"times", "basis", "gram"})
         times = read_exponents(square["times"], variables, 1 if loop.domain == "cells" else 0)
-        gram = [read_rational(v) for v in listed(square["gram"], "gram")]
+        gram = list(read_row(square["gram"], "gram"))
         common_grid(gram)
         basis = tuple(read_exponents(b, variables, 999) for b in listed(square["basis"], "basis", LIMITS["basis"]))
         size = len(basis)
@@ -243,6 +245,4 @@ def save_certificate(certificate: Evidence, path: str | Path) -> None:
     CertificateError
         When the certificate is beyond the limits of the format, such as numbers of more than 400 digits.
     """
-    text = certificate_text(certificate)
-    evidence_of(parse(text))
-    write_whole(Path(path), text)
+    write_readable(path, certificate_text(certificate), lambda text: evidence_of(parse(text)))

@@ -1,15 +1,14 @@
-"""Which claim a parsed file makes, where it says so: told without loading what decides each of them."""
+"""Which claim a parsed file makes: told without loading what decides each of them."""
 
 from typing import Any
 
-GUARANTEE, SLOW_SLIDING = "guarantee", "slow_sliding"
+GUARANTEE, SLOW_SLIDING, ATTRACTION = "guarantee", "slow_sliding", "attraction"
+POLYNOMIAL, LOOP = "polynomial", "loop"
 
 
-def is_guarantee(raw: Any) -> bool:
-    """Whether a parsed file bounds the peaks of a loop, with samples or in continuous time."""
-    return isinstance(raw, dict) and raw.get("kind") == GUARANTEE
-
-
-def is_sliding(raw: Any) -> bool:
-    """Whether a parsed file is about slow sliding."""
-    return isinstance(raw, dict) and raw.get("kind") == SLOW_SLIDING
+def kind_of(raw: Any) -> str:
+    """What a parsed file says that it is, else what its keys say: about a polynomial, or a closed loop."""
+    if not isinstance(raw, dict):
+        return LOOP
+    said = next((kind for kind in (GUARANTEE, SLOW_SLIDING, ATTRACTION) if raw.get("kind") == kind), None)
+    return said or (POLYNOMIAL if "polynomial" in raw else LOOP)

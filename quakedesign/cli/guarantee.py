@@ -116,6 +116,7 @@ def guarantee(
     out
         Certificate file to write.
     """
+    from quakedesign.certificates.guarantee.files import save_guarantee
     from quakedesign.fault import load_fault
     from quakedesign.synthesis import answer
 
@@ -136,7 +137,7 @@ def guarantee(
         proof = answer(chosen, disturbance_class=disturbance_class, **held, **options, **known)
     written = None
     if out is not None and proof.proved:
-        _save(proof.found, out)
+        save_guarantee(proof.found, out)
         written = str(out)
     facts = {"class": disturbance_class, "certificate": written, "seconds": perf_counter() - began}
     output.show({**proof.to_dict(), **facts}, proof.lines())
@@ -160,13 +161,3 @@ def _slowly(fault: Any, around: dict[str, Fraction], *, usual: bool, **asked: An
             "slip or slip rate. Leave them out."
         )
     return answer_sliding(fault, **asked, **taken)
-
-
-def _save(found: Any, out: Path) -> None:
-    from quakedesign.certificates.guarantee.files import save_guarantee
-    from quakedesign.certificates.slow_sliding import SlidingGuarantee, save_sliding
-
-    if isinstance(found, SlidingGuarantee):
-        save_sliding(found, out)
-    else:
-        save_guarantee(found, out)

@@ -10,7 +10,6 @@ from markupsafe import Markup
 
 from quakedesign.certificates import certificate_text
 from quakedesign.certificates.guarantee.files import guarantee_text
-from quakedesign.certificates.slow_sliding import SlidingGuarantee, sliding_text
 from quakedesign.errors import OutputError
 from quakedesign.fault import fault_toml
 from quakedesign.output import require_room, whole_folder, write_whole
@@ -151,8 +150,7 @@ def _write_certificates(folder: Path, comparison: Comparison) -> None:
             path.write_text(certificate_text(entry.design.certificate), encoding="utf-8")
         found = entry.guaranteed
         if found is not None:
-            text = sliding_text(found) if isinstance(found, SlidingGuarantee) else guarantee_text(found)
-            write_whole(folder / "certificates" / f"{entry.design.name}-guarantee.json", text)
+            write_whole(folder / "certificates" / f"{entry.design.name}-guarantee.json", guarantee_text(found))
         for kind, peaks in entry.peaks.items():
             path = folder / "certificates" / f"{entry.design.name}-peaks-{kind}.json"
             path.write_text(guarantee_text(peaks), encoding="utf-8")

@@ -10,7 +10,8 @@ import pytest
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Held, NoGuarantee
-from quakedesign.certificates.slow_sliding import WHOLE, SlidingClaims, SlidingGuarantee, parse_sliding
+from quakedesign.certificates.guarantee.files import parse_guarantee
+from quakedesign.certificates.slow_sliding import WHOLE, SlidingClaims, SlidingGuarantee
 from quakedesign.cli import main
 from quakedesign.fault import load_fault
 from quakedesign.loop import LinearLaw
@@ -41,7 +42,7 @@ def test_a_creeping_patch_is_held_below_1_65_times_its_rate(capsys, tmp_path):
     assert answer["verdict"] == "proved"
     assert answer["stress"] == "10000"
     assert 1e-7 < Fraction(answer["peak_slip_rate"]) < Fraction("1.65e-7")
-    assert parse_sliding(path.read_text()).check() is Verdict.PROVED
+    assert parse_guarantee(path.read_text()).check() is Verdict.PROVED
 
 
 def test_a_step_that_is_too_short_is_said_to_be(capsys):
@@ -67,7 +68,7 @@ def test_an_estimate_of_the_largest_stress_that_is_too_large_is_lowered_until_it
 
 
 def test_a_stress_far_beyond_what_a_law_stands_has_no_guarantee():
-    known = parse_sliding((PROOFS / "sliding_crustal-patch.json").read_text())
+    known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     found = proved_sliding(replace(known.task, stress=20 * known.task.stress), known.held)
     assert found.reason.startswith("a stress of 5e+05 Pa is not shown to leave |ln(v/V)| below 0.5")
 

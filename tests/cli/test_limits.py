@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.certificates.guarantee import NoGuarantee
-from quakedesign.certificates.slow_sliding import parse_sliding
+from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.cli import main
 from quakedesign.studies import fault_limits
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
@@ -65,7 +65,7 @@ def test_a_disturbance_may_be_a_shear_stress(capsys):
 
 
 def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(capsys, monkeypatch, tmp_path):
-    known = parse_sliding((PROOFS / "sliding_crustal-patch.json").read_text())
+    known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     answer = SlidingAnswer(found=known, task=known.task, held=known.held)
     monkeypatch.setattr(fault_limits, "answer_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quakedesign.certificates.slow_sliding.task import sliding_task
+from quakedesign.certificates.slow_sliding import sliding_task
 from quakedesign.errors import ParameterError, RecordError, UnsupportedError
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.identification import Estimate, Record, cover, identified_fault, identify, save_fault

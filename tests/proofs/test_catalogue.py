@@ -12,8 +12,8 @@ import pytest
 from quakedesign.certificates import Verdict, certificate_text, load_certificate, loop_of
 from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import task_of
-from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
-from quakedesign.certificates.slow_sliding import parse_sliding, read_sliding, sliding_task, sliding_text
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, read_guarantee
+from quakedesign.certificates.slow_sliding import sliding_task
 from quakedesign.controllers import family, law
 from quakedesign.fault import load_fault
 from quakedesign.sos.exact import files as polynomial_files
@@ -77,7 +77,7 @@ def test_the_library_writes_the_same_bytes(path):
     elif path in GUARANTEES:
         assert guarantee_text(parse_guarantee(text)) == text
     elif path in SLIDING:
-        assert sliding_text(parse_sliding(text)) == text
+        assert guarantee_text(parse_guarantee(text)) == text
     else:
         assert certificate_text(load_certificate(path)) == text
 
@@ -144,20 +144,20 @@ def test_a_smaller_claim_of_a_guarantee_is_refused_by_both(path, key, tmp_path):
 
 def test_a_patch_of_the_crust_is_held_at_1_65_times_its_rate_under_25_kpa():
     path = ROOT / "certificates" / "sliding_crustal-patch.json"
-    claim = parse_sliding(path.read_text())
+    claim = parse_guarantee(path.read_text())
     assert claim.task == sliding_task(load_fault("crustal-patch"), F(25000))
     assert claim.peak_slip_rate < F("1.65e-6")
     raw = json.loads(path.read_text())
     raw["stress"] = "80000"
-    assert read_sliding(raw).check() is Verdict.UNDECIDED
+    assert read_guarantee(raw).check() is Verdict.UNDECIDED
 
 
 @pytest.mark.slow
 def test_a_box_of_ten_percent_is_held_under_5e_4_of_the_normal_stress():
     """Minutes for the standalone checker: 32 cells through rock."""
     path = ROOT / "certificates" / "boxes" / "sliding_ten-percent.json"
-    claim, text = parse_sliding(path.read_text()), path.read_text()
-    assert sliding_text(claim) == text
+    claim, text = parse_guarantee(path.read_text()), path.read_text()
+    assert guarantee_text(claim) == text
     assert claim.task.stress == F(5, 10**4) * claim.task.ranges["normal_stress"][0]
     for name, value in (("direct_effect", "0.010"), ("evolution_effect", "0.015"), ("critical_slip", "0.001")):
         assert claim.task.ranges[name] == (F(value) * F("0.9"), F(value) * F("1.1"))

@@ -9,7 +9,6 @@ from standalone_guarantee import checker
 
 from quakedesign.certificates.guarantee import task as package_task
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, read_guarantee
-from quakedesign.certificates.kinds import is_guarantee
 from quakedesign.errors import CertificateError
 
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
@@ -207,9 +206,6 @@ def test_the_package_reads_this_format_and_kind_alone():
     ):
         with pytest.raises(CertificateError, match="must be"):
             read_guarantee(HELD | change)
-    assert is_guarantee(HELD)
-    assert is_guarantee({"kind": "guarantee"})
-    assert not any(is_guarantee(raw) for raw in ({"kind": "proof"}, {}, [], "guarantee", None))
 
 
 def test_the_text_of_a_file_has_a_line_for_every_entry_and_no_forward_part_of_zero():

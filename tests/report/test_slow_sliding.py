@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from quakedesign import compare
-from quakedesign.certificates.slow_sliding import parse_sliding
+from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
@@ -31,7 +31,7 @@ SHORT = replace(PATCH, reference=replace(PATCH.reference, target_slip=0.3, opera
 @pytest.fixture(scope="module")
 def comparison():
     """A law whose proof is known, over a third of its task, beside a fault that nothing has disturbed yet."""
-    guarantee = parse_sliding(PROOF.read_text())
+    guarantee = parse_guarantee(PROOF.read_text())
     answer = SlidingAnswer(found=guarantee, task=guarantee.task, held=guarantee.held)
     still = simulate_state(SHORT, 1e-9, duration=1e7, inertia=False, method="dop853")
     natural = state_runs.StateRun(fault=SHORT, loading_rate=1e-9, start=sliding(SHORT, 1e-9), trajectory=still)
@@ -68,7 +68,7 @@ def test_the_folder_holds_the_certificate_the_figures_and_the_keys_of_all_design
     assert elqr["verdict"] == "proved"
     assert elqr["outcome"]["kind"] == "tracked"
     assert elqr["guaranteed"]["stress"] == str(comparison.entries[0].guaranteed.task.stress)
-    assert parse_sliding((folder / elqr["certificate"]).read_text()).claims == comparison.entries[0].guarantee.claims
+    assert parse_guarantee((folder / elqr["certificate"]).read_text()).claims == comparison.entries[0].guarantee.claims
     assert found["uncontrolled"]["cycle"] == {"recurrence_interval": None, "slip": None, "magnitude": None}
     assert set(found["not_applicable"]) == {"cta", "dia"}
     assert {path.stem for path in (folder / "figures").iterdir()} == {"cycle", "slow-sliding", "errors"}

@@ -1,80 +1,151 @@
-"""The file of a guarantee (proofs/FORMAT.md): read strictly, written whole."""
+"""The files of claims about loops that run (proofs/FORMAT.md), of both kinds: read strictly, written whole."""
 
 import json
 import re
-from dataclasses import asdict
+from collections.abc import Iterable
+from dataclasses import asdict, fields
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
 from quakedesign.certificates.guarantee.slow_gain import SlowGain
 from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held
 from quakedesign.certificates.guarantee.task import Friction, Task
+from quakedesign.certificates.kinds import GUARANTEE, SLOW_SLIDING, kind_of
+from quakedesign.certificates.slow_sliding.cells import MOST_CELLS, Cuts, cells
+from quakedesign.certificates.slow_sliding.statement import SlidingGuarantee
+from quakedesign.certificates.slow_sliding.task import AXES, SlidingTask
+from quakedesign.certificates.slow_sliding.theorem import SlidingClaims, loop_of, model_of
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.loop import ContinuousLaw, ImplicitRoot, LinearLaw, Power
 from quakedesign.loop.implicit_root import MOST_TERMS
 from quakedesign.output import write_whole
-from quakedesign.sos.exact.strict import NAME, listed, need, parse, read_rational, with_keys
+from quakedesign.sos.exact.strict import (
+    headed,
+    listed,
+    need,
+    parse,
+    read_ends,
+    read_exactly,
+    read_names,
+    read_rational,
+    read_row,
+    texts,
+    with_keys,
+)
 
-_ROCK = ("density", "shear_modulus", "length", "damping", "normal_stress")
+Claim = Guarantee | ContinuousPeaks | SlidingGuarantee
+_Claimed = TypeVar("_Claimed", Claims, SlidingClaims)
+_ROCK = ("density", "shear_modulus", "length", "damping")
 _SPREADS = ("stiffness", "damping", "authority")
-_FRICTION = ("static", "least", "largest", "weakening", "strengthening", "rate_slope")
 _TIMES = ("step", "delay", "lag")
+_SLIDING_TIMES = (*_TIMES, "diffusion", "slip_noise")
+_SLIDING_REFERENCE = ("rate", "distance", "ramp")
 _NOISE = ("slip", "rate")
 _LAW = ("states", "measured", "output", "feedback")
 _FAULT = re.compile(r"\w[\w .+-]{0,59}")
 _MOST_COEFFICIENTS = 13
 _MOST_STATES = 20
+_ZERO = Fraction(0)
 
 
-def guarantee_text(claim: Guarantee | ContinuousPeaks) -> str:
+def guarantee_text(claim: Claim) -> str:
     """Text of the file."""
+    about = _of_sliding(claim) if isinstance(claim, SlidingGuarantee) else _of_tracking(claim)
+    claims = {part.name: getattr(claim.claims, part.name).exact for part in fields(claim.claims)}
+    return json.dumps({"format": 1, **about, "claims": claims}, indent=1) + "\n"
+
+
+def save_guarantee(claim: Claim, path: str | Path) -> None:
+    """Write the file whole."""
+    write_whole(Path(path), guarantee_text(claim))
+
+
+def parse_guarantee(text: str) -> Any:
+    """Claim from the text of a file; reading verifies nothing. Raises as `read_guarantee`."""
+    return read_guarantee(parse(text))
+
+
+def read_guarantee(raw: Any) -> Claim:
+    """Claim from a parsed file.
+
+    Raises
+    ------
+    CertificateError
+        When it breaks a rule of FORMAT.md.
+    """
+    try:
+        return _read_sliding(raw) if kind_of(raw) == SLOW_SLIDING else _read_tracking(raw)
+    except ParameterError as error:
+        raise CertificateError(str(error)) from None
+
+
+def _exactly(value: Any, names: Iterable[str]) -> dict[str, str]:
+    return {name: str(getattr(value, name)) for name in names}
+
+
+def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
     task = claim.task
     change = {} if task.change is None else {"change": str(task.change)}
     slow, start = None, {}
     if isinstance(claim, Guarantee):
-        slow, errors = claim.slow_gain, dict(zip(_NOISE, map(str, claim.held.start), strict=True))
+        slow, errors = claim.slow_gain, dict(zip(_NOISE, texts(claim.held.start), strict=True))
         start = {"start": errors} if any(claim.held.start) else {}
-    document = {
-        "format": 1,
-        "kind": "guarantee",
+    return {
+        "kind": GUARANTEE,
         "fault": {
             "name": task.name,
-            **{name: str(getattr(task, name)) for name in _ROCK},
-            "spreads": dict(zip(_SPREADS, map(str, task.spreads), strict=True)),
+            **_exactly(task, (*_ROCK, "normal_stress")),
+            "spreads": dict(zip(_SPREADS, texts(task.spreads), strict=True)),
             "friction": {name: str(value) for name, value in asdict(task.friction).items()},
         },
-        "reference": {
-            "shape": _texts(task.shape),
-            "target_slip": str(task.target_slip),
-            "operation_time": str(task.operation_time),
-        },
+        "reference": {"shape": texts(task.shape), **_exactly(task, ("target_slip", "operation_time"))},
         "disturbance": {
             "amplitude": str(task.amplitude),
             **change,
-            "growths": {"slip": str(task.growths[0]), "rate": str(task.growths[1])},
+            "growths": dict(zip(_NOISE, texts(task.growths), strict=True)),
         },
         "loop": _loop(claim),
         **start,
         **({} if slow is None else {"slow_gain": {"parts": slow.parts, "growth": str(slow.growth)}}),
-        "claims": {name: value.exact for name, value in _claims(claim.claims).items()},
     }
-    return json.dumps(document, indent=1) + "\n"
+
+
+def _of_sliding(claim: SlidingGuarantee) -> dict[str, Any]:
+    task, law = claim.task, claim.held.law
+    return {
+        "kind": SLOW_SLIDING,
+        "fault": {
+            "name": task.name,
+            **_exactly(task, _ROCK),
+            **{name: texts(task.ranges[name]) for name in AXES},
+        },
+        "reference": _exactly(task, _SLIDING_REFERENCE),
+        "stress": str(task.stress),
+        "loop": {
+            **_exactly(claim.held, _SLIDING_TIMES),
+            "states": list(law.states),
+            "update": [texts(row) for row in law.update],
+            "measured": [str(row[0]) for row in law.measured],
+            "output": texts(law.output),
+            "feedback": str(law.feedback[0]),
+        },
+        "cells": [[] if cut is None else [cut[0], str(cut[1])] for cut in claim.cuts],
+    }
 
 
 def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
     """What the file says of the law; `rates` in place of `update` and times where the pressure acts at once."""
     if isinstance(claim, ContinuousPeaks):
         law: LinearLaw | ContinuousLaw = claim.law
-        times, own = dict[str, str](), dict[str, Any](rates=[_texts(row) for row in claim.law.rates])
-        own |= {"of_reference": _texts(claim.law.of_reference)} if any(claim.law.of_reference) else {}
+        times, own = dict[str, str](), dict[str, Any](rates=[texts(row) for row in claim.law.rates])
+        own |= {"of_reference": texts(claim.law.of_reference)} if any(claim.law.of_reference) else {}
     else:
-        law, times = claim.held.law, {name: str(getattr(claim.held, name)) for name in _TIMES}
+        law, times = claim.held.law, _exactly(claim.held, _TIMES)
         times |= {"diffusion": str(claim.held.diffusion)} if claim.held.diffusion else {}
-        own = {"update": [_texts(row) for row in claim.held.law.update]}
-        own |= {"first": [_texts(row) for row in claim.held.law.first]} if claim.held.law.first else {}
+        own = {"update": [texts(row) for row in claim.held.law.update]}
+        own |= {"first": [texts(row) for row in claim.held.law.first]} if claim.held.law.first else {}
         root = claim.held.law.root
         own |= {} if root is None else {"root": _root_document(root)}
         noise = claim.held.noise
@@ -83,69 +154,83 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         **times,
         "states": list(law.states),
         **own,
-        "measured": [_texts(row) for row in law.measured],
-        "output": _texts(law.output),
-        "feedback": _texts(law.feedback),
+        "measured": [texts(row) for row in law.measured],
+        "output": texts(law.output),
+        "feedback": texts(law.feedback),
     }
 
 
-def save_guarantee(claim: Guarantee | ContinuousPeaks, path: str | Path) -> None:
-    """Write the file whole."""
-    write_whole(Path(path), guarantee_text(claim))
-
-
-def parse_guarantee(text: str) -> Guarantee | ContinuousPeaks:
-    """Claim from the text of a file; reading verifies nothing. Raises as `read_guarantee`."""
-    return read_guarantee(parse(text))
-
-
-def read_guarantee(raw: Any) -> Guarantee | ContinuousPeaks:
-    """Claim from a parsed file.
-
-    Raises
-    ------
-    CertificateError
-        When it breaks a rule of FORMAT.md.
-    """
+def _read_tracking(raw: Any) -> Guarantee | ContinuousPeaks:
     more = {"slow_gain", "start"} & set(raw) if isinstance(raw, dict) else set[str]()
-    with_keys(raw, {"format", "kind", "fault", "reference", "disturbance", "loop", "claims"} | more)
-    need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
-    need(raw["kind"] == "guarantee", "kind must be guarantee")
-    try:
-        task, claims, loop = _task(raw), _read_claims(raw["claims"]), raw["loop"]
-        if isinstance(loop, dict) and "rates" in loop:
-            need(not more, f"{min(more, default='')} is for a law of samples")
-            claim: Guarantee | ContinuousPeaks = ContinuousPeaks(task=task, law=_continuous(loop), claims=claims)
-        else:
-            slow_gain = _slow_gain(raw["slow_gain"], task) if "slow_gain" in more else None
-            held = _held(loop, _start(raw["start"]) if "start" in more else {})
-            claim = Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
-        need(len(claim.loop.states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
-    except ParameterError as error:
-        raise CertificateError(str(error)) from None
+    headed(raw, {"fault", "reference", "disturbance", "loop", "claims"} | more, GUARANTEE)
+    task, claims, loop = _task(raw), _claims(Claims, raw), raw["loop"]
+    if isinstance(loop, dict) and "rates" in loop:
+        need(not more, f"{min(more, default='')} is for a law of samples")
+        claim: Guarantee | ContinuousPeaks = ContinuousPeaks(task=task, law=_continuous(loop), claims=claims)
+    else:
+        slow_gain = _slow_gain(raw["slow_gain"], task) if "slow_gain" in more else None
+        held = _held(loop, _start(raw["start"]) if "start" in more else {})
+        claim = Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
+    _require_few(claim.loop.states)
     return claim
 
 
+def _read_sliding(raw: Any) -> SlidingGuarantee:
+    headed(raw, {"fault", "reference", "stress", "loop", "cells", "claims"}, SLOW_SLIDING)
+    task, held, claims = _sliding_task(raw), _sliding_held(raw["loop"]), _claims(SlidingClaims, raw)
+    claim = SlidingGuarantee(task=task, held=held, cuts=_cuts(raw["cells"]), claims=claims)
+    cells(task, claim.cuts)
+    model = model_of(task, claims)
+    _require_few(loop_of(held, model, task).states if model is not None else ())
+    return claim
+
+
+def _require_few(states: tuple[str, ...]) -> None:
+    need(len(states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
+
+
+def _claims(kind: type[_Claimed], raw: dict[str, Any]) -> _Claimed:
+    bounds: dict[str, Any] = {part.name: part.type for part in fields(kind)}
+    return kind(**{name: bounds[name](value) for name, value in read_exactly(raw["claims"], bounds).items()})
+
+
+def _name(fault: dict[str, Any]) -> str:
+    name = fault["name"]
+    need(isinstance(name, str) and _FAULT.fullmatch(name) is not None, "name must be a short text")
+    return str(name)
+
+
 def _task(raw: dict[str, Any]) -> Task:
-    fault = with_keys(raw["fault"], {"name", *_ROCK, "spreads", "friction"})
+    rock = (*_ROCK, "normal_stress")
+    fault = with_keys(raw["fault"], {"name", *rock, "spreads", "friction"})
     reference = with_keys(raw["reference"], {"shape", "target_slip", "operation_time"})
     given = raw["disturbance"]
     limited = isinstance(given, dict) and "change" in given
     with_keys(given, {"amplitude", "growths"} | ({"change"} if limited else set()))
-    growths = with_keys(given["growths"], {"slip", "rate"})
-    spreads, friction = with_keys(fault["spreads"], set(_SPREADS)), with_keys(fault["friction"], set(_FRICTION))
-    need(isinstance(fault["name"], str) and _FAULT.fullmatch(fault["name"]) is not None, "name must be a short text")
+    stiffness, damping, authority = read_exactly(fault["spreads"], _SPREADS).values()
+    slip, rate = read_exactly(given["growths"], _NOISE).values()
     return Task(
-        name=fault["name"],
-        **{name: read_rational(fault[name]) for name in _ROCK},
-        spreads=(*(read_rational(spreads[name]) for name in _SPREADS),),  # type: ignore[arg-type]
-        friction=Friction(**{name: read_rational(friction[name]) for name in _FRICTION}),
-        shape=_rationals(reference["shape"], "shape", _MOST_COEFFICIENTS),
+        name=_name(fault),
+        **{name: read_rational(fault[name]) for name in rock},
+        spreads=(stiffness, damping, authority),
+        friction=Friction(**read_exactly(fault["friction"], (part.name for part in fields(Friction)))),
+        shape=read_row(reference["shape"], "shape", _MOST_COEFFICIENTS),
         target_slip=read_rational(reference["target_slip"]),
         operation_time=read_rational(reference["operation_time"]),
         amplitude=read_rational(given["amplitude"]),
         change=read_rational(given["change"]) if limited else None,
-        growths=(read_rational(growths["slip"]), read_rational(growths["rate"])),
+        growths=(slip, rate),
+    )
+
+
+def _sliding_task(raw: dict[str, Any]) -> SlidingTask:
+    fault = with_keys(raw["fault"], {"name", *_ROCK, *AXES})
+    return SlidingTask(
+        name=_name(fault),
+        **{name: read_rational(fault[name]) for name in _ROCK},
+        ranges={name: read_ends(fault[name], name) for name in AXES},
+        **read_exactly(raw["reference"], _SLIDING_REFERENCE),
+        stress=read_rational(raw["stress"]),
     )
 
 
@@ -158,8 +243,7 @@ def _slow_gain(raw: Any, task: Task) -> SlowGain:
 
 
 def _start(raw: Any) -> dict[str, Fraction]:
-    with_keys(raw, set(_NOISE))
-    slip, rate = (read_rational(raw[name]) for name in _NOISE)
+    slip, rate = read_exactly(raw, _NOISE).values()
     need(min(slip, rate) >= 0 and max(slip, rate) > 0, "bounds of the start must be 0 or more, one of them above")
     return {"initial_slip": slip, "initial_slip_rate": rate}
 
@@ -171,51 +255,73 @@ def _held(raw: Any, start: dict[str, Fraction]) -> Held:
     law = LinearLaw(
         update=_square(raw, "update"), root=root, first=_first(raw) if "first" in given else (), **_rest(raw)
     )
-    noise = with_keys(raw["noise"], set(_NOISE)) if "noise" in given else {}
-    bounds = {f"{name}_noise": read_rational(value) for name, value in noise.items()}
-    diffusion = read_rational(raw["diffusion"]) if "diffusion" in given else Fraction(0)
+    noise = read_exactly(raw["noise"], _NOISE) if "noise" in given else {}
+    diffusion = read_rational(raw["diffusion"]) if "diffusion" in given else _ZERO
     need(diffusion > 0 or "diffusion" not in given, "diffusion must be positive where it is given")
     times = {name: read_rational(raw[name]) for name in _TIMES}
-    return Held(law=law, diffusion=diffusion, **times, **bounds, **start)
+    return Held(law=law, diffusion=diffusion, **times, **{f"{name}_noise": v for name, v in noise.items()}, **start)
+
+
+def _sliding_held(raw: Any) -> Held:
+    with_keys(raw, {*_SLIDING_TIMES, "update", *_LAW})
+    states = read_names(raw["states"], "states", _MOST_STATES)
+    law = LinearLaw(
+        states=states,
+        update=_square(raw, "update"),
+        measured=tuple((v, _ZERO) for v in read_row(raw["measured"], "measured", length=len(states))),
+        output=read_row(raw["output"], "output", length=len(states)),
+        feedback=(read_rational(raw["feedback"]), _ZERO),
+    )
+    return Held(law=law, **{name: read_rational(raw[name]) for name in _SLIDING_TIMES})
+
+
+def _cuts(raw: Any) -> Cuts:
+    given = (listed(entry, "a cut", 2) for entry in listed(raw, "cells", 2 * MOST_CELLS))
+    return tuple(_cut(entry) if entry else None for entry in given)
+
+
+def _cut(entry: list[Any]) -> tuple[str, Fraction]:
+    axis, at = listed(entry, "a cut", length=2)
+    need(axis in AXES, f"a cut must be across one of {', '.join(AXES)}")
+    return axis, read_rational(at)
 
 
 def _first(raw: dict[str, Any]) -> tuple[tuple[Fraction, ...], ...]:
     rows = listed(raw["first"], "first", length=len(listed(raw["states"], "states", _MOST_STATES)))
-    return tuple(_ends(row, "first") for row in rows)
+    return tuple(read_ends(row, "first") for row in rows)
 
 
 def _continuous(raw: Any) -> ContinuousLaw:
     fed = {"of_reference"} if "of_reference" in raw else set()
     with_keys(raw, {"rates", *_LAW} | fed)
-    of_reference = _ends(raw["of_reference"], "of_reference") if fed else (Fraction(0), Fraction(0))
+    of_reference = read_ends(raw["of_reference"], "of_reference") if fed else (_ZERO, _ZERO)
     return ContinuousLaw(of_reference=of_reference, rates=_square(raw, "rates"), **_rest(raw))
 
 
 def _square(raw: dict[str, Any], name: str) -> tuple[tuple[Fraction, ...], ...]:
     size = len(listed(raw["states"], "states", _MOST_STATES))
-    return tuple(_rationals(row, name, size) for row in listed(raw[name], name, size))
+    return tuple(read_row(row, name, length=size) for row in listed(raw[name], name, length=size))
 
 
 def _rest(raw: dict[str, Any]) -> dict[str, Any]:
     """Everything of a law but the matrix of its own states."""
-    names = listed(raw["states"], "states", _MOST_STATES)
-    need(all(isinstance(n, str) and NAME.fullmatch(n) for n in names), "states must be names")
+    names = read_names(raw["states"], "states", _MOST_STATES)
     return {
-        "states": tuple(names),
-        "measured": tuple(_rationals(row, "measured", 3) for row in listed(raw["measured"], "measured", len(names))),
-        "output": _rationals(raw["output"], "output", len(names)),
-        "feedback": _rationals(raw["feedback"], "feedback", 3),
+        "states": names,
+        "measured": tuple(read_row(row, "measured", 3) for row in listed(raw["measured"], "measured", len(names))),
+        "output": read_row(raw["output"], "output", len(names)),
+        "feedback": read_row(raw["feedback"], "feedback", 3),
     }
 
 
 def _root_document(root: ImplicitRoot) -> dict[str, Any]:
-    return {"pull": _sum_document(root.pull), "slopes": _texts(root.slopes), "remainder": str(root.remainder)}
+    return {"pull": _sum_document(root.pull), "slopes": texts(root.slopes), "remainder": str(root.remainder)}
 
 
 def _sum_document(terms: tuple[Power, ...]) -> list[dict[str, Any]]:
     return [
         {
-            "factor": _texts(term.factor),
+            "factor": texts(term.factor),
             "power": str(term.exponent),
             "of": term.argument if isinstance(term.argument, str) else _sum_document(term.argument),
         }
@@ -225,7 +331,7 @@ def _sum_document(terms: tuple[Power, ...]) -> list[dict[str, Any]]:
 
 def _read_root(raw: Any) -> ImplicitRoot:
     with_keys(raw, {"pull", "slopes", "remainder"})
-    slopes, remainder = _ends(raw["slopes"], "slopes"), read_rational(raw["remainder"])
+    slopes, remainder = read_ends(raw["slopes"], "slopes"), read_rational(raw["remainder"])
     return ImplicitRoot(pull=_read_sum(raw["pull"]), slopes=slopes, remainder=remainder)
 
 
@@ -235,32 +341,6 @@ def _read_sum(raw: Any) -> tuple[Power, ...]:
 
 def _read_term(raw: Any) -> Power:
     with_keys(raw, {"factor", "power", "of"})
-    factor, inner = _ends(raw["factor"], "a factor"), raw["of"]
+    factor, inner = read_ends(raw["factor"], "a factor"), raw["of"]
     argument = inner if isinstance(inner, str) else _read_sum(inner)
     return Power(factor=factor, exponent=read_rational(raw["power"]), argument=argument)
-
-
-def _read_claims(raw: Any) -> Claims:
-    names = set(Claims.__dataclass_fields__)
-    values = {name: read_rational(value) for name, value in with_keys(raw, names).items()}
-    return Claims(
-        least_pressure=LowerBound(values.pop("least_pressure")),
-        **{name: UpperBound(value) for name, value in values.items()},
-    )
-
-
-def _claims(claims: Claims) -> dict[str, Any]:
-    return {name: getattr(claims, name) for name in Claims.__dataclass_fields__}
-
-
-def _texts(values: tuple[Fraction, ...]) -> list[str]:
-    return [str(v) for v in values]
-
-
-def _ends(raw: Any, what: str) -> tuple[Fraction, Fraction]:
-    low, high = (read_rational(v) for v in listed(raw, what, length=2))
-    return low, high
-
-
-def _rationals(raw: Any, what: str, most: int) -> tuple[Fraction, ...]:
-    return tuple(read_rational(v) for v in listed(raw, what, most))

@@ -7,6 +7,7 @@ from typing import Any
 
 from quakedesign.certificates.claim import Evidence, Witness
 from quakedesign.certificates.files import evidence_of, read_json
+from quakedesign.certificates.kinds import ATTRACTION, POLYNOMIAL, kind_of
 from quakedesign.certificates.obligations import claimed, different
 from quakedesign.certificates.rocq import gallina
 from quakedesign.certificates.rocq.integers import in_integers
@@ -16,9 +17,7 @@ from quakedesign.certificates.witnesses import statement_of
 from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.output import write_whole
 from quakedesign.sos.exact.attraction import LyapunovProof
-from quakedesign.sos.exact.attraction_files import is_about_attraction
 from quakedesign.sos.exact.attraction_files import read as read_attraction_file
-from quakedesign.sos.exact.files import is_about_polynomial
 from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.polynomial import evaluate
 from quakedesign.sos.exact.proofs import Point, SumOfSquares
@@ -44,9 +43,8 @@ def rocq_text(raw: Any) -> str:
 
 def statement_text(raw: Any) -> str:
     """Statement, data and theorem, without the library. Raises as `rocq_text`."""
-    if is_about_attraction(raw):
-        return "\n".join(_attraction(raw)) + "\n"
-    return "\n".join(_polynomial(raw) if is_about_polynomial(raw) else _loop(raw)) + "\n"
+    written = {ATTRACTION: _attraction, POLYNOMIAL: _polynomial}.get(kind_of(raw), _loop)
+    return "\n".join(written(raw)) + "\n"
 
 
 def write_rocq(paths: Iterable[Path], folder: Path, *, force: bool = False) -> dict[Path, Path | str]:

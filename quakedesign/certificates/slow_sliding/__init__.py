@@ -9,13 +9,9 @@ if TYPE_CHECKING:
     from quakedesign.certificates.slow_sliding.cells import Cuts as Cuts
     from quakedesign.certificates.slow_sliding.cells import cells as cells
     from quakedesign.certificates.slow_sliding.cells import parts as parts
-    from quakedesign.certificates.slow_sliding.files import parse_sliding as parse_sliding
-    from quakedesign.certificates.slow_sliding.files import read_sliding as read_sliding
-    from quakedesign.certificates.slow_sliding.files import save_sliding as save_sliding
-    from quakedesign.certificates.slow_sliding.files import sliding_text as sliding_text
+    from quakedesign.certificates.slow_sliding.fault_data import sliding_task as sliding_task
     from quakedesign.certificates.slow_sliding.statement import SlidingGuarantee as SlidingGuarantee
     from quakedesign.certificates.slow_sliding.task import SlidingTask as SlidingTask
-    from quakedesign.certificates.slow_sliding.task import sliding_task as sliding_task
     from quakedesign.certificates.slow_sliding.theorem import SlidingClaims as SlidingClaims
     from quakedesign.certificates.slow_sliding.theorem import cell_bounds as cell_bounds
 

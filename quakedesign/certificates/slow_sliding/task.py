@@ -9,17 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-import sympy as sp
-
-from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.fault import Fault
-from quakedesign.rationals import fraction_of, rational
+from quakedesign.errors import ParameterError
 
 Range = tuple[Fraction, Fraction]
 AXES = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")
 """Constants that are only known to lie in ranges: a, b, D [m], μ* and σ′ [Pa]."""
-_AGEING = "rate-and-state-aging"
-_DIGITS = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,49 +87,3 @@ class SlidingTask:
         """N = σ′ − p [Pa] along the reference, with |p − p*| up to `push` [Pa]."""
         low, high = self.ranges["normal_stress"]
         return low - self.fastest_rise / self.rate * self.distance - push, high + push
-
-
-def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingTask:
-    """The task of a fault at its mean rate V, target slip over operation time, under a stress of at most `stress` [Pa].
-
-    The ranges of a, b and D are their values and `spread` of them to both sides [-]; that of μ* follows from a − b.
-
-    Raises
-    ------
-    UnsupportedError
-        For friction other than of the ageing law, or whose state feels the normal stress.
-    """
-    if fault.friction.name != _AGEING or fault.friction.stress_sensitivity:  # type: ignore[attr-defined]
-        raise UnsupportedError(
-            f"a guarantee of slow sliding needs friction of the law {_AGEING}, its state deaf to the normal stress. "
-            f"Received {fault.friction.name}. Simulate it."
-        )
-    law = fault.friction.exact()
-    rate = rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
-    named = {axis: rational(getattr(fault.friction, axis)) for axis in AXES[:3]}
-    steady = law.steady_coefficient(sp.Rational(rate.numerator, rate.denominator))
-    middle = _near(steady)
-    per_effect = abs(_near(sp.log(sp.Rational(rate.numerator, rate.denominator) / law.reference_rate)))  # type: ignore[attr-defined]
-    off = spread * per_effect * (named["direct_effect"] + named["evolution_effect"])
-    off += Fraction(1, 10**_DIGITS) * middle if off or not steady.is_Rational else 0
-    ends = {name: (value * (1 - spread), value * (1 + spread)) for name, value in named.items()}
-    normal = rational(fault.effective_normal_stress)
-    stiffness = rational(fault.shear_modulus) / rational(fault.side)
-    return SlidingTask(
-        name=fault.name,
-        density=rational(fault.density),
-        shear_modulus=rational(fault.shear_modulus),
-        length=rational(fault.side),
-        damping=rational(fault.damping) / fault.squares,
-        ranges={**ends, "coefficient": (middle - off, middle + off), "normal_stress": (normal, normal)},
-        rate=rate,
-        distance=rational(fault.reference.target_slip),
-        ramp=stiffness * rate / middle,
-        stress=stress,
-    )
-
-
-def _near(expression: sp.Expr) -> Fraction:
-    """A rational within 10^-14 of a number; itself if it is rational."""
-    value = sp.nsimplify(expression, rational=True) if expression.is_Rational else sp.N(expression, 40)
-    return fraction_of(value) if value.is_Rational else Fraction(str(value)).limit_denominator(10**18)

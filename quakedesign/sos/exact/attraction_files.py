@@ -6,28 +6,22 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import CertificateError, PolynomialError
-from quakedesign.output import write_whole
 from quakedesign.sos.exact.attraction import Attraction, LyapunovProof
-from quakedesign.sos.exact.files import TERMS, plain_proof, read_names, read_proof
+from quakedesign.sos.exact.files import TERMS, plain_proof, read_proof, variables
 from quakedesign.sos.exact.polynomial import constant
 from quakedesign.sos.exact.proofs import Point
 from quakedesign.sos.exact.strict import (
+    headed,
     listed,
-    need,
     parse,
     polynomial_text,
     read_polynomial,
     read_rational,
-    with_keys,
+    write_readable,
 )
 
-_CLAIM = {"format", "kind", "variables", "field", "V", "level"}
+_CLAIM = {"variables", "field", "V", "level"}
 _PROOF = {"multiplier", "positive", "decrease"}
-
-
-def is_about_attraction(raw: Any) -> bool:
-    """Whether a parsed file is about a region of attraction."""
-    return isinstance(raw, dict) and raw.get("kind") == "attraction"
 
 
 def read(raw: Any) -> Attraction:
@@ -39,10 +33,8 @@ def read(raw: Any) -> Attraction:
         When it breaks a rule of FORMAT.md.
     """
     refuted = isinstance(raw, dict) and "negative" in raw
-    with_keys(raw, _CLAIM | ({"negative"} if refuted else _PROOF))
-    need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
-    need(raw["kind"] == "attraction", "kind must be attraction")
-    names = read_names(raw)
+    headed(raw, _CLAIM | ({"negative"} if refuted else _PROOF), "attraction")
+    names = variables(raw)
     size = len(names)
     field = listed(raw["field"], "field", length=size)
     level = listed(raw["level"], "level", 1)
@@ -108,6 +100,4 @@ def save_attraction(claim: Attraction, path: str | Path) -> None:
     OutputError
         When the folder cannot be written.
     """
-    written = text(claim)
-    load(written)
-    write_whole(Path(path), written)
+    write_readable(path, text(claim), load)

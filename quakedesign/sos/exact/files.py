@@ -5,31 +5,28 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import CertificateError, PolynomialError
-from quakedesign.output import write_whole
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares
 from quakedesign.sos.exact.squares import Element, Square
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.exact.strict import (
-    NAME,
     common_grid,
+    headed,
     listed,
     need,
     parse,
     polynomial_text,
     read_exponents,
+    read_names,
     read_polynomial,
-    read_rational,
+    read_row,
+    texts,
     with_keys,
+    write_readable,
 )
 
-_STATEMENT = {"format", "variables", "polynomial", "inequalities", "equalities", "products", "degree", "multiplier"}
+_STATEMENT = {"variables", "polynomial", "inequalities", "equalities", "products", "degree", "multiplier"}
 _KINDS = ("sos", "not-sos", "negative")
 TERMS, _VARIABLES, _CONSTRAINTS, _PRODUCTS, _BASIS, _SQUARES = 20_000, 16, 32, 1024, 400, 4096
-
-
-def is_about_polynomial(raw: Any) -> bool:
-    """Whether a parsed file is about a plain polynomial rather than a closed loop."""
-    return isinstance(raw, dict) and "polynomial" in raw
 
 
 def read(raw: Any) -> tuple[Statement, Proof]:
@@ -41,17 +38,16 @@ def read(raw: Any) -> tuple[Statement, Proof]:
         When it breaks a rule of FORMAT.md.
     """
     kind = next((k for k in _KINDS if isinstance(raw, dict) and k in raw), "sos")
-    with_keys(raw, _STATEMENT | {kind})
-    need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
-    asked = _statement(raw, read_names(raw))
+    headed(raw, _STATEMENT | {kind})
+    asked = _statement(raw, variables(raw))
     return asked, read_proof(raw[kind], kind, asked)
 
 
-def read_names(raw: dict[str, Any]) -> tuple[str, ...]:
+def variables(raw: dict[str, Any]) -> tuple[str, ...]:
     """Variables of a file."""
-    names = listed(raw["variables"], "variables", _VARIABLES)
-    need(all(isinstance(n, str) and NAME.fullmatch(n) for n in names) and names != [], "variables must be names")
-    return tuple(names)
+    names = read_names(raw["variables"], "variables", _VARIABLES)
+    need(names != (), "variables must be names")
+    return names
 
 
 def load(text: str) -> tuple[Statement, Proof]:
@@ -88,8 +84,7 @@ def read_proof(raw: Any, kind: str, asked: Statement) -> Any:
     """Proof of a kind, as it stands under it."""
     size = len(asked.variables)
     if kind == "negative":
-        entries = listed(with_keys(raw, {"point"})["point"], "point", length=size)
-        return Point(coordinates=tuple(read_rational(v) for v in entries))
+        return Point(coordinates=read_row(with_keys(raw, {"point"})["point"], "point", length=size))
     if kind == "not-sos":
         values = with_keys(raw, {"functional"})["functional"]
         return Functional(values=read_polynomial(values, "functional", size, TERMS))
@@ -113,8 +108,8 @@ def _square(raw: Any, asked: Statement) -> Square:
     basis = tuple(_element(b, len(asked.variables)) for b in listed(raw["basis"], "basis", _BASIS))
     need(basis != (), "a basis must not be empty")
     size = len(basis)
-    gram = tuple(read_rational(v) for v in listed(raw["gram"], "gram", length=size * (size + 1) // 2))
-    common_grid(list(gram))
+    gram = read_row(raw["gram"], "gram", length=size * (size + 1) // 2)
+    common_grid(gram)
     monomials = [b for b in basis if isinstance(b, tuple)]
     need(len(set(monomials)) == len(monomials), "a monomial occurs twice in a basis")
     return Square(product=chosen, basis=basis, gram=gram)
@@ -146,7 +141,7 @@ def text(asked: Statement, proof: Proof) -> str:
 def plain_proof(proof: Proof) -> dict[str, Any]:
     """Proof in the words of the format, under its kind."""
     if isinstance(proof, Point):
-        return {"negative": {"point": [str(v) for v in proof.coordinates]}}
+        return {"negative": {"point": texts(proof.coordinates)}}
     if isinstance(proof, Functional):
         return {"not-sos": {"functional": polynomial_text(proof.values)}}
     parts = {
@@ -159,7 +154,7 @@ def plain_proof(proof: Proof) -> dict[str, Any]:
 
 def _plain_square(square: Square) -> dict[str, Any]:
     basis = [list(b) if isinstance(b, tuple) else polynomial_text(b) for b in square.basis]
-    return {"product": list(square.product), "basis": basis, "gram": [str(v) for v in square.gram]}
+    return {"product": list(square.product), "basis": basis, "gram": texts(square.gram)}
 
 
 def save(asked: Statement, proof: Proof | None, path: str | Path) -> None:
@@ -174,6 +169,4 @@ def save(asked: Statement, proof: Proof | None, path: str | Path) -> None:
     """
     if proof is None:
         raise CertificateError("only a proof can be saved. Received an undecided answer.")
-    written = text(asked, proof)
-    load(written)
-    write_whole(Path(path), written)
+    write_readable(path, text(asked, proof), load)

@@ -3,13 +3,15 @@
 import json
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from functools import lru_cache
 from itertools import accumulate
-from typing import Any, NoReturn
+from pathlib import Path
+from typing import Any, NoReturn, cast
 
 from quakedesign.errors import CertificateError
+from quakedesign.output import write_whole
 
 LARGEST_FILE = 4 << 20
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -77,6 +79,14 @@ def with_keys(raw: Any, keys: set[str]) -> dict[str, Any]:
     return raw
 
 
+def headed(raw: Any, keys: set[str], kind: str = "") -> dict[str, Any]:
+    """Object of a file with the given keys, the format's number and, if there is one, its kind."""
+    with_keys(raw, {"format", *keys} | ({"kind"} if kind else set()))
+    need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
+    need(not kind or raw["kind"] == kind, f"kind must be {kind}")
+    return cast(dict[str, Any], raw)
+
+
 def listed(raw: Any, what: str, limit: int | None = None, length: int | None = None) -> list[Any]:
     """List of bounded or given length."""
     if not isinstance(raw, list):
@@ -112,6 +122,36 @@ def _rational(text: str) -> Fraction:
     if str(value) != text:
         _refuse(f"{text[:40]!r} is not in lowest terms")
     return value
+
+
+def read_exactly(raw: Any, names: Iterable[str]) -> dict[str, Fraction]:
+    """Object of rationals with exactly the given names, in their order."""
+    order = list(names)
+    entries = with_keys(raw, set(order))
+    return {name: read_rational(entries[name]) for name in order}
+
+
+def read_row(raw: Any, what: str, limit: int | None = None, length: int | None = None) -> tuple[Fraction, ...]:
+    """List of rationals of bounded or given length."""
+    return tuple(read_rational(v) for v in listed(raw, what, limit, length))
+
+
+def read_ends(raw: Any, what: str) -> tuple[Fraction, Fraction]:
+    """Two rationals."""
+    low, high = read_row(raw, what, length=2)
+    return low, high
+
+
+def read_names(raw: Any, what: str, limit: int) -> tuple[str, ...]:
+    """List of names."""
+    names = listed(raw, what, limit)
+    need(all(isinstance(n, str) and NAME.fullmatch(n) for n in names), f"{what} must be names")
+    return tuple(names)
+
+
+def texts(values: Iterable[Fraction]) -> list[str]:
+    """Rationals as they stand in files."""
+    return [str(v) for v in values]
 
 
 def read_rationals(raw: Any, what: str, limit: int) -> dict[str, Fraction]:
@@ -157,3 +197,14 @@ def read_polynomial(raw: Any, what: str, variables: int | None, limit: int) -> d
 def polynomial_text(polynomial: Any) -> dict[str, str]:
     """Inverse of `read_polynomial`."""
     return {",".join(map(str, e)): str(c) for e, c in polynomial.items()}
+
+
+def write_readable(path: str | Path, written: str, load: Callable[[str], Any]) -> None:
+    """Write a text whole or not at all, and only if it can be read again.
+
+    Raises
+    ------
+    CertificateError, OutputError
+    """
+    load(written)
+    write_whole(Path(path), written)

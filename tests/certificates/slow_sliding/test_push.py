@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.certificates.impossibility import longest_diffusion, longest_reaction, smallest_withdrawal
-from quakedesign.certificates.slow_sliding import parse_sliding
 from quakedesign.certificates.slow_sliding.push import SlidingPush
 from quakedesign.fault import load_fault
 from quakedesign.studies import limits
@@ -63,7 +63,7 @@ def test_the_surprise_is_the_answer_of_the_rate_to_a_step_of_stress(step):
 
 def test_no_guarantee_contradicts_the_limits():
     path = Path(__file__).parents[3] / "proofs" / "certificates" / "sliding_crustal-patch.json"
-    proved = parse_sliding(path.read_text())
+    proved = parse_guarantee(path.read_text())
     push = SlidingPush(model=PUSH.model, amplitude=proved.task.stress)
     assert push.smallest_rate_error(proved.held.step) < proved.peak_slip_rate - proved.task.rate
     assert smallest_withdrawal(push, proved.held.step) < proved.claims.push

@@ -15,15 +15,14 @@ from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import Held, NoGuarantee
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
 from quakedesign.certificates.slow_sliding import (
     SlidingClaims,
     SlidingGuarantee,
     SlidingTask,
     cell_bounds,
     cells,
-    parse_sliding,
     sliding_task,
-    sliding_text,
     theorem,
 )
 from quakedesign.errors import CertificateError, ParameterError, UnsupportedError
@@ -95,9 +94,9 @@ def test_the_exponential_is_above_by_less_than_its_remainder(exponential):
 
 
 def test_the_guarantee_is_proved_by_both_checkers_and_survives_its_file(tmp_path):
-    text = sliding_text(CLAIM)
-    assert parse_sliding(text) == CLAIM
-    assert sliding_text(parse_sliding(text)) == text
+    text = guarantee_text(CLAIM)
+    assert parse_guarantee(text) == CLAIM
+    assert guarantee_text(parse_guarantee(text)) == text
     path = tmp_path / "sliding.json"
     path.write_text(text)
     ((verdict, lines),) = check_files([path]).values()
@@ -122,7 +121,7 @@ def test_the_ranges_that_are_said_lie_inside_those_that_are_proved(half):
 
 def paired(one, held, given):
     """Bounds of both checkers for one cell."""
-    document = json.loads(sliding_text(replace(CLAIM, task=one, held=held, claims=given)))
+    document = json.loads(guarantee_text(replace(CLAIM, task=one, held=held, claims=given)))
     fault, numbers = standalone.read_fault(document), {name: F(v) for name, v in document["claims"].items()}
     loop, path, valve = standalone.read_path(document["loop"])
     cell = standalone.Cell(fault, path, numbers, fault.normal(numbers["push"]))
@@ -151,7 +150,7 @@ UNSURE = {
 def alone(one, held=LAGGED, given=None):
     """The standalone checker's cell of a task."""
     given = given or claims()
-    document = json.loads(sliding_text(replace(CLAIM, task=one, held=held, claims=given)))
+    document = json.loads(guarantee_text(replace(CLAIM, task=one, held=held, claims=given)))
     fault, numbers = standalone.read_fault(document), {name: F(v) for name, v in document["claims"].items()}
     return standalone.Cell(fault, standalone.read_path(document["loop"])[1], numbers, fault.normal(numbers["push"]))
 
@@ -181,7 +180,7 @@ def test_both_checkers_state_the_same_loop_exactly(path):
     """Flow, inputs, outputs, what bounds the inputs and what may move after a step; with a rock that damps much."""
     one, held = task(ranges=UNSURE, ramp=F(14), damping=F(5 * 10**20)), Held(law=STIFF, step=F(200), **path)
     cell, model = alone(one, held), theorem.model_of(one, claims())
-    plain, _, valve = standalone.read_path(json.loads(sliding_text(replace(CLAIM, task=one, held=held)))["loop"])
+    plain, _, valve = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, task=one, held=held)))["loop"])
     theirs, ours = standalone.around(plain, cell, valve), theorem.loop_of(held, model, one)
     assert [list(row) for row in ours.flow] == theirs.flow
     assert [list(row) for row in ours.inputs.values()] == theirs.inputs[: len(ours.inputs)]
@@ -214,7 +213,7 @@ def test_both_checkers_make_the_same_of_gains(path, monkeypatch):
         return [list(made_up[output, name]) for output in OUTPUTS[: len(ours.outputs)]]
 
     monkeypatch.setattr(standalone, "gains", gains)
-    plain, _, valve = standalone.read_path(json.loads(sliding_text(replace(CLAIM, held=held)))["loop"])
+    plain, _, valve = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, held=held)))["loop"])
     theirs, small = standalone.bounds(plain, alone(one, held), valve)
     found = theorem.bounds_from(one, held, claims(), ours, made_up, phases)
     assert {name: found[name] for name in theirs} == theirs
@@ -302,7 +301,7 @@ def test_the_state_that_ages_fastest_counts():
 @pytest.mark.parametrize("delay", [0, 20, 50, 70])
 def test_what_is_asked_is_read_at_the_valve(delay):
     held = replace(LAGGED, delay=F(delay))
-    document = json.loads(sliding_text(replace(CLAIM, held=held)))
+    document = json.loads(guarantee_text(replace(CLAIM, held=held)))
     loop = theorem.loop_of(held, theorem.model_of(task(), claims()), task())
     assert standalone.read_path(document["loop"])[2] == loop.states.index("valve")
 
@@ -407,7 +406,7 @@ CHANGES = {
 
 
 def changed(path, new):
-    raw = copy.deepcopy(json.loads(sliding_text(CLAIM)))
+    raw = copy.deepcopy(json.loads(guarantee_text(CLAIM)))
     holder = raw
     for key in path[:-1]:
         holder = holder[key]
@@ -420,7 +419,7 @@ def changed(path, new):
 def test_what_makes_the_statement_harder_is_not_proved(name):
     text = changed(*CHANGES[name])
     try:
-        verdict = parse_sliding(text).check()
+        verdict = parse_guarantee(text).check()
     except CertificateError:
         verdict = Verdict.UNDECIDED
     assert verdict is Verdict.UNDECIDED
@@ -472,15 +471,15 @@ def test_what_breaks_a_rule_is_refused_by_both(path, new):
     with pytest.raises(checker.Refused):
         checker.check(text)
     if path == ("claims", "push"):  # no rule is broken: nothing follows
-        assert parse_sliding(text).check() is Verdict.UNDECIDED
+        assert parse_guarantee(text).check() is Verdict.UNDECIDED
         return
     with pytest.raises(CertificateError):
-        parse_sliding(text)
+        parse_guarantee(text)
 
 
 @pytest.mark.parametrize("where", [(), ("fault",), ("reference",), ("loop",), ("claims",)])
 def test_a_key_that_is_not_known_is_refused_by_both(where):
-    raw = json.loads(sliding_text(CLAIM))
+    raw = json.loads(guarantee_text(CLAIM))
     holder = raw
     for key in where:
         holder = holder[key]
@@ -488,7 +487,7 @@ def test_a_key_that_is_not_known_is_refused_by_both(where):
     with pytest.raises(checker.Refused, match="must have exactly the keys"):
         checker.check(json.dumps(raw))
     with pytest.raises(CertificateError):
-        parse_sliding(json.dumps(raw))
+        parse_guarantee(json.dumps(raw))
 
 
 @pytest.mark.parametrize("name", ["log_rate", "log_state"])
@@ -497,7 +496,7 @@ def test_logarithms_above_3_are_refused_by_both_for_that_reason(name):
     with pytest.raises(checker.Refused, match="logarithms must be at most 3"):
         checker.check(text)
     with pytest.raises(CertificateError, match="logarithms at most 3"):
-        parse_sliding(text)
+        parse_guarantee(text)
 
 
 @pytest.mark.parametrize("push", [49_900_000, 60_000_000])
@@ -512,13 +511,13 @@ def test_a_pressure_that_may_open_the_fault_is_the_reason_for_both(push):
 def test_a_claim_that_is_only_reached_on_one_cell_does_not_follow(name, monkeypatch):
     """Bounds that are made up: below all claims on one cell, one of them equal to its claim on the other."""
     two = replace(CLAIM, cuts=(("direct_effect", F("0.01")), None, None))
-    numbers = {k: F(v) for k, v in json.loads(sliding_text(two))["claims"].items()}
+    numbers = {k: F(v) for k, v in json.loads(guarantee_text(two))["claims"].items()}
     below = {k: v * F(999, 1000) for k, v in numbers.items()}
     given = [(below, F(1, 2)), (below | ({name: numbers[name]} if name else {}), F(1, 4))]
     assert [theorem.follows(found, claims()) for found, _ in given] == [True, name is None]
     answers = iter(given)
     monkeypatch.setattr(standalone, "bounds", lambda *_: next(answers))
-    document = json.loads(sliding_text(two))
+    document = json.loads(guarantee_text(two))
     if name is None:
         assert any("small gain 0.5" in line for line in standalone.verify(document))
         return

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from quakedesign import sos
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.answer import Answer
-from quakedesign.sos.exact.files import is_about_polynomial, load, save, text
+from quakedesign.sos.exact.files import load, save, text
 from quakedesign.sos.exact.proofs import Functional, Point, holds
 
 QUESTIONS = {
@@ -192,11 +192,6 @@ def test_what_breaks_a_rule_is_not_read(case):
 def test_what_is_at_the_edge_of_a_rule_is_read(fine):
     statement, proof = load(json.dumps(fine))
     assert json.loads(text(statement, proof)) == fine
-
-
-def test_files_about_polynomials_are_told_by_their_key():
-    assert is_about_polynomial(BY_HAND)
-    assert not any(map(is_about_polynomial, ({"V": []}, ["polynomial"], "polynomial", None, {})))
 
 
 def test_only_what_can_be_read_again_is_written(tmp_path):

@@ -14,7 +14,8 @@ from scipy.special import lambertw
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Held
-from quakedesign.certificates.slow_sliding import SlidingClaims, SlidingTask, parse_sliding, sliding_text
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.slow_sliding import SlidingClaims, SlidingTask
 from quakedesign.certificates.slow_sliding.theorem import cell_bounds
 from quakedesign.loop import SlidingModel
 from quakedesign.synthesis.guaranteed import slow_sliding
@@ -53,7 +54,7 @@ def sizes(claims):
 def test_claims_are_followed_down_to_what_both_checkers_still_prove(half):
     found = proved_sliding(task(half, 8000), HELD)
     assert found.check() is Verdict.PROVED
-    assert checker.check(sliding_text(found)).verdict == "proved"
+    assert checker.check(guarantee_text(found)).verdict == "proved"
     assert found.claims.log_rate < F(1, 4)
     every = [cell_bounds(cell, found.held, found.claims) for cell in found.cells]
     reached = {name: max(bounds[name] for bounds in every) for name in NAMES}
@@ -130,7 +131,7 @@ def test_the_box_is_searched_at_its_corners():
 @pytest.mark.slow
 def test_ten_percent_of_a_b_and_d_c_are_certified_to_within_three_times_the_worst_found():
     """a = 0.010, b = 0.015, D_c = 1 mm, 50 MPa, 5 km, V = 1.2 µm/s, L²/D = 833 s, under 25 kPa."""
-    wide = parse_sliding((PROOFS / "certificates" / "boxes" / "sliding_ten-percent.json").read_text())
+    wide = parse_guarantee((PROOFS / "certificates" / "boxes" / "sliding_ten-percent.json").read_text())
     smaller = replace(wide, claims=slow_sliding._smallest_claims(wide))
     assert smaller.check() is Verdict.PROVED
     assert smaller.peak_slip_rate < F(132, 100) * wide.task.rate
