@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-import numpy as np
-
 from quakedesign.errors import ParameterError
 from quakedesign.loop.implicit_root import ImplicitRoot
 
@@ -66,12 +64,6 @@ class LinearLaw:
     def of_slip_alone(self) -> bool:
         """Whether it does without the slip rate."""
         return self.root is None and not any(row[1] for row in (*self.measured, self.feedback))
-
-    @property
-    def own_poles(self) -> np.ndarray:
-        """Eigenvalues of F, the integral's first: of the law by itself, as it is while friction holds the fault."""
-        poles = np.linalg.eigvals(np.array(self.update, dtype=float).reshape((len(self.states),) * 2))
-        return np.asarray(poles[np.argsort(np.abs(poles - 1), kind="stable")])
 
 
 def require_sizes(

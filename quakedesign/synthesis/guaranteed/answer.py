@@ -15,6 +15,7 @@ from quakedesign.loop import LinearLaw
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
 from quakedesign.synthesis.guaranteed.families import MEASURED
+from quakedesign.synthesis.guaranteed.poles import own_poles
 
 _GROWS = 1 + 1e-6  # a factor per sample; eigenvalues that are 1 twice are rounded by less
 
@@ -74,7 +75,7 @@ class Answer:
         if not isinstance(self.found, Guarantee):
             return None
         held = self.found.held
-        growth = float(np.max(np.abs(held.law.own_poles), initial=0.0))
+        growth = float(np.max(np.abs(own_poles(held.law)), initial=0.0))
         return float(held.step) / log(growth) if growth > _GROWS else None
 
     def _at_rest(self) -> list[str]:

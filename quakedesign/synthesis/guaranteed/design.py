@@ -17,6 +17,7 @@ from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.checks import require_ordinary
 from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated, slowly_estimated
 from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of, why_no_law
+from quakedesign.synthesis.guaranteed.poles import own_poles
 from quakedesign.synthesis.guaranteed.slowly import best_guarantee
 
 OBJECTIVES = ("tracking", "peak")
@@ -185,7 +186,7 @@ class _Laws:
         if cost >= 10 * _FAILED:
             return cost
         slowest = _SETTLES ** float(self.template.step / self.family.period)
-        over = float(np.abs(self.family.law(x).own_poles[1:]).max(initial=0)) / slowest
+        over = float(np.abs(own_poles(self.family.law(x))[1:]).max(initial=0)) / slowest
         return cost if over <= 1 else max(cost, min(over, 9.0) * _FAILED)
 
 

@@ -7,7 +7,6 @@ from math import floor, log10
 from typing import Any, Unpack
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.optimize import minimize
 
 from quakedesign.bounds import UpperBound
@@ -27,6 +26,7 @@ from quakedesign.certificates.slow_sliding.theorem import (
 from quakedesign.errors import ParameterError
 from quakedesign.loop import LinearLaw, SlidingModel
 from quakedesign.synthesis.guaranteed.estimate import gains_of
+from quakedesign.synthesis.guaranteed.poles import spectral_radius
 from quakedesign.synthesis.guaranteed.rounding import short
 from quakedesign.synthesis.linear.sampled.slow_sliding import Weights, sliding_law
 
@@ -132,7 +132,7 @@ def designed_sliding(task: SlidingTask, step: Fraction, **around: Unpack[Around]
         if tried is None:
             return _FAILED
         model = model_of(corner, claims)
-        radius = _FAILED if model is None else _forgetting(tried, model, corner)
+        radius = _FAILED if model is None else spectral_radius(loop_of(tried, model, corner))
         if radius > _FORGETTING:
             return _FAILED + radius
         found = _estimate(corner, tried, claims)
@@ -185,15 +185,6 @@ def _law(corner: SlidingTask, task: SlidingTask, step: Fraction, around: Around,
 def _middle(task: SlidingTask, axis: str) -> Fraction:
     low, high = task.ranges[axis]
     return (low + high) / 2
-
-
-def _forgetting(held: Held, model: SlidingModel, task: SlidingTask) -> float:
-    """Largest eigenvalue of a period of the nominal loop."""
-    loop = loop_of(held, model, task)
-    flow, period = np.array(loop.flow, dtype=float), np.eye(len(loop.flow))
-    for part in loop.segments:
-        period = expm(flow * float(part.duration)) @ np.array(part.jump, dtype=float) @ period
-    return float(max(abs(np.linalg.eigvals(period))))
 
 
 def _guess(task: SlidingTask) -> SlidingClaims:

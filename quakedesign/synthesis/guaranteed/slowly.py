@@ -5,11 +5,9 @@ from fractions import Fraction
 from math import log
 from typing import overload
 
-import numpy as np
-from scipy.linalg import expm
-
 from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, SlowGain, Task, guarantee
 from quakedesign.loop import PeriodicLoop
+from quakedesign.synthesis.guaranteed.poles import spectral_radius
 from quakedesign.synthesis.guaranteed.rounding import short
 
 _PARTS = 8
@@ -49,7 +47,4 @@ def slow_gain(task: Task, held: Held) -> SlowGain | None:
 
 def _decay(loop: PeriodicLoop) -> float:
     """Of the slowest mode [1/s]."""
-    flow, period = np.array(loop.flow, dtype=float), np.eye(len(loop.flow))
-    for part in loop.segments:
-        period = expm(flow * float(part.duration)) @ np.array(part.jump, dtype=float) @ period
-    return -log(max(max(abs(np.linalg.eigvals(period))), 1e-12)) / float(loop.period)
+    return -log(max(spectral_radius(loop), 1e-12)) / float(loop.period)
