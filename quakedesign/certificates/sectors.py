@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
+from itertools import product
 from typing import Any
 
 import sympy as sp
@@ -52,6 +53,14 @@ class Sectors:
     rate: Range
     row_bounds: Range
     largest_effective_stress: Fraction
+
+    def __post_init__(self) -> None:
+        if not all(low <= high for low, high in self.ranges().values()):
+            raise ParameterError(f"ranges must be ordered. Received {self.beta}, {self.slip}, {self.rate}.")
+
+    def vertices(self) -> list[tuple[Fraction, Fraction, Fraction]]:
+        """Different corners (β, s, w) of the ranges."""
+        return list(dict.fromkeys(product(self.beta, self.slip, self.rate)))
 
     def ranges(self) -> dict[str, Range]:
         """Ranges by the names of the e-LQR's loop field."""

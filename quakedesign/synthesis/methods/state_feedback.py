@@ -33,10 +33,9 @@ from quakedesign.synthesis.guaranteed import (
 from quakedesign.synthesis.guaranteed.reach import design_at, longest_step
 from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
-from quakedesign.synthesis.linear.analysis.robust_stability import unstable_vertex, why_undecided
+from quakedesign.synthesis.linear.analysis.robust_stability import why_undecided
 from quakedesign.synthesis.linear.design.riccati import RiccatiDesign, riccati_design
-from quakedesign.synthesis.linear.plant.polytope import error_loop
-from quakedesign.synthesis.linear.plant.problem import LinearProblem
+from quakedesign.synthesis.linear.plant.problem import FeedbackLoop, LinearProblem
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix
 from quakedesign.synthesis.linear.plant.sliding_model import near_path, sliding_model
 from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
@@ -196,6 +195,6 @@ def _judged(
     details = {**details, "rate": str(certificate.claims["rate"]) if certificate else None}
     if certificate is not None:
         return problem.judged(controller, certificate, details=details)
-    loop = error_loop(tuple(controller.gains.values()), sectors(problem.fault))
-    verdict = Verdict.UNDECIDED if unstable_vertex(loop) is None else Verdict.REFUTED
+    loop = FeedbackLoop(gains=tuple(controller.gains.values()), sectors=sectors(problem.fault))
+    verdict = Verdict.UNDECIDED if loop.unstable_vertex() is None else Verdict.REFUTED
     return problem.judged(controller, verdict=verdict, details={**details, "reason": why_undecided(loop)})

@@ -7,11 +7,11 @@ import numpy as np
 
 import quakedesign as qd
 from quakedesign.certificates import Verdict
-from quakedesign.certificates.sectors import sectors
+from quakedesign.certificates.sectors import Sectors, sectors
 from quakedesign.controllers import published
-from quakedesign.synthesis.linear.analysis.robust_stability import analysis, unstable_vertex, why_undecided
-from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop
-from quakedesign.synthesis.linear.plant.problem import loop_matrix
+from quakedesign.synthesis.linear.analysis.robust_stability import analysis, why_undecided
+from quakedesign.synthesis.linear.plant.problem import FeedbackLoop
+from quakedesign.synthesis.linear.plant.rational_matrices import floats
 
 LAB = qd.load_fault("lab-fault")
 GOOD = published("lab-fault")["elqr"]
@@ -30,17 +30,17 @@ def test_a_destabilising_gain_is_refuted_at_a_vertex_with_an_unstable_pole():
     found = analysis(LAB, bad)
     assert found.verdict is Verdict.REFUTED
     assert found.certificates == {}
-    loop = error_loop(tuple(bad.gains.values()), sectors(LAB))
-    matrix = np.array([[float(v) for v in row] for row in loop_matrix(found.unstable_at, loop.authority, loop.gains)])
-    assert np.linalg.eigvals(matrix).real.max() > 0
+    loop = FeedbackLoop(gains=tuple(bad.gains.values()), sectors=sectors(LAB))
+    assert np.linalg.eigvals(floats(loop.matrix(found.unstable_at))).real.max() > 0
     assert "not stable near beta" in why_undecided(loop)
 
 
 def test_stable_vertices_without_a_v_are_said_to_be_so():
     # a wide range of s: every constant loop is stable, what varies may not be
-    loop = ErrorLoop(
-        gains=(F(4), F(1, 10), F(1, 100), F(1, 1000)), authority=F(1), beta=(F(1), F(1)), slip=(F(-50), F(3)),
-        rate=(F(1, 10), F(1, 10)),
+    wide = Sectors(
+        authority=F(1), beta=(F(1), F(1)), slip=(F(-50), F(3)), rate=(F(1, 10), F(1, 10)), row_bounds=(F(0), F(0)),
+        largest_effective_stress=F(1),
     )  # fmt: skip
-    assert unstable_vertex(loop) is None
+    loop = FeedbackLoop(gains=(F(4), F(1, 10), F(1, 100), F(1, 1000)), sectors=wide)
+    assert loop.unstable_vertex() is None
     assert "every constant vertex" in why_undecided(loop)

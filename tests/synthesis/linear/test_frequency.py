@@ -7,59 +7,53 @@ import control
 import numpy as np
 import pytest
 
-from quakedesign.synthesis.linear.analysis.frequency import (
-    characteristic,
-    circle_limit,
-    frequency_facts,
-    slip_limit,
-    stable_quartic,
-)
-from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
-from quakedesign.synthesis.linear.plant.problem import loop_matrix
+from quakedesign.certificates.sectors import Sectors
+from quakedesign.errors import ParameterError
+from quakedesign.synthesis.linear.analysis.frequency import circle_limit, frequency_facts, slip_limit
+from quakedesign.synthesis.linear.plant.problem import FeedbackLoop
 from quakedesign.synthesis.linear.plant.rational_matrices import floats
 
-LOOP = ErrorLoop(
-    gains=(F(104), F(14), F(150), F(78)),
-    authority=F(1),
-    beta=(F(1), F(57, 40)),
-    slip=(F(-1), F(29, 10)),
-    rate=(F(23, 10), F(23, 10)),
-)
+
+def loop_of(gains, *, beta, slip, rate):
+    sectors = Sectors(
+        authority=F(1), beta=beta, slip=slip, rate=rate, row_bounds=(F(0), F(0)), largest_effective_stress=F(1)
+    )
+    return FeedbackLoop(gains=tuple(F(k) for k in gains), sectors=sectors)
+
+
+LOOP = loop_of((104, 14, 150, 78), beta=(F(1), F(57, 40)), slip=(F(-1), F(29, 10)), rate=(F(23, 10), F(23, 10)))
 
 
 def eigenvalues(loop, *corner):
-    return np.linalg.eigvals(
-        np.array([[float(v) for v in row] for row in loop_matrix(corner, loop.authority, loop.gains)])
-    )
+    return np.linalg.eigvals(floats(loop.matrix(corner)))
 
 
-def test_routh_hurwitz_agrees_with_the_roots():
+def test_a_loop_is_stable_where_its_eigenvalues_are_and_its_worst_vertex_is_told():
     rng = np.random.default_rng(3)
     verdicts = set()
     for _ in range(400):
-        coefficients = [F(int(c), 8) for c in rng.integers(-4, 80, size=4)]
-        roots = np.roots([1.0, *(float(c) for c in coefficients)])
-        if abs(roots.real.max()) > 1e-6:
-            verdicts.add(stable_quartic(*coefficients))
-            assert stable_quartic(*coefficients) == (roots.real.max() < 0)
+        loop = loop_of(rng.integers(-4, 80, size=4).tolist(), beta=(F(1), F(2)), slip=(F(-1), F(3)), rate=(F(1), F(2)))
+        found = {corner: eigenvalues(loop, *corner).real.max() for corner in loop.sectors.vertices()}
+        assert len(found) == 8
+        if min(map(abs, found.values())) > 1e-6:
+            verdicts.add(loop.unstable_vertex() is None)
+            assert {corner: loop.stable(corner) for corner in found} == {c: value < 0 for c, value in found.items()}
+            assert loop.unstable_vertex() == next((c for c, value in found.items() if value > 0), None)
     assert verdicts == {True, False}
 
 
-def test_the_characteristic_polynomial_is_that_of_the_matrix():
-    for corner in LOOP.corners():
-        matrix = floats(loop_matrix(corner, LOOP.authority, LOOP.gains))
-        np.testing.assert_allclose(np.poly(matrix)[1:], [float(c) for c in characteristic(LOOP, *corner)], rtol=1e-9)
+def test_ranges_that_are_not_ordered_are_refused():
+    with pytest.raises(ParameterError, match="ordered"):
+        loop_of((1,) * 4, beta=(F(2), F(1)), slip=(F(0), F(1)), rate=(F(1), F(1)))
 
 
 @pytest.mark.parametrize(
     "gains", [(104, 14, 150, 78), (74, F(157, 10), F(58, 1000), F(15, 10**7)), (10, 1, 30, 40), (20, 3, 19, 1)]
 )
 def test_the_slip_limit_is_where_an_eigenvalue_crosses(gains):
-    loop = ErrorLoop(
-        gains=tuple(F(g) for g in gains), authority=F(1), beta=(F(1), F(4)), slip=(F(-1), F(-1)), rate=(F(23, 10),) * 2
-    )
+    loop = loop_of(tuple(F(g) for g in gains), beta=(F(1), F(4)), slip=(F(-1), F(-1)), rate=(F(23, 10),) * 2)
     limit, beta = slip_limit(loop, F(23, 10))
-    assert loop.beta[0] <= beta <= loop.beta[1]
+    assert loop.sectors.beta[0] <= beta <= loop.sectors.beta[1]
     assert eigenvalues(loop, beta, limit + abs(limit) / 1000, F(23, 10)).real.max() > 0
     below = limit - abs(limit) / 1000
     dense = [F(1) + F(i, 20) for i in range(61)]
@@ -68,9 +62,7 @@ def test_the_slip_limit_is_where_an_eigenvalue_crosses(gains):
 
 def test_the_least_limit_may_lie_inside_the_range_of_beta():
     # k1·k3 only just above k2·k4: the bracket falls, then rises with β
-    loop = ErrorLoop(
-        gains=(F(10), F(3), F(30), F(40)), authority=F(1), beta=(F(1), F(10)), slip=(F(-1), F(-1)), rate=(F(2),) * 2
-    )
+    loop = loop_of((F(10), F(3), F(30), F(40)), beta=(F(1), F(10)), slip=(F(-1), F(-1)), rate=(F(2),) * 2)
     limit, beta = slip_limit(loop, F(2))
 
     def at(b):
@@ -85,9 +77,7 @@ def test_the_least_limit_may_lie_inside_the_range_of_beta():
 
 
 def test_a_loop_without_double_integral_action_has_no_limit():
-    loop = ErrorLoop(
-        gains=(F(104), F(14), F(150), F(-1)), authority=F(1), beta=(F(1),) * 2, slip=(F(-1),) * 2, rate=(F(2),) * 2
-    )
+    loop = loop_of((F(104), F(14), F(150), F(-1)), beta=(F(1),) * 2, slip=(F(-1),) * 2, rate=(F(2),) * 2)
     assert slip_limit(loop, F(2)) is None
 
 
@@ -104,12 +94,11 @@ def test_margins_move_a_pole_onto_the_axis(corner):
     beta, slip, rate = (float(v) for v in corner)
     assert facts.stable
     if facts.gain_reduction is not None:
-        scaled = ErrorLoop(
-            gains=tuple(k * F(facts.gain_reduction) for k in LOOP.gains),
-            authority=F(1),
-            beta=LOOP.beta,
-            slip=LOOP.slip,
-            rate=LOOP.rate,
+        scaled = loop_of(
+            tuple(k * F(facts.gain_reduction) for k in LOOP.gains),
+            beta=LOOP.sectors.beta,
+            slip=LOOP.sectors.slip,
+            rate=LOOP.sectors.rate,
         )
         assert abs(eigenvalues(scaled, *corner).real.max()) < 1e-6
     assert facts.gain_margin is None
@@ -124,8 +113,8 @@ def test_margins_move_a_pole_onto_the_axis(corner):
 
 
 def test_norms_agree_with_python_control():
-    for corner in LOOP.corners():
-        A = floats(loop_matrix(corner, LOOP.authority, LOOP.gains))
+    for corner in LOOP.sectors.vertices():
+        A = floats(LOOP.matrix(corner))
         facts = frequency_facts(LOOP, corner)
         for row, value in ((0, facts.disturbance_peak_slip), (1, facts.disturbance_peak_rate)):
             system = control.ss(A, np.array([[0.0], [1], [0], [0]]), np.eye(4)[[row]], [[0.0]])
@@ -136,14 +125,13 @@ def test_norms_agree_with_python_control():
 def test_an_optimal_k_has_a_return_difference_of_at_least_one():
     A = np.array([[0, 1, 0, 0], [-1, -2.3, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0]], dtype=float)
     K, _, _ = control.lqr(A, np.array([[0.0], [1], [0], [0]]), np.eye(4), [[1.0]], method="scipy")
-    loop = ErrorLoop(
-        gains=tuple(F(float(k)) for k in K[0]),
-        authority=F(1),
+    loop = loop_of(
+        tuple(F(float(k)) for k in K[0]),
         beta=(F(1),) * 2,
         slip=(F(-1),) * 2,
         rate=(F(23, 10),) * 2,
     )
-    facts = frequency_facts(loop, next(loop.corners()))
+    facts = frequency_facts(loop, loop.sectors.vertices()[0])
     assert facts.return_difference > 1 - 1e-6
     assert facts.phase_margin >= 60
     assert facts.gain_reduction is None or facts.gain_reduction <= 0.5

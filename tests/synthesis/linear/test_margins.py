@@ -11,7 +11,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import published
 from quakedesign.synthesis.linear.analysis.common_quadratic import sector_loop
-from quakedesign.synthesis.linear.analysis.frequency import slip_limit, stable_quartic
+from quakedesign.synthesis.linear.analysis.frequency import slip_limit
 from quakedesign.synthesis.linear.analysis.margins import (
     decay_rate,
     friction_slope_margin,
@@ -20,7 +20,7 @@ from quakedesign.synthesis.linear.analysis.margins import (
 )
 from quakedesign.synthesis.linear.analysis.robust_stability import analysis
 from quakedesign.synthesis.linear.design.riccati import riccati_design
-from quakedesign.synthesis.linear.plant.polytope import error_loop
+from quakedesign.synthesis.linear.plant.problem import FeedbackLoop
 
 
 @pytest.fixture(scope="module", params=["real-fault", "lab-fault"])
@@ -67,12 +67,11 @@ def test_at_the_limit_the_constant_loop_is_not_stable(case):
     fault, controller, _ = case
     margin = friction_slope_margin(fault, controller)
     needed, spring = sectors(fault), F(str(fault.specific_stiffness))
-    loop = error_loop(tuple(controller.gains.values()), needed)
-    from quakedesign.synthesis.linear.analysis.frequency import characteristic
+    loop = FeedbackLoop(gains=tuple(controller.gains.values()), sectors=needed)
 
     at = margin.limit * margin.slope - spring
-    assert not stable_quartic(*characteristic(loop, margin.limit_beta, at, needed.rate[0]))
-    assert stable_quartic(*characteristic(loop, margin.limit_beta, at * F(999999, 1000000), needed.rate[0]))
+    assert not loop.stable((margin.limit_beta, at, needed.rate[0]))
+    assert loop.stable((margin.limit_beta, at * F(999999, 1000000), needed.rate[0]))
 
 
 def test_friction_without_slope_and_unstable_gains_have_no_margin():
@@ -95,8 +94,8 @@ def test_the_range_of_beta_holds_the_box_and_ends_above_its_limit():
     assert all(c.check() is Verdict.PROVED for c in found.certificates)
     assert found.certificates[0].loop.uncertain["beta"] == (found.low, needed.beta[1])
     assert found.certificates[1].loop.uncertain["beta"] == (needed.beta[0], found.high)
-    weak = error_loop([k * found.low_limit for k in designed.gains.values()], needed)
-    limit, _ = slip_limit(replace(weak, beta=(F(1), F(1))), needed.rate[0])
+    gains = [k * found.low_limit for k in designed.gains.values()]
+    limit, _ = slip_limit(FeedbackLoop(gains=gains, sectors=replace(needed, beta=(F(1), F(1)))), needed.rate[0])
     assert limit <= needed.slip[1]
 
 

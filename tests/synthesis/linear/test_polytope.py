@@ -12,7 +12,7 @@ from quakedesign.controllers import Signals, published
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic import plant
 from quakedesign.synthesis.linear.analysis.common_quadratic import sector_loop
-from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, Polytope, modal_scaling, polytope_of
+from quakedesign.synthesis.linear.plant.polytope import Polytope, modal_scaling, polytope_of
 
 
 @pytest.fixture(scope="module")
@@ -81,11 +81,6 @@ def test_a_field_that_is_not_linear_is_refused():
     )
     with pytest.raises(ParameterError, match="linear field"):
         polytope_of(loop)
-
-
-def test_ranges_that_are_not_ordered_are_refused():
-    with pytest.raises(ParameterError, match="ordered"):
-        ErrorLoop(gains=(F(1),) * 4, authority=F(1), beta=(F(2), F(1)), slip=(F(0), F(1)), rate=(F(1), F(1)))
 
 
 def test_modal_coordinates_do_not_depend_on_the_units_of_the_states(real):

@@ -7,35 +7,22 @@ from fractions import Fraction
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from quakedesign.synthesis.linear.plant.polytope import ErrorLoop
+from quakedesign.synthesis.linear.plant.problem import FeedbackLoop, Vertex
+from quakedesign.synthesis.linear.plant.rational_matrices import characteristic
 
 
-def stable_quartic(third: Fraction, second: Fraction, first: Fraction, constant: Fraction) -> bool:
-    """Whether all roots of z⁴ + third·z³ + second·z² + first·z + constant have negative real parts (Routh, Hurwitz)."""
-    if min(third, first, constant) <= 0:
-        return False
-    return third * second * first > first**2 + third**2 * constant
-
-
-def characteristic(loop: ErrorLoop, beta: Fraction, slip: Fraction, rate: Fraction) -> tuple[Fraction, ...]:
-    """Coefficients of z³ … z⁰ of the loop's monic characteristic polynomial for constant parameters, exact."""
-    k1, k2, k3, k4 = loop.gains
-    strength = beta * loop.authority
-    return rate + strength * k2, strength * k1 - slip, strength * k3, strength * k4
-
-
-def slip_limit(loop: ErrorLoop, rate: Fraction) -> tuple[Fraction, Fraction] | None:
+def slip_limit(loop: FeedbackLoop, rate: Fraction) -> tuple[Fraction, Fraction] | None:
     """Smallest constant s [1/s²] that destabilises the loop for some constant β, and that β; None if β alone does.
 
     For a constant β the loop is stable if and only if s is below βbk1 − βbk3/(w + βbk2) − (w + βbk2)k4/k3, which is
     convex in β; the value is exact at the β returned, an end of the range or a rational next to the least point.
     """
     k1, k2, k3, k4 = loop.gains
-    low, high = loop.beta
+    low, high = loop.sectors.beta
     candidates = [low, high]
 
     def limit(beta: Fraction) -> Fraction | None:
-        strength = beta * loop.authority
+        strength = beta * loop.sectors.authority
         damping = rate + strength * k2
         if min(damping, k3 * strength, k4 * strength) <= 0:
             return None
@@ -45,19 +32,21 @@ def slip_limit(loop: ErrorLoop, rate: Fraction) -> tuple[Fraction, Fraction] | N
         return None
     square = k3 * rate / (k1 - k2 * k4 / k3) if k1 * k3 > k2 * k4 else Fraction(-1)
     if square >= 0 and k2 > 0:
-        inner = Fraction(round((float(square) ** 0.5 - float(rate)) / float(loop.authority * k2) * 2**20), 2**20)
+        inner = Fraction(
+            round((float(square) ** 0.5 - float(rate)) / float(loop.sectors.authority * k2) * 2**20), 2**20
+        )
         candidates += [inner] if low < inner < high else []
     values = [(value, beta) for beta in candidates if (value := limit(beta)) is not None]
     return min(values)
 
 
-def circle_limit(loop: ErrorLoop, beta: Fraction, rate: Fraction, least: Fraction) -> float:
+def circle_limit(loop: FeedbackLoop, beta: Fraction, rate: Fraction, least: Fraction) -> float:
     """Largest s − least [1/s²] that the circle criterion allows for time-varying s ≥ least at a constant β; measured.
 
     1/max Re G(jω) of G(z) = z²/(characteristic polynomial with s = least): for one sector and a constant β no quadratic
     V does better (Yakubovich, Kalman, Popov).
     """
-    a3, a2, a1, a0 = (float(c) for c in characteristic(loop, beta, least, rate))
+    a3, a2, a1, a0 = (float(c) for c in characteristic(loop.matrix((beta, least, rate)))[1:])
     scale = max(abs(a3), abs(a2) ** 0.5, abs(a1) ** (1 / 3), abs(a0) ** 0.25)
 
     def real_part(logarithm: float) -> float:
@@ -107,25 +96,24 @@ class FrequencyFacts:
     disturbance_peak_rate: float
 
 
-def frequency_facts(loop: ErrorLoop, corner: Sequence[Fraction]) -> FrequencyFacts:
+def frequency_facts(loop: FeedbackLoop, corner: Vertex) -> FrequencyFacts:
     """Margins of L(z) = βb(k2z³ + k1z² + k3z + k4)/(z²(z² + wz − s)) and norms of the closed loop at one vertex."""
     beta, slip, rate = corner
     k1, k2, k3, k4 = loop.gains
-    closed = [float(c) for c in characteristic(loop, beta, slip, rate)]
+    closed = [float(c) for c in characteristic(loop.matrix(corner))[1:]]
     pace = max(abs(c) ** (1 / n) for n, c in enumerate(closed, start=1) if c)
     scaled = [c / pace**n for n, c in enumerate(closed, start=1)]
-    feedback = [float(beta * loop.authority * k) / pace**n for n, k in enumerate((k2, k1, k3, k4), start=1)]
+    feedback = [float(beta * loop.sectors.authority * k) / pace**n for n, k in enumerate((k2, k1, k3, k4), start=1)]
     plant = [1.0, float(rate) / pace, -float(slip) / pace**2, 0.0, 0.0]
     grid = np.logspace(-7, 3, 20001)
     z = 1j * grid
     gains = _crossings(feedback, plant)
     denominator = np.polyval([1.0, *scaled], z)
-    stable = stable_quartic(*characteristic(loop, beta, slip, rate))
     return FrequencyFacts(
         beta=float(beta),
         slip=float(slip),
         rate=float(rate),
-        stable=stable,
+        stable=loop.stable(corner),
         gain_margin=min((g for g in gains["gain"] if g > 1), default=None),
         gain_reduction=max((g for g in gains["gain"] if g < 1), default=None),
         phase_margin=min((abs(p) for p in gains["phase"]), default=None),

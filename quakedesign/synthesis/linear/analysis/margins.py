@@ -15,8 +15,9 @@ from quakedesign.rationals import fraction_of, nearest, rational
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 from quakedesign.synthesis.linear.analysis.common_quadratic import robust_stability, sector_loop
-from quakedesign.synthesis.linear.analysis.frequency import characteristic, circle_limit, slip_limit, stable_quartic
-from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop, polytope_of
+from quakedesign.synthesis.linear.analysis.frequency import circle_limit, slip_limit
+from quakedesign.synthesis.linear.plant.polytope import polytope_of
+from quakedesign.synthesis.linear.plant.problem import FeedbackLoop
 
 _SHARES = (Fraction(9995, 10000), Fraction(999, 1000), Fraction(997, 1000), Fraction(992, 1000))
 _STEPS = 10
@@ -83,9 +84,8 @@ def friction_slope_margin(fault: Fault, controller: Controller) -> SlopeMargin |
     fault = fault.with_box("paper")
     needed, slope = sectors(fault), nominal_slope(fault)
     spring, damping = (plant_ranges(fault)[symbol][0] for symbol in (plant.k_hat, plant.eta_hat))
-    loop = error_loop(
-        tuple(controller.gains.values()), replace(needed, slip=(-spring, -spring), rate=(damping, damping))
-    )
+    still = replace(needed, slip=(-spring, -spring), rate=(damping, damping))
+    loop = FeedbackLoop(gains=tuple(controller.gains.values()), sectors=still)
     found = slip_limit(loop, damping)
     if slope == 0 or found is None or found[0] <= -spring:
         return None
@@ -170,7 +170,7 @@ def gain_range(fault: Fault, controller: Controller) -> GainRange | None:
     inside = prove(least, most)
     if inside is None:
         return None
-    limit = _least_stable(error_loop(tuple(controller.gains.values()), needed))
+    limit = _least_stable(FeedbackLoop(gains=tuple(controller.gains.values()), sectors=needed))
     ends = {"low": (least, inside), "high": (most, inside)}
     low, certified = limit, least
     for _ in range(_BETA_STEPS):
@@ -195,17 +195,13 @@ def gain_range(fault: Fault, controller: Controller) -> GainRange | None:
     )
 
 
-def _least_stable(loop: ErrorLoop) -> Fraction:
+def _least_stable(loop: FeedbackLoop) -> Fraction:
     """Largest β below the range, to 2⁻²⁰ of its end, at which a constant vertex of s and w is not stable, or 0."""
-    corners = {(s, w) for _, s, w in loop.corners()}
-
-    def stable(beta: Fraction) -> bool:
-        return all(stable_quartic(*characteristic(loop, beta, s, w)) for s, w in corners)
-
-    low, high = Fraction(0), loop.beta[0]
+    low, high = Fraction(0), loop.sectors.beta[0]
     for _ in range(20):
         middle = (low + high) / 2
-        low, high = (low, middle) if stable(middle) else (middle, high)
+        there = replace(loop, sectors=replace(loop.sectors, beta=(middle, middle)))
+        low, high = (low, middle) if there.unstable_vertex() is None else (middle, high)
     return low
 
 

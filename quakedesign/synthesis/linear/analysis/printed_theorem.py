@@ -19,12 +19,10 @@ from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 from quakedesign.synthesis.linear.analysis.inverse_optimality import InverseOptimality, inverse_optimality
-from quakedesign.synthesis.linear.plant.problem import LinearProblem, Vertex, loop_matrix
+from quakedesign.synthesis.linear.plant.problem import FeedbackLoop, LinearProblem, Vertex, loop_matrix
 from quakedesign.synthesis.linear.plant.rational_matrices import (
     Matrix,
-    characteristic,
     definite,
-    hurwitz,
     lyapunov,
     times,
     total,
@@ -112,11 +110,10 @@ def both_tests(
     switching : Switching, optional
         A plant of the box that changes in time.
     """
-    unstable = (v for v in problem.vertices() if not hurwitz(characteristic(problem.loop(v, gains))))
     return BothTests(
         printed=inverse_optimality(problem, gains, printed=printed),
         sound=inverse_optimality(problem, gains),
-        unstable_at=next(unstable, None),
+        unstable_at=FeedbackLoop(gains=gains, sectors=problem.sectors).unstable_vertex(),
         growth=switched_growth(problem, gains, switching) if switching else None,
     )
 

@@ -9,12 +9,7 @@ from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, sector_loop
-from quakedesign.synthesis.linear.analysis.frequency import (
-    FrequencyFacts,
-    characteristic,
-    frequency_facts,
-    stable_quartic,
-)
+from quakedesign.synthesis.linear.analysis.frequency import FrequencyFacts, frequency_facts
 from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
 from quakedesign.synthesis.linear.analysis.margins import (
     DecayRate,
@@ -24,8 +19,8 @@ from quakedesign.synthesis.linear.analysis.margins import (
     friction_slope_margin,
     gain_range,
 )
-from quakedesign.synthesis.linear.plant.polytope import ErrorLoop, error_loop, polytope_of
-from quakedesign.synthesis.linear.plant.problem import LinearProblem, Vertex
+from quakedesign.synthesis.linear.plant.polytope import polytope_of
+from quakedesign.synthesis.linear.plant.problem import FeedbackLoop, LinearProblem, Vertex
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,13 +84,13 @@ def analysis(fault: Fault, controller: Controller) -> Analysis:
         e-LQR.
     """
     needed = sectors(fault)
-    loop = error_loop(tuple(controller.gains.values()), needed)
+    loop = FeedbackLoop(gains=tuple(controller.gains.values()), sectors=needed)
     return Analysis(
         decay=decay_rate(sector_loop(controller, needed)) or _decay_of_optimal_gains(fault, controller),
-        unstable_at=unstable_vertex(loop),
+        unstable_at=loop.unstable_vertex(),
         slope=friction_slope_margin(fault, controller),
         span=gain_range(fault, controller),
-        frequency=tuple(frequency_facts(loop, corner) for corner in loop.corners()),
+        frequency=tuple(frequency_facts(loop, corner) for corner in needed.vertices()),
     )
 
 
@@ -113,14 +108,9 @@ def _decay_of_optimal_gains(fault: Fault, controller: Controller) -> DecayRate |
     )
 
 
-def unstable_vertex(loop: ErrorLoop) -> Vertex | None:
-    """Vertex whose constant loop is not asymptotically stable, exactly; None when all are stable."""
-    return next((c for c in loop.corners() if not stable_quartic(*characteristic(loop, *c))), None)
-
-
-def why_undecided(loop: ErrorLoop) -> str:
+def why_undecided(loop: FeedbackLoop) -> str:
     """What is known about gains for which no V was found: an unstable vertex, or nothing."""
-    vertex = unstable_vertex(loop)
+    vertex = loop.unstable_vertex()
     if vertex is None:
         return (
             "every constant vertex of the box is stable, but no common quadratic V was found for parameters that vary; "

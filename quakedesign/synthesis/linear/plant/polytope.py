@@ -1,6 +1,6 @@
-"""The e-LQR's loop as a polytope of exact matrices, about constant references and in error coordinates."""
+"""The e-LQR's loop as a polytope of exact matrices."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
@@ -10,12 +10,9 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from quakedesign.certificates import Loop
-from quakedesign.certificates.sectors import Sectors
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic.terms import value
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, floats
-
-Range = tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,51 +65,6 @@ def _row(loop: Loop, state: str, parameters: Mapping[str, Fraction]) -> tuple[Fr
     for term in loop.field[state]:
         entries[term.factors[0][0]] += value(term, parameters)
     return tuple(entries.values())
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ErrorLoop:
-    """The loop about a moving reference: e1' = e2, e2' = s·e1 − w·e2 − βb(k1e1 + k2e2 + ζ) + force.
-
-    ζ' = k3e1 + χ + drift and χ' = k4e1 + drift_rate, where ζ = k3ξ1 + k4ξ2 + p*(r) and χ = k4ξ1, each plus what the
-    law feeds forward of the reference. The substitution removes every large term: the loop sees only
-    force = φ_e − r″ − w·r′, drift = dp*(r)/dt and, for feedback on the state, drift_rate = k1r″ + k2r‴.
-
-    Attributes
-    ----------
-    gains : (Fraction, Fraction, Fraction, Fraction)
-        k1 … k4 in SI.
-    authority : Fraction
-        b = μ_res·N̂_min [m²/kg].
-    beta, slip, rate : (Fraction, Fraction)
-        Ranges of β [-], s [1/s²] and w [1/s], which may change at any time.
-    """
-
-    gains: tuple[Fraction, Fraction, Fraction, Fraction]
-    authority: Fraction
-    beta: Range
-    slip: Range
-    rate: Range
-
-    def __post_init__(self) -> None:
-        if not all(low <= high for low, high in (self.beta, self.slip, self.rate)):
-            raise ParameterError(f"ranges must be ordered. Received {self.beta}, {self.slip}, {self.rate}.")
-
-    def corners(self) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
-        """β, s and w at every vertex, each once."""
-        yield from product(*(sorted(set(ends)) for ends in (self.beta, self.slip, self.rate)))
-
-
-def error_loop(gains: Sequence[Fraction], sectors: Sectors) -> ErrorLoop:
-    """Error loop of four gains in SI over the sectors of a fault."""
-    k1, k2, k3, k4 = gains
-    return ErrorLoop(
-        gains=(k1, k2, k3, k4),
-        authority=sectors.authority,
-        beta=sectors.beta,
-        slip=sectors.slip,
-        rate=sectors.rate,
-    )
 
 
 @dataclass(frozen=True, slots=True)

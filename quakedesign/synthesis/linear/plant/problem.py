@@ -4,14 +4,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import product
 
 from quakedesign.certificates.sectors import Sectors, sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import fraction_of, rational
 from quakedesign.symbolic import plant
-from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, congruent
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, characteristic, congruent, hurwitz
 
 Vertex = tuple[Fraction, Fraction, Fraction]
 
@@ -125,7 +124,7 @@ class LinearProblem:
 
     def vertices(self) -> list[Vertex]:
         """Different corners (β, s, w) of the ranges."""
-        return list(dict.fromkeys(product(self.sectors.beta, self.sectors.slip, self.sectors.rate)))
+        return self.sectors.vertices()
 
     def nominal(self) -> Matrix:
         """A0 (4 × 4) of the nominal plant with both integrals."""
@@ -134,6 +133,38 @@ class LinearProblem:
     def loop(self, vertex: Vertex, gains: Sequence[Fraction]) -> Matrix:
         """Matrix (4 × 4) of the loop with p = −Kx at (β, s, w)."""
         return loop_matrix(vertex, self.sectors.authority, gains)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeedbackLoop:
+    """The loop of p = −Kx, also about a moving reference: e1' = e2, e2' = s·e1 − w·e2 − βb(k1e1 + k2e2 + ζ) + force.
+
+    ζ' = k3e1 + χ + drift and χ' = k4e1 + drift_rate, where ζ = k3ξ1 + k4ξ2 + p*(r) and χ = k4ξ1, each plus what the
+    law feeds forward of the reference. The substitution removes every large term: the loop sees only
+    force = φ_e − r″ − w·r′, drift = dp*(r)/dt and, for feedback on the state, drift_rate = k1r″ + k2r‴.
+
+    Attributes
+    ----------
+    gains : sequence of 4 Fraction
+        k1 … k4 in SI.
+    sectors : Sectors
+        b and the ranges of β, s and w, which may change at any time.
+    """
+
+    gains: Sequence[Fraction]
+    sectors: Sectors
+
+    def matrix(self, vertex: Vertex) -> Matrix:
+        """Matrix (4 × 4) at constant (β, s, w)."""
+        return loop_matrix(vertex, self.sectors.authority, self.gains)
+
+    def stable(self, vertex: Vertex) -> bool:
+        """Whether it is asymptotically stable with constant parameters, exactly (Routh, Hurwitz)."""
+        return hurwitz(characteristic(self.matrix(vertex)))
+
+    def unstable_vertex(self) -> Vertex | None:
+        """Vertex whose constant loop is not asymptotically stable; None when all are."""
+        return next((vertex for vertex in self.sectors.vertices() if not self.stable(vertex)), None)
 
 
 def loop_matrix(vertex: Vertex, authority: Fraction, gains: Sequence[Fraction]) -> Matrix:
