@@ -75,6 +75,11 @@ def fraction_of(value: Any) -> Fraction:
     return Fraction(int(value.p), int(value.q))
 
 
+def end_of(ball: Any) -> Fraction:
+    """Fraction of an exact ball of python-flint, such as an end of another."""
+    return fraction_of(ball.fmpq())
+
+
 def fraction_of_float(value: "sp.Float") -> Fraction:
     """Fraction of a float of SymPy: as `rational` reads it where it is one of Python's, else its exact value."""
     import sympy as sp

@@ -29,7 +29,7 @@ from quakedesign.certificates.matched import (
 from quakedesign.certificates.robustness import Robustness
 from quakedesign.controllers import SlidingMode
 from quakedesign.fault import Fault
-from quakedesign.rationals import fraction_of
+from quakedesign.rationals import end_of
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.balls import ball, upper_bound
 
@@ -268,4 +268,4 @@ def _split_limit(question: Question, level: Fraction) -> str:
 
 def _root(level: Fraction, power: Fraction) -> Fraction:
     """Upper bound of level^power."""
-    return fraction_of((ball(level, level) ** ball(power, power)).upper().fmpq())
+    return end_of((ball(level, level) ** ball(power, power)).upper())

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Witness
-from quakedesign.certificates.term_files import LIMITS, plain_terms, read_terms, texts
+from quakedesign.certificates.term_files import LIMITS, read_terms, texts
 from quakedesign.errors import CertificateError, UnsupportedError
 from quakedesign.input import read_text
 from quakedesign.sos.exact.proofs import Square
@@ -31,6 +31,7 @@ from quakedesign.sos.exact.strict import (
     with_keys,
     write_readable,
 )
+from quakedesign.symbolic.terms import plain
 
 _LAW = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
@@ -187,7 +188,7 @@ def certificate_text(certificate: Evidence) -> str:
 
 def _plain(certificate: Evidence) -> dict[str, Any]:
     loop = certificate.loop
-    plain: dict[str, Any] = {
+    document: dict[str, Any] = {
         "format": 1,
         "law": loop.law,
         "gains": texts(loop.gains),
@@ -196,16 +197,16 @@ def _plain(certificate: Evidence) -> dict[str, Any]:
         "domain": loop.domain,
         "uncertain": {name: [str(low), str(high)] for name, (low, high) in loop.uncertain.items()},
         "roots": {name: [of, str(low), str(high)] for name, (of, (low, high)) in loop.roots.items()},
-        "lifts": {lift: plain_terms(terms) for lift, terms in loop.lifts.items()},
-        "field": {state: plain_terms(terms) for state, terms in loop.field.items()},
+        "lifts": {lift: plain(terms) for lift, terms in loop.lifts.items()},
+        "field": {state: plain(terms) for state, terms in loop.field.items()},
     }
     if certificate.refutation is not None:
         found = certificate.refutation
         parts = {"parameters": found.parameters, "point": found.point, "weights": found.weights}
-        return plain | {"refutation": {key: texts(values) for key, values in parts.items()}}
+        return document | {"refutation": {key: texts(values) for key, values in parts.items()}}
     witnesses = [_plain_witness(name, witness) for name, witness in certificate.witnesses.items()]
-    return plain | {
-        "V": plain_terms(certificate.lyapunov),
+    return document | {
+        "V": plain(certificate.lyapunov),
         "claims": texts(certificate.claims),
         "witnesses": witnesses,
     }

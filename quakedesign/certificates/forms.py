@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from flint import arb, fmpq
 
-from quakedesign.rationals import float_above, fraction_of
+from quakedesign.rationals import end_of, float_above
 
 Polynomial = Mapping[tuple[int, ...], Fraction]
 Edge = tuple[int, int]
@@ -202,7 +202,7 @@ def _bound(forms: Sequence[Form], powers: Sequence[_Power]) -> float:
         total *= arb(value) ** power.ball
     upper = total.upper()
     near = float(upper)  # has the digits of a float, unless it is out of range
-    return near if upper <= near else float_above(fraction_of(upper.fmpq()))
+    return near if upper <= near else float_above(end_of(upper))
 
 
 def _attained(forms: Sequence[Form], powers: Sequence[_Power]) -> float:

@@ -55,7 +55,7 @@ from quakedesign.certificates.guarantee import Task
 from quakedesign.certificates.guarantee.ball_matrices import ball, upper
 from quakedesign.certificates.slow_sliding.push import SlidingPush
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import fraction_of
+from quakedesign.rationals import end_of
 
 _BITS = 128
 _SHARE = Fraction(1, 20)  # E of theorem 1: of the slip over which friction falls, and of the target
@@ -167,9 +167,8 @@ def smallest_withdrawal(task: Task | SlidingPush, step: Fraction) -> LowerBound 
     """P [Pa] below which no controller holds the fault with samples T apart; None where none is proved."""
     _require(step >= 0, "a step of at least 0", step)
     with ctx.workprec(_BITS):
-        withdrawals = [
-            _lower(ball(task.amplitude / plant.authority) * (plant.pole * ball(step)).exp()) for plant in _pushed(task)
-        ]
+        needed = (ball(task.amplitude / plant.authority) * (plant.pole * ball(step)).exp() for plant in _pushed(task))
+        withdrawals = [end_of(one.lower()) for one in needed]
     return LowerBound(max(withdrawals)) if withdrawals else None
 
 
@@ -248,7 +247,7 @@ def _surprise(plant: _Surprised, step: Fraction, delay: Fraction, amplitude: Fra
         return slip >= 0 and bool(bound(slip) >= ball(peak))
 
     if plant.reach is None:
-        return max(_ZERO, _lower(bound(plant.slip)))
+        return max(_ZERO, end_of(bound(plant.slip).lower()))
     low, high = _ZERO, upper(bound(plant.slip))
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2
@@ -265,7 +264,3 @@ def _require(holds: bool, what: str, *values: Fraction) -> None:
 def _at_least_one(value: Any) -> Any:
     """Upper end of a ball, or one."""
     return value.upper().max(arb(1))
-
-
-def _lower(value: Any) -> Fraction:
-    return fraction_of(value.lower().fmpq())

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import sympy as sp
 
@@ -10,7 +9,7 @@ from quakedesign.certificates.certificate import Certificate
 from quakedesign.certificates.loop_expressions import error_units, full_field
 from quakedesign.certificates.matched import Errors
 from quakedesign.controllers import LoopField
-from quakedesign.rationals import fraction_of
+from quakedesign.rationals import end_of
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.term_expressions import from_terms
 
@@ -53,7 +52,7 @@ class LevelSets:
         sizes = {first: slip, second: rate, **dict.fromkeys(rest, Fraction(0)), rest[-1]: matched}
         sizes = {symbol: size / units[symbol] for symbol, size in sizes.items()}
         box = {symbol: (-v / self.scale, v / self.scale) for symbol, v in sizes.items()}
-        return _top(enclose(from_terms(self.certificate.lyapunov, loop.symbols), box))
+        return end_of(enclose(from_terms(self.certificate.lyapunov, loop.symbols), box).upper())
 
     def errors(self, level: Fraction) -> Errors:
         """Bounds on e1, e2 and e2' on {V ≤ level}, from V ≥ γ_i u_i^m."""
@@ -62,7 +61,7 @@ class LevelSets:
         for state, weight in loop.states.items():
             gamma = self.certificate.claims[f"bound_{state}"]
             quotient = enclose((_BASE / _OTHER) ** self._power(weight), {_BASE: (level,) * 2, _OTHER: (gamma,) * 2})
-            sizes[state] = _top(quotient)
+            sizes[state] = end_of(quotient.upper())
         box = {loop.symbols[s]: (-v, v) for s, v in sizes.items()} | {
             loop.symbols[n]: ends for n, ends in loop.uncertain.items()
         }
@@ -70,7 +69,7 @@ class LevelSets:
         box |= {loop.symbols[n]: ends for n, (_, ends) in loop.roots.items()}
         first, second, *_ = loop.states
         units = error_units(loop, self.model)
-        acceleration = _top(abs(enclose(full_field(loop)[loop.symbols[second]], box))) * units[second][1]
+        acceleration = end_of(abs(enclose(full_field(loop)[loop.symbols[second]], box)).upper()) * units[second][1]
         return Errors(
             slip=self.scale * sizes[first] * units[first][1],
             rate=self.scale * sizes[second] * units[second][1],
@@ -83,20 +82,10 @@ class LevelSets:
         function, found = from_terms(self.certificate.lyapunov, loop.symbols), []
         for state, weight in loop.states.items():
             alone = ({loop.symbols[s]: sign * (s == state) for s in loop.states} for sign in (1, -1))
-            peak = max(_top(enclose(function.subs(point), {})) for point in alone)
+            peak = max(end_of(enclose(function.subs(point), {}).upper()) for point in alone)
             size = enclose((_BASE / _OTHER) ** self._power(weight), {_BASE: (level,) * 2, _OTHER: (peak,) * 2})
-            found.append(self.scale * _bottom(size) * error_units(loop, self.model)[state][0])
+            found.append(self.scale * end_of(size.lower()) * error_units(loop, self.model)[state][0])
         return tuple(found)
 
     def _power(self, weight: int) -> sp.Rational:
         return sp.Rational(weight) / sp.Rational(self.degree.numerator, self.degree.denominator)
-
-
-def _top(enclosure: Any) -> Fraction:
-    end = enclosure.upper().fmpq()
-    return fraction_of(end)
-
-
-def _bottom(enclosure: Any) -> Fraction:
-    end = enclosure.lower().fmpq()
-    return fraction_of(end)

@@ -7,7 +7,7 @@ import sympy as sp
 
 from quakedesign.certificates.claim import Loop, Range, require
 from quakedesign.controllers import LoopField, laws
-from quakedesign.rationals import fraction_of
+from quakedesign.rationals import end_of
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.term_expressions import from_terms
 
@@ -50,7 +50,7 @@ def unit_ranges(loop: Loop, units: Mapping[str, sp.Expr]) -> dict[str, Range]:
     ranges: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))
     for state, unit in units.items():
         ball = enclose(unit, {s: values[str(s)] for s in unit.free_symbols})
-        low, high = (fraction_of(end.fmpq()) for end in (ball.lower(), ball.upper()))
+        low, high = (end_of(end) for end in (ball.lower(), ball.upper()))
         require(low > 0, f"the unit of {state} must be positive. Received {unit}.")
         ranges[state] = (low, high)
     return ranges

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
 from itertools import product
-from typing import Any
 
 import sympy as sp
 
@@ -18,7 +17,7 @@ from quakedesign.certificates.matched import (
 )
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import fraction_of, rational, to_sympy
+from quakedesign.rationals import end_of, fraction_of, rational, to_sympy
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.balls import enclose, upper_bound
 from quakedesign.symbolic.friction_bounds import friction_bounds
@@ -151,7 +150,7 @@ def rest_pressure(
         pressures = enclose(expression, box | {_r: part, _mu: _friction_at(fault, part)})
         if not pressures.is_finite():
             raise ParameterError("no finite pressure at rest was found. Positive friction is expected. Narrow the box.")
-        ends += [_end(pressures.lower()), _end(pressures.upper())]
+        ends += [end_of(pressures.lower()), end_of(pressures.upper())]
     return min(ends), max(ends)
 
 
@@ -210,8 +209,3 @@ def _friction_at(fault: Fault, slip: Range) -> Range:
     friction, start = friction_bounds(fault.friction), static_friction(fault)
     most = friction.slip_slope * slip[1]
     return max(friction.least, start - most), min(friction.most, start + most)
-
-
-def _end(end: Any) -> Fraction:
-    exact = end.fmpq()
-    return fraction_of(exact)

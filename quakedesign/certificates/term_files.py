@@ -53,8 +53,3 @@ def _factor(raw: Any, powers: Sequence[str]) -> tuple[str, Fraction, str]:
 def texts(values: Mapping[str, Fraction]) -> dict[str, str]:
     """Numbers by name."""
     return {name: str(v) for name, v in values.items()}
-
-
-def plain_terms(terms: tuple[Term, ...]) -> list[Any]:
-    """Inverse of `read_terms`."""
-    return [[str(t.coefficient), list(t.parameters), [[s, str(e), k] for s, e, k in t.factors]] for t in terms]

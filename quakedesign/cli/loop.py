@@ -22,6 +22,7 @@ from quakedesign.cli.shared import (
     Whole,
     app,
     console,
+    given,
     new_file,
     print_json,
     print_lines,
@@ -98,7 +99,7 @@ def simulate(
             actuator=chain,
             noise=told,
             initial=start.state(),
-            tuning={name: v for name, v in {"weight": weight, "authority": authority}.items() if v is not None},
+            tuning=given({"weight": weight, "authority": authority}),
         )
     if out is not None:
         trajectory.save(out)

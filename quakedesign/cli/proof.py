@@ -1,6 +1,5 @@
 """Commands that prove, refute and re-check."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -8,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, Force, Output
-from quakedesign.cli.shared import ExactSeconds, Gains, app, new_file
+from quakedesign.cli.shared import ExactSeconds, Gains, app, new_file, refuse
 from quakedesign.errors import ParameterError
 
 
@@ -68,24 +67,12 @@ def certify(
     about_fault = {"FAULT": fault, "--box": box, "--feedback": feedback, "--step": step, "--peaks": peaks}
     about_rate = {"--lipschitz": lipschitz, "--maximize": maximize, "--gain-range": gain_range}
     if law_of(law).loop_field().domain == "reals":
-        _refuse_options(law, about_rate, "needs a FAULT instead")
+        refuse(about_rate, f"{law}, which needs a FAULT instead")
         if fault is None:
             raise ParameterError(f"certify {law} needs a fault. Received none. Give a preset or a file after {law}.")
         return _certify_on_fault(fault, gains, box, feedback or "error", step, peaks, out, force, output)
-    _refuse_options(law, about_fault, "needs --lipschitz instead")
+    refuse(about_fault, f"{law}, which needs --lipschitz instead")
     return _certify_for_rate(law, gains, lipschitz, maximize, gain_range or ("1", "1"), out, output)
-
-
-def _refuse_options(law: str, options: Mapping[str, Any], remedy: str) -> None:
-    """Refuse options that belong to another kind of law.
-
-    Raises
-    ------
-    ParameterError
-    """
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise ParameterError(f"{', '.join(given)} cannot be used with {law}, which {remedy}. Leave it out.")
 
 
 def _certify_for_rate(

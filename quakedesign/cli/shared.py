@@ -5,7 +5,7 @@ import logging
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -141,6 +141,22 @@ def _version() -> str:
 
 
 app.version = _version
+
+
+def given(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options that were given."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def refuse(options: Mapping[str, Any], what: str) -> None:
+    """Refuse options that belong to something else, if any is given.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if names := list(given(options)):
+        raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Leave it out.")
 
 
 def print_json(value: dict[str, Any]) -> None:

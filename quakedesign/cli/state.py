@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
-from quakedesign.cli.shared import Pascals, Seconds
+from quakedesign.cli.shared import Pascals, Seconds, given
 from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -58,16 +58,15 @@ class StateOptions:
                 "a controlled run starts in steady sliding, and its law sets the pressure. Received pressure, start, "
                 "hold or share. Leave them out."
             )
-        told = {"stress": self.stress, "stress_period": self.stress_period}
-        return {name: value for name, value in told.items() if value is not None}
+        return given({"stress": self.stress, "stress_period": self.stress_period})
 
-    def given(self) -> dict[str, Any]:
+    def of_free(self) -> dict[str, Any]:
         """Those of a run without control that are given."""
         from quakedesign.simulation import pressure_course
 
         if self.stress is not None or self.stress_period is not None:
             raise ParameterError("a stress disturbance needs a controller. Received none. Give --controller elqr.")
-        told = {name: value for name in ("start", "hold", "share") if (value := getattr(self, name)) is not None}
+        told = given({"start": self.start, "hold": self.hold, "share": self.share})
         return told | ({} if self.pressure is None else {"pressure": pressure_course(self.pressure)})
 
 
@@ -89,15 +88,15 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
     from quakedesign.studies.state_runs import run_held, run_state
 
     usual = _single({name: option.default for name, option in signature(command).parameters.items()})
-    given = _single(options)
-    changed = {name: value for name, value in given.items() if value != usual[name]}
+    asked = _single(options)
+    changed = {name: value for name, value in asked.items() if value != usual[name]}
     trajectory: Recording
     if "controller" in changed:
-        _require_designed(given)
+        _require_designed(asked)
         held = run_held(fault, **_told(fault, changed, _HELD), **options["state"].of_control())
         trajectory, answer, lines = held.trajectory, held.to_dict(), sliding_run_lines
     else:
-        free = run_state(fault, **_told(fault, changed, _FREE), **options["state"].given())
+        free = run_state(fault, **_told(fault, changed, _FREE), **options["state"].of_free())
         trajectory, answer, lines = free.trajectory, free.to_dict(), state_run_lines
     if options["out"] is not None:
         trajectory.save(Path(options["out"]))

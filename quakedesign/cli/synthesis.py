@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Force, Output
-from quakedesign.cli.shared import Seconds, Whole, app, console, new_file
+from quakedesign.cli.shared import Seconds, Whole, app, console, given, new_file, refuse
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 if TYPE_CHECKING:
@@ -80,16 +80,16 @@ def synthesise(
     new_file(out, "certificate file", force=force)
     began = perf_counter()
     of_search = {"starts": starts, "seed": seed, "workers": workers}
-    of_trial = {"step": step, "scheme": scheme, "metric": metric}
+    of_trial, what = {"step": step, "scheme": scheme, "metric": metric}, f"the objective {objective}"
     if objective == "sampled":
-        _refuse(objective, {"--bound": bound, **{f"--{name}": given for name, given in of_search.items()}})
-        found, more = _sampled(law, fault, lipschitz, gain_range, degree, _given(of_trial))
+        refuse({"--bound": bound, **{f"--{name}": value for name, value in of_search.items()}}, what)
+        found, more = _sampled(law, fault, lipschitz, gain_range, degree, given(of_trial))
     else:
-        _refuse(objective, {"FAULT": fault, **{f"--{name}": given for name, given in of_trial.items()}})
+        refuse({"FAULT": fault, **{f"--{name}": value for name, value in of_trial.items()}}, what)
         from quakedesign.synthesis.gains.synthesise import synthesise as search
 
         ranges = {"lipschitz": lipschitz or "1", "gain_range": gain_range or ("1", "1")}
-        options = {"workers": 2, **_given(of_search), "degrees": degree or None, "bound": bound, **ranges}
+        options = {"workers": 2, **given(of_search), "degrees": degree or None, "bound": bound, **ranges}
         found, more = search(law, objective, **options), {}
     if found is not None and out is not None:
         found.certificate.save(out)
@@ -99,21 +99,6 @@ def synthesise(
     }  # fmt: skip
     output.show(answer, lambda: _print(law, found, more))
     return 0 if found is not None else 1
-
-
-def _given(options: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in options.items() if value is not None}
-
-
-def _refuse(objective: str, options: Mapping[str, Any]) -> None:
-    """Refuse options that belong to other objectives.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if given := list(_given(options)):
-        raise ParameterError(f"{', '.join(given)} cannot be used with the objective {objective}. Leave it out.")
 
 
 def _sampled(

@@ -62,7 +62,7 @@ class IntegratorChain(Law):
         if rest == 0:
             return None
         corners = list(product((1, -1), repeat=cls.order - 1))
-        pulls = [-_fraction(cls.integral_rate((sp.Integer(1), *map(sp.Integer, signs)), exact)) for signs in corners]
+        pulls = [-fraction_of(cls.integral_rate((sp.Integer(1), *map(sp.Integer, signs)), exact)) for signs in corners]
         least, most = min(pulls), max(pulls)
         pull = max(uncertain["d"][0], least)
         if pull > min(uncertain["d"][1], most):
@@ -76,10 +76,6 @@ class IntegratorChain(Law):
         middle = {f"e{i}": Fraction(0) for i in range(2, cls.order + 1)}
         return {
             "parameters": {"beta": uncertain["beta"][0], "d": pull},
-            "point": {"e1": Fraction(1), **middle, f"e{cls.order + 1}": -_fraction(rest)},
+            "point": {"e1": Fraction(1), **middle, f"e{cls.order + 1}": -fraction_of(rest)},
             "weights": dict(zip(names, weights.values(), strict=True)),
         }
-
-
-def _fraction(value: sp.Expr) -> Fraction:
-    return fraction_of(value)

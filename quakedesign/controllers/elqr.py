@@ -10,6 +10,7 @@ import sympy as sp
 from quakedesign.controllers.base import Controller, Signals
 from quakedesign.controllers.loop_field import LoopField
 from quakedesign.errors import ParameterError, require_known
+from quakedesign.rationals import to_sympy
 
 FEEDBACKS = ("error", "state")
 
@@ -79,7 +80,7 @@ class ExtendedLQR(Controller):
         wanted = self._wanted(signals)
         if self.limits is None:
             return wanted
-        return sp.Min(sp.Max(wanted, _rational(self.limits.lowest)), _rational(self.limits.highest))
+        return sp.Min(sp.Max(wanted, to_sympy(self.limits.lowest)), to_sympy(self.limits.highest))
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
         """ξ1' = x1 − r and ξ2' = ξ1; at a limit both also follow it with the double pole −1/recovery_time."""
@@ -95,13 +96,13 @@ class ExtendedLQR(Controller):
             "state": (signals.slip, signals.slip_rate),
         }[self.feedback]
         asked = -sum(k * x for k, x in zip(self._exact_gains(), (*ends, *signals.integrals), strict=True))
-        return asked + _rational(self.offset) if self.offset else asked
+        return asked + to_sympy(self.offset) if self.offset else asked
 
     def _driven_back(self) -> tuple[sp.Expr, sp.Expr]:
         """l1, l2 for which ξ' = (l1, l2)(k3ξ1 + k4ξ2) + (0, ξ1) has the double pole −1/τ."""
         assert self.limits is not None
         *_, k3, k4 = self._exact_gains()
-        pace = 1 / _rational(self.limits.recovery_time)
+        pace = 1 / to_sympy(self.limits.recovery_time)
         first = -(pace**2) / k4
         return first, (-2 * pace - first * k3) / k4
 
@@ -126,7 +127,3 @@ class ExtendedLQR(Controller):
             uncertain=(beta, s, w),
             domain="reals",
         )
-
-
-def _rational(value: Fraction) -> sp.Rational:
-    return sp.Rational(value.numerator, value.denominator)

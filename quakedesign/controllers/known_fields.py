@@ -5,7 +5,7 @@
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign import controllers
 from quakedesign.controllers.field_terms import FieldTerms
-from quakedesign.symbolic.terms import Term
+from quakedesign.symbolic.terms import Term, plain
 
 if TYPE_CHECKING:
     from quakedesign.controllers import Subject
@@ -56,13 +56,9 @@ def _kept() -> Mapping[str, FieldTerms]:
 
 
 def _plain(terms: FieldTerms) -> dict[str, Any]:
-    sums = {part: {name: _plain_sum(own) for name, own in getattr(terms, part).items()} for part in _SUMS}
+    sums = {part: {name: plain(own) for name, own in getattr(terms, part).items()} for part in _SUMS}
     names = {part: list(getattr(terms, part)) for part in _NAMES}
     return {"states": dict(terms.states), "domain": terms.domain, **names, "roots": dict(terms.roots), **sums}
-
-
-def _plain_sum(terms: Iterable[Term]) -> list[Any]:
-    return [[str(t.coefficient), list(t.parameters), [[s, str(e), k] for s, e, k in t.factors]] for t in terms]
 
 
 def _read(raw: Mapping[str, Any]) -> FieldTerms:

@@ -1,9 +1,12 @@
 """Figures as files that journals accept: letters of 8 pt to 9 pt, fonts embedded, no date, at the width of a page."""
 
 import io
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
+
+from quakedesign.output import write_whole
 
 Format = Literal["svg", "pdf", "png"]
 FORMATS: tuple[Format, ...] = ("svg", "pdf", "png")
@@ -50,6 +53,11 @@ def write_figures(folder: Path, drawn: Mapping[str, Any], formats: Sequence[str]
     for name, drawing in drawn.items():
         for kind in formats:
             (folder / f"{name}.{kind}").write_bytes(figure_bytes(drawing, kind, name))
+
+
+def write_results(folder: Path, facts: Mapping[str, Any]) -> None:
+    """Write ``results.json`` into a folder that exists."""
+    write_whole(folder / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
 
 
 def file_names(name: str, formats: Sequence[str]) -> str:

@@ -1,6 +1,5 @@
 """The folder of results, complete or not there."""
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,7 +14,7 @@ from quakedesign.fault import fault_toml
 from quakedesign.output import require_room, whole_folder, write_whole
 from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.comparison import Comparison
-from quakedesign.report.figure_files import DEFAULT, figure_bytes
+from quakedesign.report.figure_files import DEFAULT, figure_bytes, write_results
 from quakedesign.report.numbers import csv_text
 from quakedesign.report.page import page_html
 from quakedesign.report.paper_figures import PAPER
@@ -136,7 +135,7 @@ def write_folder(
         page = page_html(comparison, inside, reproduction(comparison.fault, command))
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "fault.toml").write_text(fault_toml(comparison.fault), encoding="utf-8")
-        (partial / "results.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        write_results(partial, found)
         if study:
             (partial / "numbers.csv").write_text(csv_text(found["numbers"]), encoding="utf-8")
     return found

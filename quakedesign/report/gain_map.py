@@ -1,6 +1,5 @@
 """A map of certified gains as a figure, a table and a folder; what was screened and what was proved look different."""
 
-import json
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 from quakedesign.controllers import LoopField, law
 from quakedesign.output import whole_folder, write_whole
 from quakedesign.report.drawing import SMALL, WIDTH
-from quakedesign.report.figure_files import write_figures
+from quakedesign.report.figure_files import write_figures, write_results
 from quakedesign.report.numbers import csv_text
 from quakedesign.synthesis.analysis.gain_map import GainMap
 from quakedesign.synthesis.analysis.gain_map_workers import Place
@@ -232,7 +231,7 @@ def write_gain_map(drawn: GainMap, folder: Path, formats: Sequence[str] = ("png"
             write_whole(partial / _file(place), text)
         write_figures(partial, {"map": gain_map_figure(drawn)}, formats)
         write_whole(partial / "map.csv", gain_map_csv(drawn))
-        write_whole(partial / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
+        write_results(partial, facts)
     return facts
 
 

@@ -1,6 +1,5 @@
 """Limits of a fault as lines, as a figure and as a folder."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
@@ -9,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from quakedesign.bounds import Bound, LowerBound, UpperBound
-from quakedesign.output import whole_folder, write_whole
+from quakedesign.output import whole_folder
 from quakedesign.rationals import rational
 from quakedesign.report.drawing import NATURAL, figure, finish
-from quakedesign.report.figure_files import write_figures
+from quakedesign.report.figure_files import write_figures, write_results
 from quakedesign.studies import Limits
 from quakedesign.studies.fault_limits import SlidingLimits
 
@@ -133,5 +132,5 @@ def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)
     facts = limits.to_dict()
     with whole_folder(folder) as partial:
         write_figures(partial, {"limits": limits_figure(limits)}, formats)
-        write_whole(partial / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
+        write_results(partial, facts)
     return facts

@@ -1,6 +1,5 @@
 """A sampling report on a terminal and in a folder."""
 
-import json
 from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
@@ -8,8 +7,8 @@ from typing import Any
 
 from rich.table import Table
 
-from quakedesign.output import whole_folder, write_whole
-from quakedesign.report.figure_files import write_figures
+from quakedesign.output import whole_folder
+from quakedesign.report.figure_files import write_figures, write_results
 from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells
 from quakedesign.report.terminal import table
 from quakedesign.simulation import Study
@@ -55,7 +54,7 @@ def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] 
     with whole_folder(folder) as partial:
         (partial / "figures").mkdir()
         write_figures(partial / "figures", report.figures(), formats)
-        write_whole(partial / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
+        write_results(partial, facts)
     return facts
 
 

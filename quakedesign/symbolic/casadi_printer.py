@@ -175,21 +175,15 @@ def _kinks(motion: Any) -> dict[Any, Any]:
 
 @cache
 def _casadi_operations() -> Operations:
-    other = {expm1: ca.expm1, sp.asinh: ca.asinh, sp.sinh: ca.sinh, sp.cosh: ca.cosh, sp.atan: ca.atan}
-    logic = {
-        sp.Piecewise: ca.if_else,
-        sp.And: lambda *c: reduce(ca.logic_and, c),
-        sp.Or: lambda *c: reduce(ca.logic_or, c),
-    }
-    return _powers(ca) | other | logic
+    return _operations(ca, ca.asinh, ca.atan, ca.if_else, ca.logic_and, ca.logic_or)
 
 
 @cache
 def _numpy_operations() -> Operations:
-    other = {expm1: np.expm1, sp.asinh: np.arcsinh, sp.sinh: np.sinh, sp.cosh: np.cosh, sp.atan: np.arctan}
-    logic = {
-        sp.Piecewise: np.where,
-        sp.And: lambda *c: reduce(np.logical_and, c),
-        sp.Or: lambda *c: reduce(np.logical_or, c),
-    }
-    return _powers(np) | other | logic
+    return _operations(np, np.arcsinh, np.arctan, np.where, np.logical_and, np.logical_or)
+
+
+def _operations(library: Any, asinh: Any, atan: Any, choose: Any, both: Any, either: Any) -> Operations:
+    other = {expm1: library.expm1, sp.asinh: asinh, sp.sinh: library.sinh, sp.cosh: library.cosh, sp.atan: atan}
+    logic = {sp.Piecewise: choose, sp.And: lambda *c: reduce(both, c), sp.Or: lambda *c: reduce(either, c)}
+    return _powers(library) | other | logic

@@ -16,7 +16,7 @@ import sympy as sp
 from flint import arb, fmpq
 
 from quakedesign.errors import UnsupportedError
-from quakedesign.rationals import fraction_of, fraction_of_float, rational
+from quakedesign.rationals import end_of, fraction_of, fraction_of_float, rational
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
 End = Fraction | float  # the only floats are −inf and inf
@@ -211,7 +211,7 @@ def upper_end(ball: Any) -> End:
         return -(Fraction(2) ** _LARGEST)
     if abs(end) * large < 1:
         return Fraction(1 if end > 0 else 0, 2**_LARGEST)
-    return fraction_of(end.fmpq())
+    return end_of(end)
 
 
 def _wave(name: str) -> Callable[[list[Interval]], Interval]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
-from typing import Any
+from typing import Any, ClassVar
 
 import sympy as sp
 from sympy.core.cache import clear_cache
@@ -35,6 +35,7 @@ class _Power(sp.Function):  # type: ignore[misc]
 
     nargs = 2
     is_real = True
+    _brackets: ClassVar[tuple[str, str]]
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         """Derivative with respect to the argument; refused where the function has a kink.
@@ -56,6 +57,11 @@ class _Power(sp.Function):  # type: ignore[misc]
         partner = AbsolutePower if isinstance(self, SignedPower) else SignedPower
         return a * partner(x, a - 1)
 
+    def _latex(self, printer: Any, exp: Any = None) -> str:
+        x, a = (printer._print(arg) for arg in self.args)
+        body = x.join(self._brackets) + f"^{{{a}}}"
+        return body if exp is None else rf"\left({body}\right)^{{{exp}}}"
+
 
 class SignedPower(_Power):
     """⌈x⌋^a = |x|^a sign(x) for a ≥ 0; the sign at zero is the set [−1, 1], evaluated as 0.
@@ -66,6 +72,8 @@ class SignedPower(_Power):
     a : Expr
         Exponent; a negative one arises only from derivatives off the kinks, and has no value at zero.
     """
+
+    _brackets = (r"\left\lceil ", r"\right\rfloor")
 
     @classmethod
     def eval(cls, x: Any, a: Any) -> sp.Expr | None:
@@ -80,11 +88,6 @@ class SignedPower(_Power):
             return -cls(-x, a)
         return None
 
-    def _latex(self, printer: Any, exp: Any = None) -> str:
-        x, a = (printer._print(arg) for arg in self.args)
-        body = rf"\left\lceil {x}\right\rfloor^{{{a}}}"
-        return body if exp is None else rf"\left({body}\right)^{{{exp}}}"
-
 
 class AbsolutePower(_Power):
     """|x|^a.
@@ -97,6 +100,7 @@ class AbsolutePower(_Power):
     """
 
     is_nonnegative = True
+    _brackets = (r"\left|", r"\right|")
 
     @classmethod
     def eval(cls, x: Any, a: Any) -> sp.Expr | None:
@@ -110,8 +114,3 @@ class AbsolutePower(_Power):
         if x.could_extract_minus_sign():
             return cls(-x, a)
         return None
-
-    def _latex(self, printer: Any, exp: Any = None) -> str:
-        x, a = (printer._print(arg) for arg in self.args)
-        body = rf"\left|{x}\right|^{{{a}}}"
-        return body if exp is None else rf"\left({body}\right)^{{{exp}}}"

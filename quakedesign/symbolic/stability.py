@@ -4,14 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
-from typing import Any
 
 import sympy as sp
 from flint import arb, ctx
 
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
-from quakedesign.rationals import fraction_of, rational
+from quakedesign.rationals import end_of, rational
 from quakedesign.symbolic import plant, state_plant
 from quakedesign.symbolic.balls import Box, enclose
 from quakedesign.symbolic.equilibrium import operating_rate
@@ -236,12 +235,7 @@ def _ratio(terms: list[sp.Expr], box: Box) -> Interval:
     if not size > 0:
         return (Fraction(0), Fraction(0)) if size.is_zero() else whole
     ratio = total / size
-    return max(_rational(ratio.lower()), whole[0]), min(_rational(ratio.upper()), whole[1])
-
-
-def _rational(value: Any) -> Fraction:
-    exact = value.fmpq()
-    return fraction_of(exact)
+    return max(end_of(ratio.lower()), whole[0]), min(end_of(ratio.upper()), whole[1])
 
 
 def critical_stiffness(

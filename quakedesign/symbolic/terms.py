@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from quakedesign.errors import CertificateError
 
@@ -26,6 +27,11 @@ class Term:
     coefficient: Fraction
     parameters: tuple[str, ...]
     factors: tuple[Factor, ...]
+
+
+def plain(terms: Iterable[Term]) -> list[Any]:
+    """Terms as JSON can hold them: numbers as texts."""
+    return [[str(t.coefficient), list(t.parameters), [[s, str(e), k] for s, e, k in t.factors]] for t in terms]
 
 
 def collected(terms: Iterable[Term], states: Sequence[str]) -> tuple[Term, ...]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from flint import arb, arb_mat, fmpq
 
-from quakedesign.rationals import fraction_of
+from quakedesign.rationals import end_of
 
 
 def ball(value: Fraction) -> Any:
@@ -49,4 +49,4 @@ def absolute(matrix: Any) -> Any:
 
 def upper(value: Any) -> Fraction:
     """A rational that is not below a ball."""
-    return fraction_of(value.upper().fmpq())
+    return end_of(value.upper())

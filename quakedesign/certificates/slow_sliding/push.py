@@ -31,7 +31,7 @@ from flint import arb_mat, ctx
 from quakedesign.bounds import LowerBound
 from quakedesign.certificates.guarantee.ball_matrices import ball
 from quakedesign.loop import SlidingModel
-from quakedesign.rationals import fraction_of
+from quakedesign.rationals import end_of
 
 _BITS = 128
 _ZERO, _ONE = Fraction(0), Fraction(1)
@@ -84,5 +84,5 @@ class SlidingPush:
             time = ball(step * self.model.state_rate)
             moved = (arb_mat([[ball(v) * time for v in row] for row in flow])).exp()
             late = 1 - ball(kappa) * moved[0, 2] - ball(beta) * moved[1, 2]
-            share = max(_ONE, fraction_of(late.lower().fmpq()))
+            share = max(_ONE, end_of(late.lower()))
         return LowerBound(self.model.rate * self.amplitude / self.model.strength * share)

@@ -18,28 +18,15 @@ from quakedesign.fault.checks import require_nonnegative, require_positive
 from quakedesign.loop import LinearLaw
 from quakedesign.loop.actuators import DIRECT
 from quakedesign.loop.schemes import simulation_scheme
-from quakedesign.simulation.campaign.problem import Problem, SampleResult
+from quakedesign.simulation.campaign.problem import NOT_COMPARED, Problem, SampleResult
 from quakedesign.simulation.campaign.space import Sample, Space
 from quakedesign.simulation.integrators import adaptive_integrators
-from quakedesign.simulation.metrics import EVENTS
+from quakedesign.simulation.metrics import EVENTS, Metrics
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.sliding_conditions import FRICTION, PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, criterion_of, simulate_sliding
 
-_FIGURES = (
-    "max_slip_error",
-    "max_slip_rate_error",
-    "rms_slip_error",
-    "rms_slip_rate_error",
-    "mise_slip",
-    "mise_slip_rate",
-    "rms_pressure",
-    "pressure_total_variation",
-    "reverse_slip_fraction",
-    "peak_slip_rate",
-    "max_pressure",
-    "min_pressure",
-)
+_FIGURES = tuple(part.name for part in fields(Metrics) if part.name not in (*NOT_COMPARED, "max_h_rate"))
 _FACTORS = tuple(field.name for field in fields(SlidingVariation))
 
 

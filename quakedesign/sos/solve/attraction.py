@@ -17,7 +17,7 @@ from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.decide import strict_proof
 from quakedesign.sos.solve.engine import decide
 from quakedesign.sos.solve.expanding_interior import affine, decision_names, expanded, with_shape
-from quakedesign.sos.solve.faces import simplest_between
+from quakedesign.sos.solve.faces import just_below, simplest_between
 from quakedesign.sos.solve.level_crossing import lowest_crossing, other_equilibrium
 from quakedesign.sos.solve.program import Program
 
@@ -188,7 +188,7 @@ def _bisected(claim: Attraction, ceiling: Fraction, relative: float) -> Attracti
     """Largest level that is proved, a simple number just below the refuted ones where it can be."""
     best, above = None, ceiling
     for share in _SHARES:
-        best = _proved(replace(claim, level=_short(share * ceiling)))
+        best = _proved(replace(claim, level=just_below(share * ceiling)))
         if best is not None:
             break
         above = share * ceiling
@@ -199,15 +199,10 @@ def _bisected(claim: Attraction, ceiling: Fraction, relative: float) -> Attracti
         return _proved(exact, thorough=True) or best
     low = best.level
     while above - low > Fraction(relative) * above:
-        middle = _short((low + above) / 2)
+        middle = just_below((low + above) / 2)
         found = _proved(replace(claim, level=middle))
         best, low, above = (found, middle, above) if found is not None else (best, low, middle)
     return best
-
-
-def _short(level: Fraction) -> Fraction:
-    """Fraction of few digits within a part in ten million below a level, less than a bisection steps."""
-    return simplest_between(level * (1 - Fraction(1, 10**7)), level)
 
 
 def _of_linearised(claim: Attraction) -> dict[Exponents, Fraction] | None:

@@ -29,7 +29,7 @@ from quakedesign.sos.exact.polynomial import (
 from quakedesign.sos.exact.squares import form, integer_gram
 from quakedesign.sos.exact.statement import Statement, statement
 from quakedesign.sos.solve.decide import strict_proof
-from quakedesign.sos.solve.faces import simplest_between
+from quakedesign.sos.solve.faces import just_below
 from quakedesign.sos.solve.level_crossing import lowest_value_on
 from quakedesign.sos.solve.program import Program
 
@@ -52,7 +52,7 @@ def with_shape(found: Region, shape: Polynomial) -> Region:
     touching = lowest_value_on(shape, combination([(Fraction(1), claim.lyapunov), (-claim.level, constant(size))]))
     if not 0 < touching < inf:
         return found
-    for beta in (_short(Fraction(touching) * share) for share in _SHARES):
+    for beta in (just_below(Fraction(touching) * share) for share in _SHARES):
         asked = _inclusion(claim, _INSIDE * claim.level, shape, beta, degree(claim.lyapunov))
         proof = strict_proof(asked)
         if proof is not None:
@@ -166,8 +166,3 @@ def decision_names(variables: tuple[str, ...], count: int) -> list[str]:
     """Names that no variable has."""
     prefix = "c" * (1 + max(map(len, variables)))
     return [f"{prefix}{i}" for i in range(count)]
-
-
-def _short(value: Fraction) -> Fraction:
-    """Fraction of few digits just below a number."""
-    return simplest_between(value * (1 - Fraction(1, 10**7)), value)

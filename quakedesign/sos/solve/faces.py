@@ -216,6 +216,11 @@ def simplest(value: float, tolerance: float) -> Fraction:
     return -simplest_between(-high, -low) if exact < 0 else simplest_between(low, high)
 
 
+def just_below(value: Fraction) -> Fraction:
+    """Fraction of few digits within a part in ten million below a number, less than a bisection steps."""
+    return simplest_between(value * (1 - Fraction(1, 10**7)), value)
+
+
 def simplest_between(low: Fraction, high: Fraction) -> Fraction:
     """Fraction of smallest denominator in [low, high], 0 < low (continued fractions)."""
     whole = low.numerator // low.denominator

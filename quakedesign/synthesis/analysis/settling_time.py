@@ -10,7 +10,7 @@ from quakedesign.certificates import Certificate
 from quakedesign.certificates.loop_expressions import error_units
 from quakedesign.certificates.obligations import Obligations, degree
 from quakedesign.controllers import LoopField, Subject, model_of
-from quakedesign.rationals import float_above, fraction_of, rational, to_sympy
+from quakedesign.rationals import end_of, float_above, rational, to_sympy
 from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.term_expressions import from_terms
 from quakedesign.synthesis.analysis.certify import Number, closed_loop
@@ -68,9 +68,9 @@ def settling(certificate: Certificate, start: Number = 1, model: LoopField | Non
     loop = certificate.loop
     sizes = {loop.symbols[s]: size / unit for s, (unit, _) in error_units(loop, model).items()}
     level = enclose(from_terms(certificate.lyapunov, loop.symbols), {s: (-v, v) for s, v in sizes.items()})
-    top = fraction_of(level.upper().fmpq())
+    top = end_of(level.upper())
     bound = enclose(to_sympy(factor) * _BASE ** to_sympy(power), {_BASE: (top, top)})
-    seconds = float_above(fraction_of(bound.upper().fmpq()))
+    seconds = float_above(end_of(bound.upper()))
     return Settling(decay=kappa, factor=factor, power=power, start=size, seconds=seconds)
 
 

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from flint import arb, fmpq
-
-from quakedesign.rationals import fraction_of
+from quakedesign.certificates.guarantee.ball_matrices import ball
+from quakedesign.rationals import end_of
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.plant.rational_matrices import (
     Matrix,
@@ -84,6 +83,6 @@ def refutes(question: Question, z: Sequence[Fraction]) -> bool:
     if D is not None:
         return value <= 0
     g1, g2 = question.inside.bounds
-    root = arb(fmpq(*(lambda v: (v.numerator, v.denominator))(z1 * z2))).sqrt().lower().fmpq()
-    least = g1**2 * z1 + g2**2 * z2 + 2 * g1 * g2 * max(fraction_of(root), Fraction(0))
+    root = end_of(ball(z1 * z2).sqrt().lower())
+    least = g1**2 * z1 + g2**2 * z2 + 2 * g1 * g2 * max(root, Fraction(0))
     return value - least <= 0  # min of a1z1 + a2z2 over the admissible D is (g1√z1 + g2√z2)²

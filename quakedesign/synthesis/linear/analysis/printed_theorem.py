@@ -15,7 +15,7 @@ from flint import arb
 from quakedesign.certificates.guarantee.ball_matrices import ball, identity, matrix
 from quakedesign.certificates.premises import least_authority, plant_ranges
 from quakedesign.fault import Fault
-from quakedesign.rationals import fraction_of, rational
+from quakedesign.rationals import end_of, fraction_of, rational
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 from quakedesign.synthesis.linear.analysis.inverse_optimality import InverseOptimality, inverse_optimality
@@ -130,8 +130,7 @@ def switched_growth(problem: LinearProblem, gains: Sequence[Fraction], switching
     power, best, n = period, Fraction(0), 1
     for _ in range(7):
         power, n = power * power, 2 * n
-        end = ((abs(power.trace()) / 4) ** (arb(1) / n)).lower().fmpq()
-        best = max(best, fraction_of(end))
+        best = max(best, end_of(((abs(power.trace()) / 4) ** (arb(1) / n)).lower()))
     return best
 
 

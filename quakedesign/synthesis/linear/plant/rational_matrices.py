@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from flint import arb, fmpq, fmpq_mat
 
-from quakedesign.rationals import fraction_of
+from quakedesign.rationals import end_of, fraction_of
 from quakedesign.sos.exact.definiteness import positive_definite
 
 Rows = Sequence[Sequence[Fraction]]
@@ -102,8 +102,7 @@ def riccati_residual(a: Rows, g: Rows, q: Rows, x: Rows) -> Matrix:
 def frobenius(a: Rows) -> Fraction:
     """Rigorous upper bound on the Frobenius norm, tight to about 1e-15."""
     square = sum((v * v for row in a for v in row), Fraction(0))
-    end = arb(fmpq(square.numerator, square.denominator)).sqrt().upper().fmpq()
-    return fraction_of(end)
+    return end_of(arb(fmpq(square.numerator, square.denominator)).sqrt().upper())
 
 
 def definite(a: Rows) -> bool:

@@ -8,7 +8,7 @@ import sympy as sp
 
 from quakedesign.fault import Fault
 from quakedesign.loop import SlidingModel
-from quakedesign.rationals import fraction_of, rational
+from quakedesign.rationals import fraction_of, rational, to_sympy
 from quakedesign.symbolic.slow_sliding import sliding_errors, sliding_rate
 
 _ONE, _NEAR = Fraction(1), Fraction(1, 10)
@@ -25,7 +25,7 @@ def sliding_model(fault: Fault) -> SlidingModel:
     law = fault.friction.exact()
     errors = sliding_errors(law)
     rate = mean_rate(fault)
-    at = {sliding_rate: _sympy(rate)}
+    at = {sliding_rate: to_sympy(rate)}
     direct, evolution = (_number(slope.subs(at)) for slope in errors.slopes)
     normal = rational(fault.effective_normal_stress)
     return SlidingModel(
@@ -38,7 +38,7 @@ def sliding_model(fault: Fault) -> SlidingModel:
         direct=direct,
         evolution=evolution,
         stiffness=rational(fault.shear_modulus) / rational(fault.side),
-        coefficient=_number(law.steady_coefficient(_sympy(rate))),
+        coefficient=_number(law.steady_coefficient(to_sympy(rate))),
     )
 
 
@@ -67,10 +67,6 @@ def sliding_poles(model: SlidingModel) -> tuple[complex, complex]:
     trace = beta - 1 - kappa
     root = sqrt(trace**2 - 4 * kappa)
     return speed * (trace + root) / 2, speed * (trace - root) / 2
-
-
-def _sympy(value: Fraction) -> Any:
-    return sp.Rational(value.numerator, value.denominator)
 
 
 def _number(expression: Any) -> Fraction:
