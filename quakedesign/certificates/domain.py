@@ -122,8 +122,8 @@ class Question:
         known = self.robustness
         if known is None or self.along_reference() > self.allowed:
             return None
-        found = errors or self.sets.errors(level)
-        still = Errors(slip=found.slip, rate=found.rate)
+        bounds = errors or self.sets.errors(level)
+        still = Errors(slip=bounds.slip, rate=bounds.rate)
         g1, g2 = largest_sensitivities(self.fault, self.controller.divisor, still, **self._added)
         return {
             "slip": known.slip * g1 * _root(level, known.slip_power),

@@ -201,8 +201,8 @@ def _plain(certificate: Evidence) -> dict[str, Any]:
         "field": {state: plain(terms) for state, terms in loop.field.items()},
     }
     if certificate.refutation is not None:
-        found = certificate.refutation
-        parts = {"parameters": found.parameters, "point": found.point, "weights": found.weights}
+        equilibrium = certificate.refutation
+        parts = {"parameters": equilibrium.parameters, "point": equilibrium.point, "weights": equilibrium.weights}
         return document | {"refutation": {key: texts(values) for key, values in parts.items()}}
     witnesses = [_plain_witness(name, witness) for name, witness in certificate.witnesses.items()]
     return document | {

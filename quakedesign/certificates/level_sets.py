@@ -79,13 +79,13 @@ class LevelSets:
     def starts(self, level: Fraction) -> tuple[Fraction, ...]:
         """Largest size of every state for which {V ≤ level} surely holds it while the other states are zero."""
         loop = self.certificate.loop
-        function, found = from_terms(self.certificate.lyapunov, loop.symbols), []
+        function, sizes = from_terms(self.certificate.lyapunov, loop.symbols), []
         for state, weight in loop.states.items():
             alone = ({loop.symbols[s]: sign * (s == state) for s in loop.states} for sign in (1, -1))
             peak = max(end_of(enclose(function.subs(point), {}).upper()) for point in alone)
             size = enclose((_BASE / _OTHER) ** self._power(weight), {_BASE: (level,) * 2, _OTHER: (peak,) * 2})
-            found.append(self.scale * end_of(size.lower()) * error_units(loop, self.model)[state][0])
-        return tuple(found)
+            sizes.append(self.scale * end_of(size.lower()) * error_units(loop, self.model)[state][0])
+        return tuple(sizes)
 
     def _power(self, weight: int) -> sp.Rational:
         return sp.Rational(weight) / sp.Rational(self.degree.numerator, self.degree.denominator)

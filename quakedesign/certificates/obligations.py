@@ -95,8 +95,8 @@ class Obligations:
         """Every sign cell of states and lifts that may have an interior."""
         if not self.loop.lifts:
             return tuple(self.sign_cells())
-        found = (self._cell(signs) for signs in _signs((*self.loop.states, *self.loop.lifts)))
-        return tuple(cell for cell in found if cell is not None)
+        possible = (self._cell(signs) for signs in _signs((*self.loop.states, *self.loop.lifts)))
+        return tuple(cell for cell in possible if cell is not None)
 
     @cached_property
     def with_variable(self) -> tuple[str, ...]:

@@ -65,13 +65,13 @@ def attraction(
     if everywhere and (degree, shape) != (None, None):
         raise PolynomialError("--degree and --shape are of a region. Received --everywhere as well. Leave one out.")
     if everywhere:
-        found = Region.of(stability(rates, function))
+        region = Region.of(stability(rates, function))
     else:
-        found = region_of_attraction(rates, function, relative=relative, degree=degree, shape=shape)
+        region = region_of_attraction(rates, function, relative=relative, degree=degree, shape=shape)
     files: dict[str, tuple[Path | None, Attraction | Answer | None]] = {
-        "file": (out, found.proved or (None if above else found.refuted)),
-        "file_above": (above, found.refuted),
-        "file_inclusion": (inclusion, found.inclusion),
+        "file": (out, region.proved or (None if above else region.refuted)),
+        "file_above": (above, region.refuted),
+        "file_inclusion": (inclusion, region.inclusion),
     }
     written: dict[str, str | None] = dict.fromkeys(files)
     for key, (path, proof) in files.items():
@@ -79,6 +79,6 @@ def attraction(
             written[key] = str(path)
             proof.save(path) if isinstance(proof, Answer) else save_attraction(proof, path)
     seconds = perf_counter() - began
-    lines = [*region_words(found), f"{seconds:.2f} s; checked in exact arithmetic"]
-    output.show({**region_facts(found), **written, "seconds": seconds}, lines)
-    return 0 if found.proved is not None else 1
+    lines = [*region_words(region), f"{seconds:.2f} s; checked in exact arithmetic"]
+    output.show({**region_facts(region), **written, "seconds": seconds}, lines)
+    return 0 if region.proved is not None else 1

@@ -122,18 +122,18 @@ def _print(problem: "Problem", done: "Campaign", answer: dict[str, Any], written
     from quakedesign.simulation.metrics import StickMetrics
 
     out = console()
-    happened = ", ".join(f"{len(found)} {name.replace('_', ' ')}" for name, found in done.events.items() if found)
+    happened = ", ".join(f"{len(indices)} {name.replace('_', ' ')}" for name, indices in done.events.items() if indices)
     law = problem.controller.title if problem.controller else "no control"
     out.print(f"{problem.fault.name}, {law}: {answer['samples']} samples, {answer['resumed']} of them from files")
-    came_to = ", ".join(f"{len(found)} {kind}" for kind, found in done.kinds.items() if found)
+    came_to = ", ".join(f"{len(indices)} {kind}" for kind, indices in done.kinds.items() if indices)
     out.print(f"outcomes (samples): {came_to or 'none'}")
     out.print(f"events (samples): {happened or 'none'}")
     levels = ("0.05", "0.5", "0.95", "1")
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     for column in ("metric", "unit", "5 %", "50 %", "95 %", "worst", "samples"):
         table.add_column(column, no_wrap=column != "samples")
-    for name, found in answer["quantiles"].items():
-        values = ("diverges" if found[level] is None else f"{found[level]:.2g}" for level in levels)
+    for name, quantiles in answer["quantiles"].items():
+        values = ("diverges" if quantiles[level] is None else f"{quantiles[level]:.2g}" for level in levels)
         worst = ", ".join(str(entry["index"]) for entry in answer["worst"][name][:3])
         table.add_row(name, StickMetrics.unit(name) or "-", *values, worst)
     out.print(table, soft_wrap=False)

@@ -86,9 +86,9 @@ class DesignOptions:
         from quakedesign.fault import load_fault
 
         controllers(self.controller)
-        found = load_fault(fault, box=self.box, disturbance=self.disturbance)
-        names = controllers(self.controller, found)
-        return found, {"names": names, "published_scheme": self.published_scheme, **self.told(names)}
+        loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
+        names = controllers(self.controller, loaded)
+        return loaded, {"names": names, "published_scheme": self.published_scheme, **self.told(names)}
 
     def told(self, names: list[str]) -> dict[str, Any]:
         """Options of `designed_comparison`.
@@ -141,14 +141,14 @@ def design(
     """
     from quakedesign.report.folder import prepare
 
-    found, asked = options.asked(fault)
-    folder = out or Path(f"quakedesign-{found.name}")
+    loaded, asked = options.asked(fault)
+    folder = out or Path(f"quakedesign-{loaded.name}")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import write_folder
 
     with progress() as tell:
-        comparison = designed_comparison(found, tell=tell, **asked)
+        comparison = designed_comparison(loaded, tell=tell, **asked)
         results = write_folder(comparison, folder, force=force, formats=format, command=command_line(), tell=tell)
 
     def said() -> None:

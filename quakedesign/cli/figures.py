@@ -26,9 +26,9 @@ def compare(
     from quakedesign.report.numbers import printed_lines
     from quakedesign.studies.paper_numbers import printed, table
 
-    found, asked = options.asked(fault)
+    loaded, asked = options.asked(fault)
     with progress() as tell:
-        comparison = designed_comparison(found, tell=tell, **asked)
+        comparison = designed_comparison(loaded, tell=tell, **asked)
     if output.json:
         beside = {"numbers": table(comparison), "printed": printed(comparison)}
         print_json({**results(comparison, stored=False), **beside})
@@ -62,8 +62,8 @@ def figures(
     """
     from quakedesign.report.folder import prepare, write_folder
 
-    found, asked = options.asked(fault)
-    folder = out or Path(f"quakedesign-{found.name}-figures")
+    loaded, asked = options.asked(fault)
+    folder = out or Path(f"quakedesign-{loaded.name}-figures")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.numbers import printed_lines
@@ -71,7 +71,7 @@ def figures(
     from quakedesign.report.paper_study import paper_study
 
     with progress() as tell:
-        comparison = designed_comparison(found, tell=tell, **asked)
+        comparison = designed_comparison(loaded, tell=tell, **asked)
         study = paper_study(comparison, progress=tell)
         results = write_folder(
             comparison, folder, force=force, study=study, formats=format, command=command_line(), tell=tell
@@ -79,7 +79,7 @@ def figures(
     if output.json:
         print_json(results)
         return 0
-    runs = ((e.label, "; ".join(run_sentences(e.run, found))) for e in comparison.entries if e.run)
+    runs = ((e.label, "; ".join(run_sentences(e.run, loaded))) for e in comparison.entries if e.run)
     print_lines(f"{label}: {said}" for label, said in runs)
     files = [(drawn["file"], drawn["paper"]) for drawn in results["figures"].values()]
     print_lines(f"{folder}/{file}" + (f": {paper} of the paper" if paper else "") for file, paper in files)

@@ -44,21 +44,23 @@ def derive(
 
     model = derive_model(load_fault(fault))
     write = in_latex if latex else plain
-    found: dict[str, Any] = {
+    equations: dict[str, Any] = {
         "error_dynamics": {"beta": write(model.error_dynamics.beta), "h": write(model.error_dynamics.h)},
         "jacobian": write(model.jacobian),
         "instability": write(model.instability),
         "unstable": model.unstable,
     }
-    beta, h = found["error_dynamics"].values()
+    beta, h = equations["error_dynamics"].values()
     lines = [
         r"\dot e_1 = e_2, \quad \dot e_2 = \beta (\nu + h)" if latex else "e_1' = e_2, e_2' = beta*(nu + h)",
         rf"\beta = {beta}" if latex else f"beta = {beta}",
         f"h = {h}",
-        rf"J(0, 0) = {found['jacobian']}" if latex else f"jacobian = {found['jacobian']}",
-        rf"\text{{unstable}} \iff {found['instability']}" if latex else f"unstable if {found['instability']}",
+        rf"J(0, 0) = {equations['jacobian']}" if latex else f"jacobian = {equations['jacobian']}",
+        rf"\text{{unstable}} \iff {equations['instability']}" if latex else f"unstable if {equations['instability']}",
     ]
-    output.show(found, [*lines, f"{'% ' if latex else ''}this fault is {'unstable' if model.unstable else 'stable'}"])
+    output.show(
+        equations, [*lines, f"{'% ' if latex else ''}this fault is {'unstable' if model.unstable else 'stable'}"]
+    )
     return 0
 
 

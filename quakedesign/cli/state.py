@@ -146,11 +146,11 @@ class SpreadOptions:
 
         _require_designed({"controller": law.controller, "gains": law.gains})
         off = rational(self.spread, "spread")
-        found = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=self.stress, spread=off)
-        if found.controller is None or found.sliding is None:
-            raise ParameterError(f"a campaign needs a law. Received none from design: {found.details['reason']}.")
-        told = {"spread": off, "stress": float(found.sliding.task.stress)}
-        return found.controller, told | ({} if self.stress_period is None else {"stress_period": self.stress_period})
+        designed = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=self.stress, spread=off)
+        if designed.controller is None or designed.sliding is None:
+            raise ParameterError(f"a campaign needs a law. Received none from design: {designed.details['reason']}.")
+        told = {"spread": off, "stress": float(designed.sliding.task.stress)}
+        return designed.controller, told | ({} if self.stress_period is None else {"stress_period": self.stress_period})
 
 
 def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str]) -> dict[str, Any]:

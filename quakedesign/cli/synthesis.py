@@ -83,22 +83,22 @@ def synthesise(
     of_trial, what = {"step": step, "scheme": scheme, "metric": metric}, f"the objective {objective}"
     if objective == "sampled":
         refuse({"--bound": bound, **{f"--{name}": value for name, value in of_search.items()}}, what)
-        found, more = _sampled(law, fault, lipschitz, gain_range, degree, given(of_trial))
+        synthesis, more = _sampled(law, fault, lipschitz, gain_range, degree, given(of_trial))
     else:
         refuse({"FAULT": fault, **{f"--{name}": value for name, value in of_trial.items()}}, what)
         from quakedesign.synthesis.gains.synthesise import synthesise as search
 
         ranges = {"lipschitz": lipschitz or "1", "gain_range": gain_range or ("1", "1")}
         options = {"workers": 2, **given(of_search), "degrees": degree or None, "bound": bound, **ranges}
-        found, more = search(law, objective, **options), {}
-    if found is not None and out is not None:
-        found.certificate.save(out)
-    answer = _facts(found) | more | {
-        "certificate": str(out) if found is not None and out is not None else None,
+        synthesis, more = search(law, objective, **options), {}
+    if synthesis is not None and out is not None:
+        synthesis.certificate.save(out)
+    answer = _facts(synthesis) | more | {
+        "certificate": str(out) if synthesis is not None and out is not None else None,
         "seconds": perf_counter() - began,
     }  # fmt: skip
-    output.show(answer, lambda: _print(law, found, more))
-    return 0 if found is not None else 1
+    output.show(answer, lambda: _print(law, synthesis, more))
+    return 0 if synthesis is not None else 1
 
 
 def _sampled(

@@ -49,13 +49,13 @@ def free_peaks(loop: PeriodicLoop) -> Mapping[str, tuple[Fraction, ...]]:
         generator, rows = matrix(loop.flow), matrix(tuple(loop.outputs.values()))
         flows = [Flow.of(generator, part, past=False) for part in loop.segments]
         groups = _followed(flows, beside([column(s) for s in loop.start]))
-        found: list[list[Any]] = [[] for _ in loop.outputs]
+        largest: list[list[Any]] = [[] for _ in loop.outputs]
         for flow in flows:
             for parts in zip(*(_pieces(flow, rows, *group) for group in groups), strict=True):
-                for peaks, bounds in zip(found, zip(*parts, strict=True), strict=True):
+                for peaks, bounds in zip(largest, zip(*parts, strict=True), strict=True):
                     peaks.append(reduce(arb.max, bounds))
             groups = [(flow.whole * columns, weights) for columns, weights in groups]
-        return {output: tuple(map(upper, peaks)) for output, peaks in zip(loop.outputs, found, strict=True)}
+        return {output: tuple(map(upper, peaks)) for output, peaks in zip(loop.outputs, largest, strict=True)}
 
 
 def _followed(flows: list[Flow], start: Any) -> list[Group]:

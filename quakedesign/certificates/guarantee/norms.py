@@ -71,8 +71,8 @@ def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     ParameterError
         When the nominal loop is not found to be stable within 4096 periods.
     """
-    found = dict(_norms(replace(loop, start=())))
-    return found | {(output, START): peaks for output, peaks in free_peaks(loop).items()} if loop.start else found
+    gains = dict(_norms(replace(loop, start=())))
+    return gains | {(output, START): peaks for output, peaks in free_peaks(loop).items()} if loop.start else gains
 
 
 @lru_cache(maxsize=128)
@@ -146,13 +146,13 @@ def _whole(left: Any, sums: list[Any]) -> Any:
     """
     own, size = _as_column(sums), len(sums)
     try:
-        found = absolute((identity(size) - left).solve(own) * ball(_ROOM))
+        solution = absolute((identity(size) - left).solve(own) * ball(_ROOM))
     except ZeroDivisionError:
         raise unstable() from None
-    bounded = zip(own.entries(), (left * found).entries(), found.entries(), strict=True)
+    bounded = zip(own.entries(), (left * solution).entries(), solution.entries(), strict=True)
     if not all(y + far <= x for y, far, x in bounded):
         raise unstable()
-    return found
+    return solution
 
 
 def _gains(parts: list[Response], past: _Past, outputs: Any) -> list[list[Any]]:

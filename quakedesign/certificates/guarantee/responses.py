@@ -167,12 +167,12 @@ def responses(loop: PeriodicLoop, flows: list[Flow], name: str) -> list[Response
 def _weights(flows: list[Flow], fading: Fading) -> list[Weights]:
     """Ω and Ω′ of every piece of every segment."""
     count = len(flows)
-    found, start = [Weights()] * count, _ZERO
+    weights, start = [Weights()] * count, _ZERO
     for place in ((fading.first + turn) % count for turn in range(count)):
         for length in flows[place].lengths:
-            found[place] += (_weight(fading, start, length),)
+            weights[place] += (_weight(fading, start, length),)
             start += length
-    return found
+    return weights
 
 
 def _weight(fading: Fading, start: Fraction, length: Fraction) -> tuple[Any, Any]:

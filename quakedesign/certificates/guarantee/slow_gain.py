@@ -78,8 +78,8 @@ def slow_gains(loops: Iterable[PeriodicLoop], growth: Fraction) -> Gains:
     ParameterError
         When one of the loops, or of those that grow, is not found to be stable.
     """
-    found = [norms(loop) | norms(grown(loop, growth)) for loop in loops]
-    return {key: tuple(chain.from_iterable(gains[key] for gains in found)) for key in found[0]}
+    of_parts = [norms(loop) | norms(grown(loop, growth)) for loop in loops]
+    return {key: tuple(chain.from_iterable(gains[key] for gains in of_parts)) for key in of_parts[0]}
 
 
 def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:

@@ -256,12 +256,12 @@ class Guarantee:
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
-        found = self.bounds()
-        if isinstance(found, NoGuarantee) or not _root_within(self.held, self.claims):
+        bounds = self.bounds()
+        if isinstance(bounds, NoGuarantee) or not _root_within(self.held, self.claims):
             return Verdict.UNDECIDED
-        if self.slow_gain is not None and not found.slip_error < self.claims.slip_error:
+        if self.slow_gain is not None and not bounds.slip_error < self.claims.slip_error:
             return Verdict.UNDECIDED
-        return Verdict.PROVED if self.claims.covers(Claims.of(self.task, found)) else Verdict.UNDECIDED
+        return Verdict.PROVED if self.claims.covers(Claims.of(self.task, bounds)) else Verdict.UNDECIDED
 
     def sentence(self) -> str:
         """What is guaranteed, for people."""
@@ -313,8 +313,8 @@ def guarantee(task: Task, held: Held, slow_gain: SlowGain | None = None) -> Guar
 
 
 def _claims(task: Task, held: Held) -> Claims | NoGuarantee:
-    found = _bounds(task, held, held.loop(task))
-    return found if isinstance(found, NoGuarantee) else Claims.of(task, found).rounded()
+    bounds = _bounds(task, held, held.loop(task))
+    return bounds if isinstance(bounds, NoGuarantee) else Claims.of(task, bounds).rounded()
 
 
 def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
@@ -323,10 +323,10 @@ def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuar
     if isinstance(gains, NoGuarantee):
         return gains
     for _ in range(_TURNS):
-        found = _slow_bounds(task, held, slow_gain, gains, slip_error)
-        if isinstance(found, NoGuarantee):
-            return found
-        claims = Claims.of(task, found).rounded()
+        bounds = _slow_bounds(task, held, slow_gain, gains, slip_error)
+        if isinstance(bounds, NoGuarantee):
+            return bounds
+        claims = Claims.of(task, bounds).rounded()
         if claims.slip_error <= slip_error:
             return claims
         slip_error = _above(claims.slip_error * _MARGIN)

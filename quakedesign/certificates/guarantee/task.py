@@ -180,11 +180,11 @@ class Task:
     @cached_property
     def reference_rates(self) -> tuple[Fraction, Fraction]:
         """Bounds of r′ [m/s] and |r″| [m/s²]."""
-        found = []
+        bounds = []
         for order in (1, 2):
             bound = max(abs(v) for v in _range_of(_derived(self.shape, order)))
-            found.append(bound * self.target_slip / self.operation_time**order)
-        return found[0], found[1]
+            bounds.append(bound * self.target_slip / self.operation_time**order)
+        return bounds[0], bounds[1]
 
     @property
     def reference_jerk(self) -> Fraction:
@@ -237,8 +237,8 @@ class Task:
 
 
 def _hull(values: Iterable[Fraction]) -> Range:
-    found = list(values)
-    return min(found), max(found)
+    listed = list(values)
+    return min(listed), max(listed)
 
 
 def _derived(shape: tuple[Fraction, ...], order: int) -> tuple[Fraction, ...]:

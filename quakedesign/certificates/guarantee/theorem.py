@@ -192,10 +192,10 @@ def best_bounds(
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains; of a disturbance of bounded rate, the better of both classes."""
     classes = [task] if task.change is None else [task, replace(task, change=None)]
-    found = [bounds_from(one, gains, root, step, noise, spread) for one in classes]
-    proved = [bounds for bounds in found if isinstance(bounds, Bounds)]
+    answers = [bounds_from(one, gains, root, step, noise, spread) for one in classes]
+    proved = [bounds for bounds in answers if isinstance(bounds, Bounds)]
     if not proved:
-        return found[0]
+        return answers[0]
     return Bounds(**{part.name: min(getattr(bounds, part.name) for bounds in proved) for part in fields(Bounds)})
 
 
@@ -211,13 +211,13 @@ def bounds_from(
     channels = (*channels_of(task, root, step, noise, spread), *_beside(task, {name for _, name in gains}))
     if ("push", "awaited") in gains:
         channels = tuple(_through_layer(channels, gains))
-    small_gain, found = channel_bounds(channels, gains)
-    if found is None:
+    small_gain, peaks = channel_bounds(channels, gains)
+    if peaks is None:
         return _none(small_gain, channels, gains)
     return Bounds(
-        slip_error=Fraction(found["slip_error"]),
-        slip_rate_error=Fraction(found["slip_rate_error"]),
-        push=Fraction(found["push"] + found.get("left_out", _ZERO) + _unshifted(task)),
+        slip_error=Fraction(peaks["slip_error"]),
+        slip_rate_error=Fraction(peaks["slip_rate_error"]),
+        push=Fraction(peaks["push"] + peaks.get("left_out", _ZERO) + _unshifted(task)),
         small_gain=Fraction(small_gain),
     )
 

@@ -20,21 +20,21 @@ def cells(task: SlidingTask, cuts: Cuts) -> tuple[SlidingTask, ...]:
     ParameterError
         For a cut outside its box, too few or too many cuts, or more than 64 cells.
     """
-    boxes, found = [task], []
+    boxes, leaves = [task], []
     for cut in cuts[: 2 * MOST_CELLS]:
         if not boxes:
             break
         box = boxes.pop()
         if cut is None:
-            found.append(box)
+            leaves.append(box)
         else:
             boxes += reversed(parts(box, *cut))
-    if boxes or len(cuts) != 2 * len(found) - 1 or len(found) > MOST_CELLS:
+    if boxes or len(cuts) != 2 * len(leaves) - 1 or len(leaves) > MOST_CELLS:
         raise ParameterError(
             f"a box must be cut into 1 to {MOST_CELLS} cells, with one cut less. Received {len(cuts)} entries and "
-            f"{len(found)} cells. Complete them."
+            f"{len(leaves)} cells. Complete them."
         )
-    return tuple(found)
+    return tuple(leaves)
 
 
 def parts(task: SlidingTask, axis: str, at: Fraction) -> tuple[SlidingTask, SlidingTask]:

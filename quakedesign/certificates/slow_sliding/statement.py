@@ -54,8 +54,8 @@ class SlidingGuarantee:
     def check(self) -> Verdict:
         """PROVED if the claims follow from themselves on every cell, in ball arithmetic; else UNDECIDED."""
         for cell in self.cells:
-            found = cell_bounds(cell, self.held, self.claims)
-            if isinstance(found, NoGuarantee) or not follows(found, self.claims):
+            bounds = cell_bounds(cell, self.held, self.claims)
+            if isinstance(bounds, NoGuarantee) or not follows(bounds, self.claims):
                 return Verdict.UNDECIDED
         return Verdict.PROVED
 

@@ -138,23 +138,23 @@ def bounds_from(
         replace(one, own=one.own + sum((c * more.get(y, _ZERO) for y, c in one.shares.items()), _ZERO))
         for one in channels_of(task, held, claims, loop)
     ]
-    small_gain, found = channel_bounds(channels, gains)
-    if found is None:
+    small_gain, bounds = channel_bounds(channels, gains)
+    if bounds is None:
         whole = UpperBound(Fraction(small_gain))
         return NoGuarantee(reason=f"small gain {whole:.3g}", small_gain=whole)
     return {
-        "log_rate": found["log_rate"] + more["log_rate"],
-        "log_state": found["log_state"],
-        "slip_error": found["slip_error"],
-        "push": found["push"] + found.get("left_out", _ZERO),
-        "asked": found["asked"],
+        "log_rate": bounds["log_rate"] + more["log_rate"],
+        "log_state": bounds["log_state"],
+        "slip_error": bounds["slip_error"],
+        "push": bounds["push"] + bounds.get("left_out", _ZERO),
+        "asked": bounds["asked"],
         "small_gain": small_gain,
     }
 
 
-def follows(found: Mapping[str, Any], claims: SlidingClaims) -> bool:
+def follows(bounds: Mapping[str, Any], claims: SlidingClaims) -> bool:
     """Whether every bound lies below its claim."""
-    return all(found[name] < getattr(claims, name) for name in SlidingClaims.__dataclass_fields__)
+    return all(bounds[name] < getattr(claims, name) for name in SlidingClaims.__dataclass_fields__)
 
 
 def loop_of(held: Held, model: SlidingModel, task: SlidingTask) -> PeriodicLoop:
@@ -214,17 +214,17 @@ def channels_of(task: SlidingTask, held: Held, claims: SlidingClaims, loop: Peri
     if left_out and not loop.fading:
         left_out["left_out"] += _middle(task.ranges["coefficient"])
     state = {"ageing": off, "log_rate": off * bent, "log_state": (1 + off) * _half(states)}
-    found = [
+    channels = [
         Channel(name="stress", own=task.stress + inertia(task, held, claims), shares={**stress, **left_out}),
         Channel(name="rate", own=_ZERO, shares={"log_rate": bent}),
         Channel(name="state", own=_ZERO, shares=state),
     ]
     if "drift" in loop.inputs:
-        found.append(Channel(name="drift", own=task.drift, shares={}))
-    found += [Channel(name=name, own=size, shares={}) for name, size in held.noise.items()]
+        channels.append(Channel(name="drift", own=task.drift, shares={}))
+    channels += [Channel(name=name, own=size, shares={}) for name, size in held.noise.items()]
     if loop.fading:
-        found.append(Channel(name="left_out", own=_ZERO, shares={"left_out": _ONE}))
-    return tuple(found)
+        channels.append(Channel(name="left_out", own=_ZERO, shares={"left_out": _ONE}))
+    return tuple(channels)
 
 
 def inertia(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fraction:
@@ -324,14 +324,14 @@ def _with_what_adds_at_once(
     loop: PeriodicLoop, model: SlidingModel, gains: Gains, phases: Sequence[Fraction]
 ) -> dict[tuple[str, str], tuple[Any, ...]]:
     """Gains with what stress and left out pressure make of y at once, in every part of the period."""
-    found = dict(gains)
+    total = dict(gains)
     for (output, name), size in at_once(model).items():
         if name in loop.inputs:
-            found[output, name] = tuple(v + size for v in gains[output, name])
+            total[output, name] = tuple(v + size for v in gains[output, name])
         elif name in loop.fading:
             weights = (loop.fading[name].weight(time) for time in phases)
-            found[output, name] = tuple(v + size * w for v, w in zip(gains[output, name], weights, strict=True))
-    return found
+            total[output, name] = tuple(v + size * w for v, w in zip(gains[output, name], weights, strict=True))
+    return total
 
 
 def _once_settled(

@@ -32,8 +32,8 @@ __all__ = [
 @cache
 def stages() -> dict[str, type[Stage]]:
     """Every stage of the package, by name, along the signal."""
-    found = discovered(__name__, Stage, shared=("base", "chain"))
-    return dict(sorted(found.items(), key=lambda item: (issubclass(item[1], FlowStage), item[1].place)))
+    known = discovered(__name__, Stage, shared=("base", "chain"))
+    return dict(sorted(known.items(), key=lambda item: (issubclass(item[1], FlowStage), item[1].place)))
 
 
 check_arguments(__name__)

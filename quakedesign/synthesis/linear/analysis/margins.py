@@ -86,10 +86,10 @@ def friction_slope_margin(fault: Fault, controller: Controller) -> SlopeMargin |
     spring, damping = (plant_ranges(fault)[symbol][0] for symbol in (plant.k_hat, plant.eta_hat))
     still = replace(needed, slip=(-spring, -spring), rate=(damping, damping))
     loop = FeedbackLoop(gains=tuple(controller.gains.values()), sectors=still)
-    found = slip_limit(loop, damping)
-    if slope == 0 or found is None or found[0] <= -spring:
+    critical = slip_limit(loop, damping)
+    if slope == 0 or critical is None or critical[0] <= -spring:
         return None
-    limit, beta = (found[0] + spring) / slope, found[1]
+    limit, beta = (critical[0] + spring) / slope, critical[1]
 
     def prove(margin: Fraction) -> Certificate | None:
         widened = replace(needed, slip=(-spring, margin * slope - spring), rate=(damping, damping))
@@ -124,8 +124,8 @@ def _largest(prove: Callable[[Fraction], Certificate | None], limit: Fraction) -
     low, high, best = Fraction(0), limit * _SHARES[-1], None
     for _ in range(_STEPS):
         middle = _decimal((low + high) / 2)
-        found = prove(middle)
-        low, high, best = (middle, high, found) if found is not None else (low, middle, best)
+        proof = prove(middle)
+        low, high, best = (middle, high, proof) if proof is not None else (low, middle, best)
     return low, best
 
 

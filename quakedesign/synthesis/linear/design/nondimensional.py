@@ -116,18 +116,18 @@ class ScaledDesign:
 
     def _weight(self, ratio: Callable[[Any], float], high: float, tolerance: float) -> Choice:
         """R at which a ratio that falls with R is 1, the split of W following in a few rounds."""
-        split, found = 0.5, high
+        split, root = 0.5, high
         for _ in range(_ROUNDS):
 
             def excess(log_weight: float, split: float = split) -> float:
                 return math.log(ratio(self.solve(10.0**log_weight, split)[0]))
 
-            found = _root(excess, LIGHTEST, high, tolerance)
-            best = self.best_split(10.0**found)
+            root = _root(excess, LIGHTEST, high, tolerance)
+            best = self.best_split(10.0**root)
             if abs(best - split) < 1e-5:
                 break
             split = best
-        return 10.0**found, split
+        return 10.0**root, split
 
 
 def sound_bound(bounds: Sequence[Fraction], split: Fraction) -> Matrix:

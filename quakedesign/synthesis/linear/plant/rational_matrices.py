@@ -112,8 +112,8 @@ def definite(a: Rows) -> bool:
 
 def characteristic(a: Rows) -> tuple[Fraction, ...]:
     """Coefficients of det(zI − A), highest power first."""
-    found = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in a]).charpoly()
-    return tuple(fraction_of(c) for c in reversed(found.coeffs()))
+    polynomial = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in a]).charpoly()
+    return tuple(fraction_of(c) for c in reversed(polynomial.coeffs()))
 
 
 def hurwitz(polynomial: Sequence[Fraction]) -> bool:

@@ -114,18 +114,18 @@ def uncertainty_bounds(fault: Fault, *, loading_rate: float | str = 0) -> Uncert
     speed = rational(loading_rate, "loading_rate")
     if speed < 0:
         raise ParameterError(f"loading_rate must not be negative. Received {float(speed):.4g} m/s. Give its size.")
-    found, b, ranges = sectors(fault), least_authority(fault), plant_ranges(fault)
+    needed, b, ranges = sectors(fault), least_authority(fault), plant_ranges(fault)
     values = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
     drift = ranges[plant.k_hat][1] * speed * rational(fault.reference.operation_time)
-    parts = _terms(fault, found, ranges, values, drift)
+    parts = _terms(fault, needed, ranges, values, drift)
     lasting = sum((max(map(abs, r)) for _, acts_on, r in parts if acts_on == "nothing"), Fraction(0)) / b
     return UncertaintyBounds(
-        sectors=found,
+        sectors=needed,
         contributions=tuple(
             Contribution(name=name, acts_on=acts_on, range=ends, bound=max(map(abs, ends)) / b)
             for name, acts_on, ends in parts
         ),
-        control=(found.beta[0] * b, found.beta[1] * b),
+        control=(needed.beta[0] * b, needed.beta[1] * b),
         rest_pressure=rest_pressure(fault, (Fraction(0), rational(fault.reference.target_slip)), drift=drift),
         nonvanishing=lasting,
     )

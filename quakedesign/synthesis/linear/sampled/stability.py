@@ -148,8 +148,8 @@ class _Task:
         for i, (low, high) in enumerate(cell):
             if low == high:
                 continue
-            found = self.conditions(tuple(cell[j] if j == i else (m, m) for j, m in enumerate(middle)))
-            spread = max(float(v.rad()) / max(float(abs(v.mid())), 1e-300) for v in found)
+            values = self.conditions(tuple(cell[j] if j == i else (m, m) for j, m in enumerate(middle)))
+            spread = max(float(v.rad()) / max(float(abs(v.mid())), 1e-300) for v in values)
             if spread > largest:
                 best, largest = i, spread
         low, high = cell[best]
