@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,14 +22,18 @@ class Recording(ABC):
     name : str
     time : ndarray
         [s], shape (n,).
+    described : mapping of str to (str, str)
+        Long name and SI unit of every field that is a signal; one that is None is none.
     """
 
     name: str
     time: "np.ndarray"
+    described: ClassVar[Mapping[str, tuple[str, str]]]
 
-    @abstractmethod
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
         """Values, long name and SI unit of every signal that this run has, by name."""
+        known = ((name, getattr(self, name), *told) for name, told in self.described.items())
+        return {name: (values, title, unit) for name, values, title, unit in known if values is not None}
 
     @abstractmethod
     def attributes(self) -> Mapping[str, Any]:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from fractions import Fraction
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -47,6 +47,8 @@ class SlidingRun(Trajectory):
         As in `SIGNALS`, shape (n,).
     """
 
+    described: ClassVar[Mapping[str, tuple[str, str]]] = {**Trajectory.described, **SIGNALS}
+
     theta: "np.ndarray" = field(repr=False)
     asked: "np.ndarray" = field(repr=False)
     stress: "np.ndarray" = field(repr=False)
@@ -55,10 +57,6 @@ class SlidingRun(Trajectory):
     def opened(self) -> float | None:
         """Time [s] at which the pressure would reach the effective normal stress, where the run ends."""
         return self.events.get("opening")
-
-    def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
-        """Values, long name and SI unit of every signal, by name."""
-        return super().signals() | {name: (getattr(self, name), *described) for name, described in SIGNALS.items()}
 
 
 def simulate_sliding(

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -53,6 +53,8 @@ class StateTrajectory(Recording):
         Method, tolerance, evaluations and versions.
     """
 
+    described: ClassVar[Mapping[str, tuple[str, str]]] = SIGNALS
+
     name: str
     time: "np.ndarray" = field(repr=False)
     load_point: "np.ndarray" = field(repr=False)
@@ -100,7 +102,7 @@ class StateTrajectory(Recording):
 
     def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
         """Values, long name and SI unit of every signal, by name."""
-        found = {name: (getattr(self, name), *described) for name, described in SIGNALS.items()}
+        found = super().signals()
         for name, values, unit in zip(self.state_names, self.states, self.state_units, strict=True):
             found[name] = (values, f"state of friction {name}", unit)
         return found

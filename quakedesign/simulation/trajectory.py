@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -60,6 +60,8 @@ class Trajectory(Recording):
         Method, step, scheme, backend and versions; the fault as a TOML file (``scenario``).
     """
 
+    described: ClassVar[Mapping[str, tuple[str, str]]] = SIGNALS
+
     name: str
     time: "np.ndarray" = field(repr=False)
     slip: "np.ndarray" = field(repr=False)
@@ -102,11 +104,7 @@ class Trajectory(Recording):
 
     def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
         """Values, long name and SI unit of every signal that this run has, by name."""
-        found = {
-            name: (getattr(self, name), *described)
-            for name, described in SIGNALS.items()
-            if getattr(self, name) is not None
-        }
+        found = super().signals()
         for number, (values, unit) in enumerate(zip(self.integrals, self.integral_units, strict=True), 1):
             found[f"xi_{number}"] = (values, f"integral state xi{number}", unit)
         return found

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor, log10
-from typing import TYPE_CHECKING, Any, ClassVar, TypedDict
+from typing import TYPE_CHECKING, Any, ClassVar, TypedDict, cast
 
 from quakedesign import loop as loops
 from quakedesign.bounds import LowerBound, UpperBound
@@ -92,15 +92,7 @@ class Held:
     @property
     def around(self) -> Around:
         """All but law and T_s."""
-        return Around(
-            delay=self.delay,
-            lag=self.lag,
-            diffusion=self.diffusion,
-            slip_noise=self.slip_noise,
-            rate_noise=self.rate_noise,
-            initial_slip=self.initial_slip,
-            initial_slip_rate=self.initial_slip_rate,
-        )
+        return cast(Around, {name: getattr(self, name) for name in Around.__annotations__})
 
     @property
     def start(self) -> tuple[Fraction, Fraction]:

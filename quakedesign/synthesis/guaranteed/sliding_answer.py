@@ -70,11 +70,7 @@ class SlidingAnswer:
             "verdict": "proved",
             "guarantee": self.found.sentence(),
             **self.found.to_dict(),
-            "step": str(held.step),
-            "diffusion": str(held.diffusion),
-            "lag": str(held.lag),
-            "delay": str(held.delay),
-            "slip_noise": str(held.slip_noise),
+            **{name: str(getattr(held, name)) for name in ("step", "diffusion", "lag", "delay", "slip_noise")},
             "measured": "slip",
             "worst_found": self.worst and asdict(self.worst),
         }
