@@ -380,4 +380,4 @@ def test_a_certificate_without_disturbance_does_not_cover_a_fault(capsys, tmp_pa
 def test_a_path_that_no_system_accepts_is_one_line(capsys):
     code, _, err = run(capsys, "check", "a" * 300)
     assert code == 2
-    assert "must exist" in err
+    assert "certificate must be a file" in err

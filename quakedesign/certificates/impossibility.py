@@ -190,7 +190,8 @@ def hopeless(task: Task, withdrawal: Fraction, delay: Fraction, diffusion: Fract
         way = f"through rock of L^2/D above {far.quantity('s')}"
     else:
         return ""
-    return f"no controller whatever that withdraws at most {LowerBound(withdrawal).quantity('Pa')} holds it {way}"
+    most = LowerBound(withdrawal).quantity("Pa")
+    return f"no controller whatever that withdraws at most {most} holds it {way}, whatever T_s"
 
 
 def _least(task: Task | SlidingPush, value: Callable[[_Pushed | SlidingPush], Any]) -> UpperBound | None:

@@ -6,7 +6,7 @@ import os
 import sys
 import warnings
 
-from cyclopts import CycloptsError
+from cyclopts import CoercionError, CycloptsError, MissingArgumentError
 
 from quakedesign.cli import (
     attraction,
@@ -70,7 +70,7 @@ def main(arguments: list[str] | None = None) -> None:
     except QuakedesignError as error:
         _refuse(str(error))
     except CycloptsError as error:
-        _refuse(str(error))
+        _refuse(_with_help(error))
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
@@ -83,6 +83,14 @@ def main(arguments: list[str] | None = None) -> None:
         defect = one_line(f"{type(error).__name__}: {error}")
         print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the place.", file=sys.stderr)
         sys.exit(3)
+
+
+def _with_help(error: CycloptsError) -> str:
+    """What is wrong with a command line; where to look, unless a value is wrong, whose message says what would do."""
+    if isinstance(error, CoercionError):
+        return str(error)
+    hyphen = " A value that begins with - is joined by =." if isinstance(error, MissingArgumentError) else ""
+    return f"{error}{hyphen} See {' '.join(('quakedesign', *(error.command_chain or ())))} --help."
 
 
 def _without_warnings() -> None:

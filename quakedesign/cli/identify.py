@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from quakedesign.cli.options import PLAIN, FaultName, Force, Output
-from quakedesign.cli.shared import Pascals, Whole, app, in_unit, new_file
+from quakedesign.cli.shared import Pascals, Whole, app, in_unit, new_file, require_different
 
 
 @app.command
@@ -48,13 +48,14 @@ def identify(
     """
     from quakedesign.fault import load_fault
     from quakedesign.identification import identify as fitted
-    from quakedesign.identification import read_record, save_fault
+    from quakedesign.identification import other_parts, read_record, save_fault
     from quakedesign.report.identification import identification_lines, require_format, save_figure
 
     for path, what in ((out, "fault file"), (figure, "figure")):
         new_file(path, what, force=force)
     if figure is not None:
         require_format(figure)
+    require_different({"--out": out, "--figure": figure, "the record": data, "--fault": Path(fault)})
     around = load_fault(fault)
     record = read_record(data, normal_stress=normal_stress)
     spring = None if stiffness is None else in_unit(stiffness, record.stiffness_unit, "stiffness")
@@ -66,7 +67,7 @@ def identify(
         save_fault(identification, around, out)
     told = [f"written: {', '.join(map(str, written))}"] if written else []
     if out in written:
-        told.append(f"all but the friction is that of {around.name}: normal stress, size, task, T_s, disturbance")
+        told.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
     if out is not None and not identification.identified:
         told.append(f"not written: {out}, which needs every parameter")
     places = {"figure": figure, "file": out if identification.identified else None}

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from itertools import combinations
 from pathlib import Path
 from textwrap import wrap
 from typing import Annotated, Any
@@ -214,6 +215,21 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
     if os.path.isdir(path):
         raise OutputError(f"{what} must be a file. Received {path}, which is a folder. Choose another --out.")
     require_room(path)
+
+
+def require_different(places: Mapping[str, Path | None]) -> None:
+    """Refuse two names for one place, so that what is read is not replaced.
+
+    Raises
+    ------
+    OutputError
+    """
+    named = {name: os.path.realpath(path) for name, path in places.items() if path is not None}
+    for one, other in combinations(named, 2):
+        if named[one] == named[other]:
+            raise OutputError(
+                f"{one} and {other} must be different files. Received {places[one]} for both. Choose another."
+            )
 
 
 @contextmanager

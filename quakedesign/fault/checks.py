@@ -52,6 +52,17 @@ class Problems:
         raise error from None
 
 
+def require_seed(seed: int) -> None:
+    """Refuse what is no seed.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise ParameterError(f"seed must be a whole number of at least 0. Received {seed!r}.")
+
+
 def require_positive(remedy: str = "", **values: float | Fraction) -> None:
     """Refuse values that are not positive finite numbers, all at once; the keyword is the name.
 

@@ -6,6 +6,7 @@ from decimal import ROUND_FLOOR, Context, Decimal
 from typing import Any
 
 from quakedesign.errors import ScenarioError
+from quakedesign.fault.friction import FrictionLaw
 from quakedesign.fault.parameters import Fault
 from quakedesign.fault.reference import Reference
 
@@ -13,6 +14,8 @@ PERIODS = 4.6e5
 """ω_n times the operation time [-] of both faults of Table I."""
 SAMPLES = 10.0
 """Samples while the fastest of an error and of a free oscillation grows or turns by one."""
+AGEINGS = 20.0
+"""Samples in D_c/V, few enough to be summed in a proof of slow sliding at V and many enough to control it."""
 _SHARE = 1000  # of the operation time, which a sampling time must not exceed
 
 
@@ -33,6 +36,19 @@ def radiation_damping(density: float, shear_modulus: float, area: float) -> floa
     Rice (1993), J. Geophys. Res. 98(B6), 9885; c_s = √(G/ρ) is the speed of shear waves.
     """
     return area * math.sqrt(density * shear_modulus) / 2
+
+
+def sliding_step(law: FrictionLaw, task: Reference) -> float:
+    """T_s [s] near which slow sliding at the mean rate V of a task has a guarantee: D_c/(20 V), rounded down.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+        With a state.
+    task : Reference
+    """
+    ageing = float(min(law.steady_state(task.target_slip / task.operation_time)))
+    return _cut(min(ageing / AGEINGS, task.operation_time / _SHARE), digits=2)
 
 
 def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[str, ...] = ()) -> Fault:
@@ -71,8 +87,8 @@ def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[s
     if "operation_time" not in task:
         longest = _cut(PERIODS / fault.natural_frequency)
         assumed.append(f"operation time {longest:g} s, about as many natural periods as for the paper's faults")
-    step = task.get("sampling_time") or _step(fault, longest, assumed)
     reference = Reference(target_slip=target, operation_time=longest)
+    step = task.get("sampling_time") or _step(fault, reference, assumed)
     return Fault(
         **dict(parts) | {"damping": fault.damping, "reference": reference, "sampling_time": step},
         assumed=tuple(assumed),
@@ -92,9 +108,13 @@ def _target(fault: Fault, assumed: list[str]) -> float:
     return target
 
 
-def _step(fault: Fault, operation_time: float, assumed: list[str]) -> float:
+def _step(fault: Fault, task: Reference, assumed: list[str]) -> float:
+    if fault.friction.state_names:
+        step = sliding_step(fault.friction, task)
+        assumed.append(f"sampling time {step:g} s, near D_c/({AGEINGS:g} V) in slow sliding at the task's mean rate V")
+        return step
     pace = max(fault.natural_frequency, _growth(fault))
-    step = _cut(min(1 / (SAMPLES * pace), operation_time / _SHARE), digits=2)
+    step = _cut(min(1 / (SAMPLES * pace), task.operation_time / _SHARE), digits=2)
     assumed.append(
         f"sampling time {step:g} s, at least {SAMPLES:g} samples while an error grows e-fold or it swings by 1 rad"
     )

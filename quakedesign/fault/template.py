@@ -48,7 +48,7 @@ _LEFT_OUT = {
     "damping": "radiation of shear waves, G A/(2 c_s), if left out",
     "target_slip": "the next rest slip if left out",
     "operation_time": "about as many natural periods as for the paper's faults if left out",
-    "sampling_time": "at least ten samples while an error grows e-fold if left out",
+    "sampling_time": "at least ten samples while an error grows e-fold, with a state near D_c/(20 V), if left out",
 }
 
 

@@ -1,7 +1,7 @@
 """From a laboratory record to friction parameters: fits of the simulated experiment, with confidence regions."""
 
 from quakedesign.arguments import check_arguments
-from quakedesign.identification.fault_file import cover, identified_fault, save_fault
+from quakedesign.identification.fault_file import cover, identified_fault, other_parts, save_fault
 from quakedesign.identification.identify import identify
 from quakedesign.identification.record import Record, read_record
 from quakedesign.identification.result import Estimate, Identification
@@ -13,6 +13,7 @@ __all__ = [
     "cover",
     "identified_fault",
     "identify",
+    "other_parts",
     "read_record",
     "save_fault",
 ]

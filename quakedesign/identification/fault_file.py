@@ -14,7 +14,8 @@ from itertools import product
 from pathlib import Path
 
 from quakedesign.errors import RecordError
-from quakedesign.fault import Fault, FrictionLaw, UncertaintyBox
+from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox
+from quakedesign.fault.defaults import sliding_step
 from quakedesign.fault.template import fault_toml
 from quakedesign.identification.result import Estimate, Identification
 from quakedesign.output import write_whole
@@ -90,7 +91,8 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     identification : Identification
         Of a record that tells every parameter.
     fault : Fault
-        That gives everything but friction.
+        That gives everything but friction. Where the identified friction has a state and that of the fault has none,
+        there is no disturbance, and T_s suits slow sliding.
 
     Returns
     -------
@@ -110,6 +112,9 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         if covers(identification.law)
         else Cover(law=identification.law, box=fault.box)
     )
+    if _gains_a_state(identification, fault):
+        step = sliding_step(held.law, fault.reference)
+        fault = replace(fault, friction=held.law, sampling_time=step, disturbance=Disturbance())
     return replace(
         fault,
         name=f"{fault.name[:40].rstrip()}-identified",
@@ -118,6 +123,16 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         box=held.box,
         assumed=(),
     )
+
+
+def other_parts(identification: Identification, fault: Fault) -> str:
+    """What a fault file of a record takes from a fault, in words."""
+    shared = "normal stress, size, task"
+    return shared if _gains_a_state(identification, fault) else f"{shared}, T_s, disturbance"
+
+
+def _gains_a_state(identification: Identification, fault: Fault) -> bool:
+    return bool(identification.law.state_names) and not fault.friction.state_names
 
 
 def covers(law: FrictionLaw) -> bool:
@@ -154,7 +169,7 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
     )
     return [
         f"Friction identified from {identification.record.name!r} as {identification.law.name}; "
-        f"everything else is {fault.name}'s.",
+        f"from {fault.name}: {other_parts(identification, fault)}.",
         f"Best fit (95 % alone; box of all together); {said}.",
         *(_remark(estimate) for estimate in identification.estimates.values()),
     ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from quakedesign.errors import RecordError
 from quakedesign.fault import friction_law
-from quakedesign.fault.checks import require_positive
+from quakedesign.fault.checks import require_positive, require_seed
 from quakedesign.identification.experiment import Difference
 from quakedesign.identification.fitting import Fit, Search, fit, settled
 from quakedesign.identification.profiles import BetterFit, interval
@@ -61,6 +61,7 @@ def identify(
     UnknownNameError
         For a law that does not exist.
     """
+    require_seed(seed)
     if stiffness is not None:
         require_positive(stiffness=stiffness)
     if normal_stress is not None:

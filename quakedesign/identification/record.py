@@ -97,6 +97,8 @@ def read_record(path: str | Path, *, normal_stress: float | None = None) -> Reco
     lines = [(n, line) for n, line in enumerate(text.splitlines(), start=1) if line.strip() and line.strip()[0] != "#"]
     if not lines:
         raise RecordError(f"a record must have a line of headings. Received {path}, which is empty.")
+    if len(lines) == 1:
+        raise RecordError(f"a record must have samples. Received {path}, which has a line of headings alone.")
     factors = _headings(next(csv.reader([lines[0][1]])))
     if len(lines) - 1 > MOST_SAMPLES:
         raise RecordError(
@@ -115,10 +117,7 @@ def _headings(cells: Sequence[str]) -> dict[str, float]:
         match = _HEADING.fullmatch(cell)
         name, unit = match.groups() if match else (cell.strip(), None)
         if name not in COLUMNS:
-            raise RecordError(
-                f"a column must be one of {', '.join(COLUMNS)}. Received {shown(name)}."
-                f"{nearest_name(name, COLUMNS) or ' Remove it, or rename it.'}"
-            )
+            raise RecordError(f"a column must be one of {', '.join(COLUMNS)}. Received {shown(name)}.{_remedy(name)}")
         if name in headings:
             raise RecordError(f"a column must be there once. Received {name} twice. Remove one.")
         if unit is None and COLUMNS[name]:
@@ -129,6 +128,12 @@ def _headings(cells: Sequence[str]) -> dict[str, float]:
         plain = not unit or unit.strip() in ("-", "1")
         headings[name] = 1.0 if plain and not COLUMNS[name] else si_value(f"1 {unit}", COLUMNS[name], f"column {name}")
     return headings
+
+
+def _remedy(name: str) -> str:
+    if any(sign in name for sign in ";\t"):
+        return " Put commas between columns."
+    return nearest_name(name, COLUMNS) or " Remove it, or rename it."
 
 
 def _values(lines: Sequence[tuple[int, str]], names: Sequence[str]) -> "np.ndarray":

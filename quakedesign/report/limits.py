@@ -47,6 +47,8 @@ def _meaning(limits: Limits) -> list[str]:
         "class amplitude, which may jump",
         "slip-rate error: even with slip, slip rate and disturbance known up to the sample, if the slip error stays "
         f"{within}; slip rates may be negative, as in the guarantees",
+        "proved: of two designs, the one with the smaller slip-rate error; design prefers a smaller slip error unless "
+        "its objective is peak",
     ]
     if limits.largest_step.impossible_beyond is None:
         return [*told, "the others: none is known, since friction's weakening alone does not make this fault unstable"]
@@ -65,7 +67,7 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
         "slip-rate error: even with slip, slip rate, state and stress known up to the sample; the stress may jump",
     ]
     if limits.largest_step.impossible_beyond is None:
-        return [*told, "the others: none is known, since no error of this fault grows by itself"]
+        return [*told, "the others: none is known, since errors of this fault swing while they grow, or do not grow"]
     return [
         *told,
         f"the others: pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference needs, "

@@ -52,6 +52,7 @@ def controller_step(
         For a scheme that does not sample, an actuator with a motion of its own, or a step that is not positive or not
         that of the sensor.
     """
+    fault.require_memoryless("a controller in C")
     scheme, step, own = own_way(controller, scheme, step)
     period = fault.sampling_time if step is None else step
     require_positive(step=period)
@@ -178,7 +179,10 @@ def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, s
 
 
 def _text(value: Any) -> str:
-    """Exact numbers as p/q, values by their fields."""
+    """Exact numbers as p/q, values by their fields that hold something."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_text, value))}]"
     if not is_dataclass(value):
         return str(value)
-    return ", ".join(f"{f.name} {getattr(value, f.name)}" for f in fields(value))
+    held = {f.name: getattr(value, f.name) for f in fields(value)}
+    return ", ".join(f"{name} {_text(part)}" for name, part in held.items() if part not in (None, ()))

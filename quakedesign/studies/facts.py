@@ -9,6 +9,7 @@ from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.impossibility import longest_reaction
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault, fault_toml
+from quakedesign.fault.defaults import AGEINGS, sliding_step
 from quakedesign.rationals import rational
 from quakedesign.studies.needed_pressure import need_sentence, needed_pressure, ways
 from quakedesign.symbolic import derive
@@ -60,6 +61,7 @@ def fault_sentences(fault: Fault) -> list[str]:
         *(f"assumed: {said}" for said in fault.assumed),
         f"{state}; eigenvalues {poles} 1/s",
         sampling_sentence(sampling_adequacy(fault)),
+        *_sliding_sentence(fault),
         *beyond_control(fault),
         *([need_sentence(needed)] if (needed := needed_pressure(fault)) else []),
     ]
@@ -84,6 +86,16 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
         f"{adequacy.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
         f"{'' if adequacy.adequate else '; guarantee says whether something is proved at this T_s all the same'}"
     )
+
+
+def _sliding_sentence(fault: Fault) -> list[str]:
+    """Which T_s suits a guarantee of slow sliding, where the fault's is more than a factor two off."""
+    if not fault.friction.state_names:
+        return []
+    suits = sliding_step(fault.friction, fault.reference)
+    if suits / 2 <= fault.sampling_time <= 2 * suits:
+        return []
+    return [f"a guarantee of slow sliding wants sampling_time near D_c/({AGEINGS:g} V), here {suits:g} s"]
 
 
 def beyond_control(fault: Fault) -> list[str]:

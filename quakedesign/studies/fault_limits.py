@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.bounds import Bound, LowerBound, UpperBound
-from quakedesign.certificates.guarantee import Guarantee, Task, task_of
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task, task_of
 from quakedesign.certificates.impossibility import (
     farthest_well,
     longest_diffusion,
@@ -21,7 +21,7 @@ from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.synthesis.guaranteed import design_held, longest_delay, reached
-from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
+from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer, answer_sliding
 from quakedesign.synthesis.linear.plant.sliding_model import near_path, sliding_model
 
 _ATTEMPTS = 6  # designs for one time
@@ -239,7 +239,9 @@ def limits(
     task, step = task_of(fault), rational(fault.sampling_time)
     withdrawal, spread = _given(fault, pressure, diffusivity)
     held = _proved_steps(task, step) if prove else ()
-    own = next((g for g in held if g.held.step == step), None)
+    if own := next((g for g in held if g.held.step == step), None):
+        own = _best_at(own)
+        held = tuple(own if g.held.step == step else g for g in held)
     peak, proved = smallest_peak(task, step), dict[str, Bound | None]()
     if held:
         proved["largest_step"] = LowerBound(held[-1].held.step)
@@ -311,7 +313,7 @@ def _sliding_limits(
     if amplitude is None or amplitude <= 0:
         raise ParameterError(
             "limits of slow sliding need a shear stress above 0 that pushes the fault. Received none, and no design "
-            "was found that stands any. Give --stress, such as '25 kPa'."
+            f"was found that stands any{_why(answer)}. Give --stress, such as '25 kPa'."
         )
     push = SlidingPush(model=model, amplitude=amplitude)
     proved: dict[str, Bound | None] = {}
@@ -334,12 +336,23 @@ def _sliding_limits(
     )
 
 
+def _why(answer: SlidingAnswer | None) -> str:
+    return f": {answer.found.reason}" if answer is not None and isinstance(answer.found, NoGuarantee) else ""
+
+
 def _above_the_reference(found: SlidingGuarantee) -> UpperBound:
     return UpperBound(found.peak_slip_rate - found.task.rate)
 
 
 def _proved_steps(task: Task, step: Fraction) -> tuple[Guarantee, ...]:
     return reached(lambda held: design_held(task, held, objective="peak"), step, attempts=_ATTEMPTS)
+
+
+def _best_at(least_peak: Guarantee) -> Guarantee:
+    """Of a design for the smallest slip-rate error and one that tracks, that with the smaller one that is proved."""
+    tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking")
+    found = [least_peak, *([tracking] if isinstance(tracking, Guarantee) else [])]
+    return min(found, key=lambda g: g.claims.slip_rate_error)
 
 
 def _proved_delay(task: Task, step: Fraction) -> LowerBound | None:

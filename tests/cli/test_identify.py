@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from quakedesign.cli import main
-from quakedesign.fault import load_fault
+from quakedesign.fault import fault_toml, load_fault
 
 
 def run(capsys, *arguments):
@@ -47,9 +47,9 @@ def test_text_keeps_within_80_columns_and_says_what_is_not_from_the_record(recor
     code, out, _ = run(capsys, *told)
     assert code == 0
     assert "every parameter identified" in out
-    assert "all but the friction" not in out
+    assert "not from the record" not in out
     written = run(capsys, *told, "--out", str(tmp_path / "own.toml"))[1]
-    assert "all but the friction is that of lab-fault: normal stress, size, task, T_s, disturbance" in written
+    assert "from lab-fault, not from the record: normal stress, size, task, T_s, disturbance" in written
     assert max(map(len, out.splitlines())) <= 80
 
 
@@ -75,6 +75,8 @@ def test_what_cannot_be_told_is_said_and_no_file_written(tmp_path, capsys):
         (("--fault", "nowhere"), "fault must be a preset"),
         (("--out", "nowhere/found.toml"), "must be in a folder that can be written"),
         ((), "needs the motion of the load point"),
+        (("--seed", "-1"), "seed must be a whole number of at least 0"),
+        (("--out", "same.svg", "--figure", "same.svg"), "--out and --figure must be different files"),
     ],
 )
 def test_nonsense_is_refused_in_one_line(record, monkeypatch, tmp_path, capsys, more, said):
@@ -82,3 +84,24 @@ def test_nonsense_is_refused_in_one_line(record, monkeypatch, tmp_path, capsys, 
     code, out, err = run(capsys, record, "--normal-stress", "5 MPa", *more)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert said in err
+
+
+@pytest.mark.parametrize("option", ["--out", "--figure"])
+def test_a_record_is_never_replaced_by_its_answer(record, capsys, tmp_path, option):
+    data = tmp_path / "record.svg"
+    data.write_text(record.read_text())
+    (tmp_path / "link.svg").symlink_to(data)
+    for place in (data, tmp_path / "link.svg"):
+        code, out, err = run(capsys, data, option, place, "--force")
+        assert (code, out) == (2, "")
+        assert "the record must be different files" in err
+    assert data.read_text() == record.read_text()
+
+
+def test_nor_is_the_fault(record, capsys, tmp_path):
+    (tmp_path / "own.toml").write_text(fault_toml(load_fault("lab-fault")))
+    given = (record, "--fault", tmp_path / "own.toml", "--out", tmp_path / "own.toml", "--force")
+    code, _, err = run(capsys, *given)
+    assert code == 2
+    assert "--out and --fault must be different files" in err
+    assert load_fault(tmp_path / "own.toml").name == "lab-fault"

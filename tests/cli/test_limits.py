@@ -8,6 +8,7 @@ import pytest
 from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.cli import main
+from quakedesign.fault import fault_toml, load_fault
 from quakedesign.studies import fault_limits
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
 
@@ -90,3 +91,24 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
 def test_a_stress_that_does_not_apply_is_refused(given, said, capsys):
     assert run(*given) == 2
     assert said in capsys.readouterr().err
+
+
+def test_where_no_design_stands_a_stress_the_reason_is_told(capsys, monkeypatch):
+    """A sampling time that suits no law would else look like a missing option."""
+    none = NoGuarantee(reason="T_s near 0.51 s suits", small_gain=None)
+    answer = SlidingAnswer(found=none, task=None, held=None)
+    monkeypatch.setattr(fault_limits, "answer_sliding", lambda fault, **asked: answer)
+    assert run("crustal-patch") == 2
+    assert "no design was found that stands any: T_s near 0.51 s suits. Give --stress" in capsys.readouterr().err
+
+
+def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, monkeypatch, tmp_path):
+    """Softer than steady sliding needs, but the error swings while it grows."""
+    file = tmp_path / "swings.toml"
+    patch = load_fault("double-direct-shear")
+    file.write_text(fault_toml(patch))
+    known = parse_sliding((PROOFS / "sliding_crustal-patch.json").read_text())
+    answer = SlidingAnswer(found=known, task=known.task, held=known.held)
+    monkeypatch.setattr(fault_limits, "answer_sliding", lambda fault, **asked: answer)
+    assert run(str(file)) == 0
+    assert "errors of this fault swing while they grow, or do not grow" in " ".join(capsys.readouterr().out.split())

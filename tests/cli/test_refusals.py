@@ -227,3 +227,33 @@ def test_a_compiler_that_cannot_be_read_is_none(capsys, monkeypatch):
     monkeypatch.setenv("CC", "'x")
     code, _, err = run(capsys, "simulate", "lab-fault", "--duration", "0.01", "--json")
     assert (code, err) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("given", "where"),
+    [
+        (("guarantee", "lab-fault", "--step", "-1 ms"), "joined by =. See quakedesign guarantee --help."),
+        (("guarantee", "lab-fault", "lab-fault"), "See quakedesign guarantee --help."),
+        (("--json", "fault", "lab-fault"), "See quakedesign --help."),
+        (("fault", "lab-fault", "--where", "x"), "See quakedesign fault --help."),
+    ],
+)
+def test_what_is_in_the_wrong_place_is_told_where_to_look(given, where, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(list(given))
+    err = capsys.readouterr().err
+    assert (end.value.code, err.count("\n")) == (2, 1)
+    assert err.rstrip().endswith(where)
+
+
+def test_a_value_that_is_wrong_has_its_own_remedy(capsys):
+    with pytest.raises(SystemExit):
+        main(["guarantee", "lab-fault", "--step=-1 ms"])
+    assert "--help" not in capsys.readouterr().err
+
+
+def test_a_folder_is_no_certificate(tmp_path, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["check", str(tmp_path)])
+    assert end.value.code == 2
+    assert f"certificate must be a file. Received {tmp_path}, which is none" in capsys.readouterr().err

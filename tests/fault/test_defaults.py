@@ -139,6 +139,16 @@ fastest_rate = "1 m/s"
 """
 
 
+def test_with_a_state_the_sampling_time_is_a_twentieth_of_the_ageing_time():
+    """D_c/(20 V) at the task's mean rate, whatever the mass; a thousandth of the task where that is shorter."""
+    head = PLAIN[: PLAIN.index("law =")]
+    for days, expected in ((2, 1e-3 * 2 * 86400 / (20 * 0.05)), (0.0002, None)):
+        task = f'[task]\ntarget_slip = "5 cm"\noperation_time = "{days} days"\n'
+        fault = parse_fault(f"{head}{RATE}{task}", "own.toml")
+        assert fault.sampling_time == floored(expected or 86.4 * days, 2)
+        assert any("near D_c/(20 V) in slow sliding" in said for said in fault.assumed)
+
+
 def test_symbols_are_names():
     head = PLAIN[: PLAIN.index("law =")]
     law = parse_fault(f"{head}{RATE}{TASK}", "own.toml").friction

@@ -12,8 +12,8 @@ import pytest
 
 from quakedesign.certificates.slow_sliding import sliding_task
 from quakedesign.errors import ParameterError, RecordError, UnsupportedError
-from quakedesign.fault import friction_law, load_fault
-from quakedesign.identification import Estimate, Record, cover, identified_fault, identify, save_fault
+from quakedesign.fault import Disturbance, friction_law, load_fault
+from quakedesign.identification import Estimate, Record, cover, identified_fault, identify, other_parts, save_fault
 from quakedesign.identification.setup import set_up
 from quakedesign.rationals import rational
 
@@ -188,6 +188,23 @@ def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, nam
         assert "design and guarantee are for rate-and-state-aging alone." in path.read_text()
     else:
         assert "--spread 0.063 of design and guarantee holds" in path.read_text()
+
+
+def test_friction_with_a_state_brings_its_sampling_time_unless_the_fault_has_one_for_it(weak):
+    """The laboratory's 1 ms is for slip weakening; D_c/(20 V) with V = 7.1 mm/3600 s is 0.507 s for D_c = 20 µm."""
+    lab, patch = load_fault("lab-fault"), load_fault("crustal-patch")
+    aged = replace(weak, law=patch.friction)
+    assert identified_fault(aged, lab).sampling_time == 3.6  # a thousandth of the hour; D_c/(20 V) is 203 s
+    quick = replace(aged, law=replace(patch.friction, critical_slip=2e-5))
+    assert identified_fault(quick, lab).sampling_time == 0.50  # 0.507 s rounded down
+    assert identified_fault(quick, patch).sampling_time == patch.sampling_time
+    assert identified_fault(weak, lab).sampling_time == lab.sampling_time
+    assert other_parts(quick, lab) == "normal stress, size, task"
+    assert (
+        identified_fault(quick, lab).disturbance == Disturbance()
+    )  # a stress is told to what runs it, not to the fault
+    assert identified_fault(weak, lab).disturbance == lab.disturbance != Disturbance()
+    assert other_parts(weak, lab) == other_parts(quick, patch) == "normal stress, size, task, T_s, disturbance"
 
 
 @pytest.mark.parametrize(

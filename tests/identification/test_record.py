@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from quakedesign.errors import QuakedesignError
+from quakedesign.errors import QuakedesignError, RecordError
 from quakedesign.identification import read_record
 
 HEAD = "time [ms], load_point_displacement [um], shear_stress [MPa], normal_stress [kPa]"
@@ -63,3 +63,18 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, lines, said):
     with pytest.raises(QuakedesignError, match=said) as refused:
         read_record(written(tmp_path, *lines))
     assert "\n" not in str(refused.value)
+
+
+def test_a_line_of_headings_alone_is_no_record(tmp_path):
+    path = tmp_path / "none.csv"
+    path.write_text("time [s], load_point_displacement [um], shear_stress [MPa], normal_stress [MPa]\n# a remark\n")
+    with pytest.raises(RecordError, match=r"must have samples\. Received .*none\.csv"):
+        read_record(path)
+
+
+@pytest.mark.parametrize("sign", [";", "\t"])
+def test_other_signs_between_columns_are_named(tmp_path, sign):
+    path = tmp_path / "signs.csv"
+    path.write_text(f"time [s]{sign} friction\n0{sign} 0.6\n")
+    with pytest.raises(RecordError, match="Put commas between columns"):
+        read_record(path)

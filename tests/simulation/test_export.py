@@ -178,6 +178,19 @@ def test_a_sensed_controller_measures_the_slip_alone_and_leaves_the_noise_to_the
     assert controller_step(LAB, PUBLISHED["cta"], scheme=noisy).start == plain.start
 
 
+def test_a_header_writes_exact_numbers_plainly(tmp_path):
+    law = export_controller(LAB, SAMPLED, tmp_path / "c").facts["law"]
+    assert law.startswith("states [predicted_rate, disturbance], update [[0, 0], [")
+    assert "feedback [-149400000, -" in law
+    assert "Fraction" not in law
+    assert "None" not in law
+
+
+def test_a_law_of_slow_sliding_is_refused():
+    with pytest.raises(ParameterError, match="a controller in C needs a friction law of slip and slip rate alone"):
+        controller_step(load_fault("crustal-patch"), PUBLISHED["elqr"])
+
+
 def test_no_text_of_the_user_ends_the_comment(tmp_path, monkeypatch):
     monkeypatch.setattr(type(PUBLISHED["elqr"]), "title", "*/ #error \n#error")
     export_controller(LAB, PUBLISHED["elqr"], tmp_path / "c")

@@ -13,6 +13,7 @@ from quakedesign.certificates.impossibility import longest_reaction
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
 from quakedesign.loop import summed_integrals
+from quakedesign.rationals import rational
 from quakedesign.report.limits import limits_figure, limits_lines
 from quakedesign.studies import limits as study
 from quakedesign.studies.facts import beyond_control
@@ -37,10 +38,13 @@ def _natural_peak(monkeypatch):
 @pytest.fixture
 def designs(monkeypatch):
     """Designs that have a guarantee up to a longest T_s and a longest delay; the pairs that were asked for."""
-    asked, longest = [], {"step": F(4, 5), "delay": F(95, 1000)}
+    asked, longest = [], {"step": F(4, 5), "delay": F(95, 1000), "tracking": F(3, 10**4)}
 
     def designed(task, step, *, objective, delay=F(0)):
-        assert objective == "peak"
+        if objective == "tracking":
+            assert (step, delay) == (rational(REAL.sampling_time), 0)
+            claims = dataclasses.replace(CLAIMS, slip_rate_error=UpperBound(longest["tracking"]))
+            return Guarantee(task=task, held=Held(law=LAW, step=step, delay=delay), claims=claims)
         asked.append((step, delay))
         if step > longest["step"] or delay > longest["delay"]:
             return NoGuarantee(reason="too long", small_gain=None)
@@ -69,6 +73,14 @@ def test_both_sides_of_the_real_fault(designs):
         assert isinstance(limit.impossible_beyond, LowerBound | UpperBound)
         if limit.proved_up_to is not None:
             assert type(limit.proved_up_to) is not type(limit.impossible_beyond)
+
+
+@pytest.mark.parametrize("tracking", [F(1, 10**4), F(3, 10**4)])
+def test_what_is_proved_of_the_slip_rate_is_the_better_of_both_objectives(designs, tracking):
+    designs[1]["tracking"] = tracking
+    found = study(REAL)
+    assert found.peak_slip_rate_error.proved_up_to == min(tracking, CLAIMS.slip_rate_error)
+    assert found.achieved[0] == (rational(REAL.sampling_time), min(tracking, CLAIMS.slip_rate_error))
 
 
 @pytest.mark.parametrize(("step", "said"), [(0.184, False), (5.0, True), (40.0, False)])

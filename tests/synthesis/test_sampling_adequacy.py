@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.fault import Disturbance, load_fault
 from quakedesign.fault.friction import friction_law
-from quakedesign.studies.facts import sampling_sentence
+from quakedesign.studies.facts import fault_sentences, sampling_sentence
 from quakedesign.synthesis.analysis.sampling_adequacy import sampling_adequacy
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
@@ -83,3 +83,12 @@ def test_friction_with_a_state_is_judged_in_slow_sliding_along_its_task(width):
     assert not found.over_box
     assert found.pole == pytest.approx(max(abs(roots)), rel=1e-9)
     assert min(roots.real) > 0
+
+
+@pytest.mark.parametrize(("factor", "said"), [(0.49, True), (0.51, False), (1.99, False), (2.1, True)])
+def test_a_state_asks_for_a_sampling_time_of_its_own_when_that_of_the_fault_is_far_off(factor, said):
+    """A twentieth of D_c/V, where what a run-away allows is much longer."""
+    patch = load_fault("crustal-patch")
+    step = patch.friction.critical_slip * patch.reference.operation_time / (20 * patch.reference.target_slip)
+    lines = fault_sentences(replace(patch, sampling_time=factor * step))
+    assert (f"a guarantee of slow sliding wants sampling_time near D_c/(20 V), here {step:g} s" in lines) is said

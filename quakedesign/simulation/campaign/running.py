@@ -13,6 +13,7 @@ import numpy as np
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
+from quakedesign.fault.checks import require_seed
 from quakedesign.loop.schemes import Scheme, own_way, simulation_scheme
 from quakedesign.rationals import rational
 from quakedesign.simulation.campaign.crews import Cluster, Given
@@ -22,7 +23,7 @@ from quakedesign.simulation.campaign.problem import Problem, Program, SampleResu
 from quakedesign.simulation.campaign.result import Campaign, Failure, badness, metric_names, require_metric
 from quakedesign.simulation.campaign.search import Worst, search
 from quakedesign.simulation.campaign.sliding import SlidingProblem, sliding_space
-from quakedesign.simulation.campaign.space import Sample, Space, require_count, require_seed
+from quakedesign.simulation.campaign.space import Sample, Space, require_count
 from quakedesign.simulation.campaign.stepped import SteppedProblem
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.integrators.dormand_prince import DormandPrince

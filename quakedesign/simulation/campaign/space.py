@@ -123,14 +123,3 @@ def require_count(samples: int) -> None:
     """
     if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
         raise ParameterError(f"samples must be a whole number, 1 to {MOST_SAMPLES}. Received {samples!r}.")
-
-
-def require_seed(seed: int) -> None:
-    """Refuse what is no seed.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise ParameterError(f"seed must be a whole number of at least 0. Received {seed!r}.")

@@ -24,6 +24,7 @@ from quakedesign.certificates.slow_sliding.theorem import (
     model_of,
 )
 from quakedesign.errors import ParameterError
+from quakedesign.fault.defaults import AGEINGS
 from quakedesign.loop import LinearLaw, SlidingModel
 from quakedesign.synthesis.guaranteed.estimate import gains_of
 from quakedesign.synthesis.guaranteed.poles import spectral_radius
@@ -39,7 +40,6 @@ _STARTS = (
 _SIMPLEX = (0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.05, 0.05, 0.05)
 _EVALUATIONS = 120
 _FORGETTING = 0.972  # largest eigenvalue of a period, so that the proof need not sum many
-_PER_AGEING = 20  # periods in D/V that are few enough to be summed and many enough to control
 _GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}  # over Y, pressures in 2a of the normal stress
 _TURNS = 6
 _SHRINKING = 24
@@ -143,10 +143,10 @@ def designed_sliding(task: SlidingTask, step: Fraction, **around: Unpack[Around]
     reached = minimize(cost, best, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": _EVALUATIONS})
     chosen = held(reached.x)
     if chosen is None or reached.fun >= _FAILED / 2:
-        suits = float(task.ranges["critical_slip"][0] / task.rate) / _PER_AGEING
+        suits = float(task.ranges["critical_slip"][0] / task.rate) / AGEINGS
         reason = (
             f"no law held over {float(step):g} s was found whose loop is stable and forgets within some hundred "
-            f"periods; T_s near D_c/{_PER_AGEING}V, here {suits:.2g} s, suits"
+            f"periods; T_s near D_c/({AGEINGS:g} V), here {suits:.2g} s, suits: set sampling_time in [task]"
         )
         return NoGuarantee(reason=reason, small_gain=None)
     return chosen
