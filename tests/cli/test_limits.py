@@ -107,7 +107,7 @@ def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, m
     file = tmp_path / "swings.toml"
     patch = load_fault("double-direct-shear")
     file.write_text(fault_toml(patch))
-    known = parse_sliding((PROOFS / "sliding_crustal-patch.json").read_text())
+    known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     answer = SlidingAnswer(found=known, task=known.task, held=known.held)
     monkeypatch.setattr(fault_limits, "answer_sliding", lambda fault, **asked: answer)
     assert run(str(file)) == 0
