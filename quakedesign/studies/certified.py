@@ -12,7 +12,7 @@ from quakedesign.certificates import Certificate, Loop, Verdict
 from quakedesign.errors import CertificateError, ParameterError, require_known
 from quakedesign.rationals import rational
 from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.synthesis.analysis.certify import Number, certify, closed_loop
+from quakedesign.synthesis.analysis.certify import Number, closed_loop, proof
 from quakedesign.synthesis.analysis.margins import (
     Reach,
     against,
@@ -140,11 +140,10 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
     hopeless = limit is not None and bound >= limit
     if decay and not hopeless:
         fast = fastest_settling(name, gains, lipschitz=lipschitz, gain_range=ends, start=bound or Fraction(1))
-    certificate = fast[0] if fast else refute(loop, name)
-    if certificate is None and not hopeless:
-        certificate = certify(name, gains, lipschitz=lipschitz, gain_range=ends)[1]
-    proved = _verdict(certificate) is Verdict.PROVED
-    kind = "none" if proved else against(loop, name)[0]
+    refuted = None if fast else refute(loop, name)
+    certificate = fast[0] if fast else refuted or (None if hopeless else proof(loop, name))
+    proved = certificate is not None and refuted is None
+    kind = "none" if proved else against(loop, refuted)
     excluded = [] if proved or kind == "exact" else _excluded(loop)
     told = fast[1] if fast else None
     facts = _facts(

@@ -56,8 +56,13 @@ def certify(
         For the name of an unknown law.
     """
     loop = closed_loop(subject, gains, lipschitz=lipschitz, gain_range=gain_range)
-    certificate = refute(loop, subject) or find_certificate(loop, subject=subject) or _swept(loop, subject)
+    certificate = refute(loop, subject) or proof(loop, subject)
     return (certificate.check(subject), certificate) if certificate else (Verdict.UNDECIDED, None)
+
+
+def proof(loop: Loop, subject: Subject) -> Certificate | None:
+    """Proof of a loop without a counterexample, or None."""
+    return find_certificate(loop, subject=subject) or _swept(loop, subject)
 
 
 def _swept(loop: Loop, subject: Subject) -> Certificate | None:

@@ -201,20 +201,14 @@ def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
     return min(limits, default=None)
 
 
-def against(loop: Loop, subject: Subject) -> tuple[str, Certificate | None]:
-    """What speaks against a loop without a proof.
+def against(loop: Loop, refuted: Certificate | None) -> str:
+    """What speaks against a loop without a proof, of which a counterexample is known or none.
 
-    Returns
-    -------
-    kind : str
-        ``"exact"`` for an equilibrium away from the origin, ``"simulated"`` for a run that grows, else ``"none"``.
-    certificate : Certificate or None
-        The exact counterexample, checked.
+    ``"exact"`` for an equilibrium away from the origin, ``"simulated"`` for a run that grows, else ``"none"``.
     """
-    refuted = refute(loop, subject)
     if refuted is not None:
-        return "exact", refuted
-    return ("simulated" if escape(loop) is not None else "none"), None
+        return "exact"
+    return "simulated" if escape(loop) is not None else "none"
 
 
 def _reach(line: _Line, subject: Subject, degrees: tuple[int, ...], began: float) -> Reach:
@@ -236,7 +230,9 @@ def _reach(line: _Line, subject: Subject, degrees: tuple[int, ...], began: float
             break
     kind = "none"
     if certificate is None:
-        kind, certificate = against(line.at(line.floor), subject)
+        loop = line.at(line.floor)
+        certificate = refute(loop, subject)
+        kind = against(loop, certificate)
     return Reach(
         quantity=line.quantity,
         value=value,
