@@ -70,8 +70,8 @@ def states(comparison: "Compared") -> Any:
 
 
 def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, float]) -> None:
-    divisor, size = sizes
     """Curves that lie on each other, each narrower than the one below it."""
+    divisor, size = sizes
     runs = runs_of(comparison.of(origin))
     for place, (entry, run) in enumerate(runs):
         width = 1.5 * (len(runs) - place)
