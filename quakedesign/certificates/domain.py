@@ -113,6 +113,10 @@ class Question:
         """|h'|/L̄ on {V ≤ level}, errors and control included; at most 1 where the certificate speaks."""
         return self._rate(self.sets.errors(level), pieces=pieces) / self.allowed
 
+    def holds_whole(self, level: Fraction) -> bool:
+        """Whether `whole` is below 1; what it is, is not asked."""
+        return self._rate(self.sets.errors(level), pieces=_PIECES, limit=self.allowed) < self.allowed
+
     def split(self, level: Fraction, errors: Errors | None = None) -> dict[str, Fraction] | None:
         """Shares of the decrease of V that the errors' part of h takes on {V ≤ level}, by error.
 
@@ -134,7 +138,7 @@ class Question:
     def _added(self) -> dict[str, Any]:
         return {"feedforward": self.controller.feedforward}
 
-    def _rate(self, errors: Errors, **options: int) -> Fraction:
+    def _rate(self, errors: Errors, **options: Any) -> Fraction:
         return largest_matched_rate(self.fault, self.controller.divisor, errors, **options, **self._added)
 
 
@@ -155,7 +159,7 @@ def certified_domain(question: Question) -> Domain:
         return _domain(question, Fraction(0), "", "the control coefficient β, which leaves its certified range")
 
     def whole(step: int) -> bool:
-        return question.whole(_level(step, question.sets.degree)) < 1
+        return question.holds_whole(_level(step, question.sets.degree))
 
     split = _largest_split(question)
     low = _STEPS[0] if split is None else split

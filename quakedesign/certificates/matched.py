@@ -159,7 +159,13 @@ def static_friction(fault: Fault) -> Fraction:
 
 @lru_cache(maxsize=256)
 def largest_matched_rate(
-    fault: Fault, divisor: Fraction, errors: Errors, *, pieces: int = 120, feedforward: FeedForward = NONE
+    fault: Fault,
+    divisor: Fraction,
+    errors: Errors,
+    *,
+    pieces: int = 120,
+    feedforward: FeedForward = NONE,
+    limit: Fraction | None = None,
 ) -> Fraction:
     """Rigorous bound on |h'| [unit of ν per s] over the uncertainty box, the reference and the disturbance class.
 
@@ -177,9 +183,11 @@ def largest_matched_rate(
         Largest number of subdivisions; fewer give a larger bound.
     feedforward : FeedForward
         What the law adds to ν, and so to h.
+    limit : Fraction, optional
+        As in `upper_bound`, where it is asked only whether the bound is below that [unit of ν per s].
     """
     expression = rate_expression(fault, divisor, feedforward)
-    return upper_bound(expression, known_ranges(fault) | errors.ranges(), pieces=pieces)
+    return upper_bound(expression, known_ranges(fault) | errors.ranges(), pieces=pieces, limit=limit)
 
 
 @lru_cache(maxsize=256)

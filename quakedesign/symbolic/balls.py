@@ -208,7 +208,12 @@ def _monotone(exponent: sp.Expr, *, signed: bool) -> Operation:
 
 
 def upper_bound(
-    expression: sp.Expr, box: Box, *, tolerance: Fraction = Fraction(1, 100), pieces: int = 1500
+    expression: sp.Expr,
+    box: Box,
+    *,
+    tolerance: Fraction = Fraction(1, 100),
+    pieces: int = 1500,
+    limit: Fraction | None = None,
 ) -> Fraction:
     """Rigorous upper bound of |expression| over a box, by subdivision.
 
@@ -220,6 +225,8 @@ def upper_bound(
         Stop when the bound is within this share of a value that is attained.
     pieces : int
         Largest number of subdivisions; the bound is rigorous whenever it stops.
+    limit : Fraction, optional
+        Stop as soon as the bound is below that, or never will be, where nothing else is asked.
 
     Returns
     -------
@@ -232,8 +239,8 @@ def upper_bound(
     """
     order = count()
     operations = _compiled(sp.sympify(expression))
-    symbols = [s for s in box if s in expression.free_symbols]
-    start = {s: box[s] for s in symbols}
+    free = expression.free_symbols
+    start = {symbol: ends for symbol, ends in box.items() if symbol in free}
     values = operations.values(_balls(start))
     attained = Fraction(0)
     heap = [(-_upper(values[-1]), next(order), start, values)]
@@ -242,6 +249,8 @@ def upper_bound(
         middle = {s: ((a + b) / 2,) * 2 for s, (a, b) in worst.items()}
         attained = max(attained, _lower(operations.value(_balls(middle))))
         if -bound <= attained * (1 + tolerance):
+            break
+        if limit is not None and (-bound < limit or limit <= attained < -bound < float("inf")):
             break
         heapq.heappop(heap)
         for part, found in _halves(operations, worst, values):

@@ -57,7 +57,7 @@ class Feedforward:
 def simple(monkeypatch):
     """|h'| = 1 + 3|e1| and sensitivities 2 + |e1| and 4 + |e2|; the cause is not asked for."""
 
-    def rate(fault, divisor, errors, *, pieces=None, feedforward):
+    def rate(fault, divisor, errors, *, pieces=None, feedforward, limit=None):
         return 1 + 3 * errors.slip
 
     def sensitivities(fault, divisor, errors, *, feedforward):
@@ -89,6 +89,8 @@ def test_shares_by_hand(simple):
     assert one.along_reference() == 1
     assert float(one.whole(F(4))) == pytest.approx(7 / 2)
     assert {name: float(v) for name, v in one.split(F(4)).items()} == pytest.approx({"slip": 2, "rate": 1.5})
+    assert one.holds_whole(F(1, 10))
+    assert not one.holds_whole(F(1, 9))
     at_rest = one.split(F(4), Errors())
     assert {name: float(v) for name, v in at_rest.items()} == pytest.approx({"slip": 1, "rate": 1})
 

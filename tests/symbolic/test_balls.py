@@ -293,6 +293,24 @@ def test_a_bound_stops_near_a_value_that_is_attained():
     assert F(1, 4) * F(11, 10) < one <= 1
 
 
+@pytest.mark.parametrize(
+    ("limit", "least", "most"),
+    [(F(2), 1, 1.001), (F(1), 0.5, 0.501), (F(1, 2), 0.375, 0.376), (F(1, 4), 1, 1.001), (F(1, 8), 1, 1.001)],
+)
+def test_beside_a_limit_a_bound_stops_once_that_is_decided(limit, least, most):
+    """x (1 − x) on [0, 1]: at most 1, halved 1/2, halved again 3/8; it attains 1/4, so no bound is below that."""
+    found = upper_bound(x * (1 - x), {x: (F(0), F(1))}, limit=limit)
+    assert least <= found <= most
+    assert (found < limit) == (limit > F(1, 4))
+
+
+def test_beside_a_limit_a_bound_is_found_where_the_first_is_not_finite():
+    """1/(1 + x − 4x²) on [0, 3/5]: 25/4 at the end, and in the middle more than the limit from the first on."""
+    expression, box = 1 / (1 + x - 4 * x**2), {x: (F(0), F(3, 5))}
+    assert not enclose(expression, box).is_finite()
+    assert upper_bound(expression, box, limit=F(1, 2)) >= F(25, 4)
+
+
 @pytest.mark.parametrize("tolerance", [F(0), F(1, 2)])
 @pytest.mark.parametrize("value", [0, -7])
 def test_the_search_ends_where_the_bound_is_attained(value, tolerance):
