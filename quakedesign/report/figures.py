@@ -95,6 +95,8 @@ _SHOWN = {
 
 def metrics(comparison: "Compared") -> Any:
     """Bars of four metrics in their units."""
+    from matplotlib.ticker import NullFormatter
+
     drawing, axes = figure(2, 3.7, columns=2, sharey=True)
     settled = [(e, run) for e, run in runs_of(comparison.entries) if run.metrics.max_slip_error is not None]
     for axis, (name, title) in zip(axes.ravel(), _SHOWN.items(), strict=True):
@@ -109,6 +111,7 @@ def metrics(comparison: "Compared") -> Any:
         axis.set_xlabel(f"{title} [{unit}]")
         if name != "rms_pressure" and min(values, default=0) > 0:
             axis.set_xscale("log")
+            axis.xaxis.set_minor_formatter(NullFormatter())
             axis.set_xlim(min(values) / 3, max(values) * 10)
         else:
             axis.set_xlim(right=max(values, default=1) * 1.3 or 1)

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from quakedesign.studies.comparison import Compared, Entry
     from quakedesign.studies.state_runs import StateRun
 
-_YEAR = 31_557_600.0
 _PER_BAND = 16  # instants, four periods
 
 
@@ -27,12 +26,13 @@ def cycle(comparison: "Compared", natural: "StateRun") -> Any:
     run, name = natural.trajectory, comparison.fault.name
     drawing, ((slip,), (rate,)) = figure(2, 3.6)
     size, unit = length(float(run.slip.max()))
-    slip.plot(run.time / _YEAR, run.slip / size, color=NATURAL)
+    divisor, passing = clock(float(run.time[-1]))
+    slip.plot(run.time / divisor, run.slip / size, color=NATURAL)
     slip.set_ylabel(f"slip [{unit}]")
-    rate.semilogy(run.time / _YEAR, run.slip_rate, color=NATURAL)
+    rate.semilogy(run.time / divisor, run.slip_rate, color=NATURAL)
     rate.axhline(natural.loading_rate, color="grey", linestyle=":", label="loading rate")
     rate.set_ylabel("slip rate [m/s]")
-    rate.set_xlabel("time [years]")
+    rate.set_xlabel(f"time [{passing}]")
     rate.legend(loc="upper right", fontsize=SMALL)
     made = f"method {run.provenance['method']}, tolerance {run.provenance['rtol']:g}, with inertia"
     return finish(drawing, f"{name} without control", [], made)
@@ -64,6 +64,7 @@ def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
     (steady,) = map(float, fault.friction.steady_state(float(speed[0])))
     _filled(state, time, run.theta / steady, shade)
     state.set_ylabel("state / steady [-]")
+    state.set_ylim(min(state.get_ylim()[0], 0.99), max(state.get_ylim()[1], 1.01))
     state.set_xlabel(f"time [{unit}]")
     shaken = f"shear stress up to {float(np.abs(run.stress).max()) / 1e3:.3g} kPa"
     note = f"bands between the extremes of {_PER_BAND} instants; {shaken}"

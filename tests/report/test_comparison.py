@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,6 +12,7 @@ from quakedesign.certificates.premises import Premise
 from quakedesign.errors import OutputError
 from quakedesign.fault import Reference
 from quakedesign.report import Comparison, Entry, headline
+from quakedesign.report.figures import metrics
 from quakedesign.report.folder import write_folder
 from quakedesign.report.headlines import remarks
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
@@ -63,6 +65,18 @@ def test_every_axis_of_every_figure_has_a_label_with_a_unit(comparison):
         assert any("[" in axis.get_xlabel() for axis in figure.axes)
 
 
+def test_bars_of_nearly_equal_values_name_no_crowded_parts_of_a_decade(comparison):
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    runs = [entry for entry in comparison.entries if entry.run is not None]
+    equal = replace(runs[0].run.metrics, pressure_total_variation=4.98e6, max_slip_error=2e-8)
+    entries = [replace(entry, run=replace(entry.run, metrics=equal)) for entry in runs]
+    drawn = metrics(SimpleNamespace(fault=comparison.fault, entries=entries))
+    FigureCanvasAgg(drawn).draw()
+    for axis in drawn.axes:
+        assert not any(tick.label1.get_text() for tick in axis.xaxis.get_minor_ticks())
+
+
 def test_no_tick_label_covers_another_and_no_text_leaves_its_figure(comparison):
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -70,7 +84,8 @@ def test_no_tick_label_covers_another_and_no_text_leaves_its_figure(comparison):
         FigureCanvasAgg(figure).draw()
         for side in (side for axis in figure.axes for side in (axis.xaxis, axis.yaxis)):
             low, high = side.get_view_interval()
-            shown = [tick.label1 for tick in side.get_major_ticks() if low <= tick.get_loc() <= high]
+            ticks = sorted((*side.get_major_ticks(), *side.get_minor_ticks()), key=lambda tick: tick.get_loc())
+            shown = [tick.label1 for tick in ticks if low <= tick.get_loc() <= high]
             boxes = [label.get_window_extent() for label in shown if label.get_visible() and label.get_text()]
             assert not any(one.overlaps(other) for one, other in pairwise(boxes)), (name, side.axes.get_title())
         for text in (*figure.texts, figure._suptitle):

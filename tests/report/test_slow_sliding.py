@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from quakedesign.cli import main
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.report.folder import write_folder
+from quakedesign.report.sliding_figures import cycle
 from quakedesign.simulation import simulate_state
 from quakedesign.simulation.starting_state import sliding
 from quakedesign.studies import comparison as compared_in
@@ -158,3 +160,16 @@ def test_one_command_takes_a_preset_from_file_to_a_guaranteed_controller(preset,
     if in_event:  # what is loaded in a cycle is slipped in it, nearly all of it in its event
         loaded = load_fault(preset).friction.reference_rate * cycle["recurrence_interval"]
         assert in_event < cycle["slip"] / loaded < 1
+
+
+@pytest.mark.parametrize(("last", "unit"), [(3264.0, "min"), (30.0, "s"), (168 * 31_557_600.0, "years")])
+def test_a_cycle_is_drawn_in_a_unit_that_suits_it(last, unit):
+    time = np.linspace(0, last, 5)
+    run = SimpleNamespace(time=time, slip=time / last, slip_rate=1 + time, provenance={"method": "radau", "rtol": 1e-8})
+    drawn = cycle(
+        SimpleNamespace(fault=SimpleNamespace(name="own")), SimpleNamespace(trajectory=run, loading_rate=1e-6)
+    )
+    assert drawn.axes[1].get_xlabel() == f"time [{unit}]"
+    assert drawn.axes[0].lines[0].get_xdata()[-1] == pytest.approx(
+        last / {"min": 60, "s": 1, "years": 31_557_600}[unit]
+    )
