@@ -34,7 +34,7 @@ def test_files_are_checked_one_by_one_under_their_names(tmp_path):
     assert list(found) == list(map(str, paths))
     assert [verdict for verdict, _ in found.values()] == ["proved", "refuted"]
     for missing in (tmp_path, tmp_path / "none.json", Path("\0"), Path("x" * 5000)):
-        with pytest.raises(CertificateError, match="certificate file must exist"):
+        with pytest.raises(CertificateError, match="certificate must be a file"):
             check_files([missing])
     (tmp_path / "broken.json").write_text('{"format": 1,\n')
     verdict, said = checked(tmp_path / "broken.json")
