@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.continuous import ContinuousLaw as ContinuousLaw
     from quakedesign.loop.continuous import continuous_loop as continuous_loop
     from quakedesign.loop.continuous import exact_integrals as exact_integrals
+    from quakedesign.loop.following_limits import FollowingLimits as FollowingLimits
     from quakedesign.loop.held import SHORTEST as SHORTEST
     from quakedesign.loop.held import held_loop as held_loop
     from quakedesign.loop.held import starts as starts

@@ -1,6 +1,6 @@
 """Linear laws that run once per sample, as exact matrices."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from quakedesign.errors import ParameterError
@@ -36,6 +36,8 @@ class LinearLaw:
         What w solves; None for a linear law.
     first : tuple of rows
         S, two columns: z = S(e1, e2) at the first sample, as they are measured then; without rows 0.
+    applied : tuple of Fraction
+        What z⁺ gains per Pa that is applied beyond p, where limits cut it off; without entries the law is not told.
 
     Raises
     ------
@@ -50,6 +52,7 @@ class LinearLaw:
     feedback: Row
     root: ImplicitRoot | None = None
     first: Matrix = ()
+    applied: Row = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         seen = len(MEASURED) + (self.root is not None)
@@ -58,6 +61,11 @@ class LinearLaw:
             raise ParameterError(
                 f"first of a linear law needs {len(self.states)} rows of {len(MEASURED)} entries, or none. Received "
                 f"{len(self.first)} rows. Complete them."
+            )
+        if self.applied and len(self.applied) != len(self.states):
+            raise ParameterError(
+                f"applied of a linear law needs {len(self.states)} entries, or none. Received {len(self.applied)}. "
+                "Complete them."
             )
 
     @property
@@ -203,7 +211,8 @@ def disturbance_estimate(
     asked, pushes = answered(gains, gain, errors, level, waiting, prediction.ahead, prediction.ahead_of_pushes)
     own = unit_row(size, {size - 2: prediction.of_slip, size - 1: prediction.of_rate})
     predicted = combined((one, own), *zip(prediction.of_pushes, pushes, strict=True))
-    return law_of_rows(("predicted_rate", "disturbance"), [predicted, level], asked, waiting)
+    pushed = (gain * prediction.of_pushes[0], Fraction(0))
+    return law_of_rows(("predicted_rate", "disturbance"), [predicted, level], asked, waiting, pushed)
 
 
 def require_gain(gain: Fraction) -> None:
@@ -234,8 +243,11 @@ def answered(
     return asked, [combined((gain, asked), (one, level)), *before]
 
 
-def law_of_rows(names: tuple[str, ...], own: list[Row], asked: Row, waiting: list[Row]) -> LinearLaw:
-    """Law of rows that act on its states and then on e1 and e2; pressures on their way move one place on."""
+def law_of_rows(names: tuple[str, ...], own: list[Row], asked: Row, waiting: list[Row], pushed: Row) -> LinearLaw:
+    """Law of rows that act on its states and then on e1 and e2; pressures on their way move one place on.
+
+    Its own states gain `pushed` per Pa that is applied.
+    """
     rows = [*own, *[asked, *waiting][: len(waiting)]]
     return LinearLaw(
         states=(*names, *(f"asked_{j + 1}_ago" for j in range(len(waiting)))),
@@ -243,6 +255,7 @@ def law_of_rows(names: tuple[str, ...], own: list[Row], asked: Row, waiting: lis
         measured=tuple(row[-2:] for row in rows),
         output=asked[:-2],
         feedback=asked[-2:],
+        applied=(*pushed, *[Fraction(1), *[Fraction(0)] * len(waiting)][: len(waiting)]),
     )
 
 

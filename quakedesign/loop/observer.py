@@ -80,4 +80,5 @@ def slip_observer(
         )
         for i, (of_slip, of_rate) in enumerate(prediction.of_errors)
     ]
-    return law_of_rows(("predicted_slip", "predicted_rate", "disturbance"), [*predicted, level], asked, waiting)
+    pushed = (*(gain * v for v in prediction.of_pushes[0]), Fraction(0))
+    return law_of_rows(("predicted_slip", "predicted_rate", "disturbance"), [*predicted, level], asked, waiting, pushed)

@@ -11,6 +11,7 @@ import sympy as sp
 
 from quakedesign.controllers import Controller, LoopField, Sampling, Signals
 from quakedesign.errors import UnsupportedError
+from quakedesign.loop.following_limits import FollowingLimits
 from quakedesign.loop.laws import LinearLaw
 from quakedesign.rationals import to_sympy
 
@@ -26,6 +27,8 @@ class SampledController(Controller):
         T_s [s] for which it is meant.
     lag, diffusion : Fraction
         As of `Sampling` [s].
+    limits : FollowingLimits, optional
+        Of its pressure; its states are then told what is applied, and those of the limits follow them.
     gains : mapping of str to Fraction
         Read off the law: p = −k1·e1 − k2·e2 − Σ gain·state, every state under its name.
     """
@@ -39,13 +42,15 @@ class SampledController(Controller):
     step: Fraction
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
+    limits: FollowingLimits | None = None
 
     def __post_init__(self) -> None:
         values = (-v for v in (*self.law.feedback, *self.law.output))
         object.__setattr__(self, "gains", MappingProxyType(dict(zip(self.gain_units, values, strict=True))))
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
-        return partial(type(self), law=self.law, step=self.step, lag=self.lag, diffusion=self.diffusion), ()
+        told = {name: getattr(self, name) for name in ("law", "step", "lag", "diffusion", "limits")}
+        return partial(type(self), **told), ()
 
     @property
     def sampling(self) -> Sampling:
@@ -65,17 +70,32 @@ class SampledController(Controller):
     @property
     def integral_units(self) -> tuple[str, ...]:  # type: ignore[override]
         """One for every state; the law's own."""
-        return ("-",) * len(self.law.states)
+        return ("-",) * len(self.law.states) + (("Pa", "Pa", "m") if self.limits else ())
 
     def pressure(self, signals: Signals) -> sp.Expr:
-        """Cz + Dy [Pa]."""
-        return _combined((*self.law.output, *self.law.feedback), _read(signals))
+        """Cz + Dy within the limits [Pa]."""
+        return self._decided(signals)[0]
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
-        """(Fz + Gy − z)/T_s."""
-        rows = zip(self.law.update, self.law.measured, signals.integrals, strict=True)
-        seen = _read(signals)
-        return tuple((_combined((*own, *fed), seen) - z) / to_sympy(self.step) for own, fed, z in rows)
+        """(Fz + Gy − z)/T_s, of what the limits cut off what the law makes of it besides, and of the limits' states."""
+        cut, after = self._decided(signals)[1:]
+        z, seen, period = signals.integrals, self._read(signals), to_sympy(self.step)
+        told = self.law.applied or (Fraction(0),) * len(self.law.states)
+        rows = zip(self.law.update, self.law.measured, told, z, strict=False)
+        rates = [(_combined((*own, *fed), seen) - state) / period + to_sympy(h) * cut for own, fed, h, state in rows]
+        return (*rates, *((new - old) / period for new, old in zip(after, z[len(rates) :], strict=True)))
+
+    def _decided(self, signals: Signals) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...]]:
+        """The pressure that is applied, what that is more than is asked for, over T_s, and the limits' states after."""
+        asked = _combined((*self.law.output, *self.law.feedback), self._read(signals))
+        if self.limits is None:
+            return asked, sp.S.Zero, ()
+        states = signals.integrals[len(self.law.states) :]
+        applied, after = self.limits.cut(asked, states, signals.slip - signals.slip_error)
+        return applied, (applied - asked) / to_sympy(self.step), after
+
+    def _read(self, signals: Signals) -> tuple[Any, ...]:
+        return (*signals.integrals[: len(self.law.states)], signals.slip_error, signals.slip_rate_error)
 
     @classmethod
     def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
@@ -86,10 +106,6 @@ class SampledController(Controller):
     def loop_field(cls) -> LoopField:
         """Refuse: it has no loop in continuous time."""
         raise UnsupportedError("a sampled law has no loop in continuous time. Use a guarantee of the loop that runs.")
-
-
-def _read(signals: Signals) -> tuple[Any, ...]:
-    return (*signals.integrals, signals.slip_error, signals.slip_rate_error)
 
 
 def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Expr:

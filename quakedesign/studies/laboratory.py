@@ -17,7 +17,6 @@ from quakedesign.certificates.guarantee import Guarantee
 from quakedesign.controllers import Controller, published
 from quakedesign.fault import Disturbance, Fault, load_fault
 from quakedesign.loop.actuators import Actuator, Delay, Lag, Saturation, Stage
-from quakedesign.loop.running import SampledController
 from quakedesign.loop.schemes import own_way, simulation_scheme
 from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Sensor, SlipStage, Transducer
 from quakedesign.loop.sensing.measurement import Measurement
@@ -341,6 +340,5 @@ def guaranteed_in(
 
 def guaranteed_problem(one: Apparatus, proof: Guarantee, seed: int, *, duration: float | None = None) -> Problem:
     """Campaign of a guaranteed law in an apparatus; duration in s, the whole task unless given."""
-    law = SampledController(law=proof.held.law, step=proof.held.step)
     noise = Measurement(slip_noise=float(proof.held.slip_noise), bounded=True)
-    return one.problem(law, seed, duration=duration, measurement=noise)
+    return one.problem(proof.controller, seed, duration=duration, measurement=noise)

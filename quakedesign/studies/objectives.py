@@ -49,7 +49,7 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
         FrontPoint(
             objective=name,
             guarantee=claim,
-            run=simulate(fault, claim.held.controller, duration=max(length, float(step)), settled_from=length / 2),
+            run=simulate(fault, claim.controller, duration=max(length, float(step)), settled_from=length / 2),
         )
         for name, claim in designs.items()
         if isinstance(claim, Guarantee)

@@ -4,6 +4,7 @@ import ctypes
 import json
 import os
 import subprocess
+from dataclasses import replace
 from fractions import Fraction as F
 
 import numpy as np
@@ -13,7 +14,14 @@ from quakedesign.controllers import published
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.loop import ErrorPrediction, Prediction, SampledController, disturbance_estimate, slip_observer
+from quakedesign.loop import (
+    ErrorPrediction,
+    FollowingLimits,
+    Prediction,
+    SampledController,
+    disturbance_estimate,
+    slip_observer,
+)
 from quakedesign.loop.actuators.chain import Actuator
 from quakedesign.loop.actuators.delay import Delay
 from quakedesign.loop.actuators.lag import Lag
@@ -51,9 +59,11 @@ OBSERVER = SampledController(
     ),
     step=F(1, 1000),
 )
+LIMITS = FollowingLimits(width=F(2000), per_slip=F(10**7))
 CASES = {
     "observer": (OBSERVER, "explicit", {}),
     "sampled": (SAMPLED, "explicit", {}),
+    "sampled, with limits": (replace(SAMPLED, limits=LIMITS), "explicit", {}),
     "cta": (PUBLISHED["cta"], "explicit", {}),
     "dia": (PUBLISHED["dia"], "explicit", {}),
     "elqr": (PUBLISHED["elqr"], "explicit", {}),

@@ -13,7 +13,17 @@ from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.certificates.guarantee.theorem import Bounds, Gains, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.loop import NOISES, Layer, LinearLaw, Model, PeriodicLoop, held_loop, starts, with_known_area
+from quakedesign.loop import (
+    NOISES,
+    FollowingLimits,
+    Layer,
+    LinearLaw,
+    Model,
+    PeriodicLoop,
+    held_loop,
+    starts,
+    with_known_area,
+)
 from quakedesign.rationals import six_digits
 
 if TYPE_CHECKING:
@@ -236,6 +246,25 @@ class Guarantee:
     def loop(self) -> PeriodicLoop:
         """Nominal error loop."""
         return self.held.loop(self.task)
+
+    @property
+    def limits(self) -> FollowingLimits | None:
+        """Limits that the pressure of the law never reaches; None behind a lag or rock, or for a law that is not told.
+
+        What the law asks for acts a delay later, while the reference moves on.
+        """
+        held, (low, high) = self.held, self.task.rest_pressure
+        if held.lag or held.diffusion or not held.law.applied:
+            return None
+        away = max(self.claims.largest_pressure - high, low - self.claims.least_pressure)
+        per_slip = max(map(abs, self.task.slip_chord)) / self.task.authority
+        late = per_slip * held.delay * self.task.reference_rates[0]
+        return FollowingLimits(width=_above(2 * away + late), per_slip=_above(per_slip))
+
+    @property
+    def controller(self) -> "SampledController":
+        """The law for `simulate`, as that of `Held`, with limits against windup."""
+        return replace(self.held.controller, limits=self.limits)
 
     def bounds(self) -> Bounds | NoGuarantee:
         """What the theorem gives, computed anew."""

@@ -120,7 +120,7 @@ def _sampled(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
     found = sampled_design(problem.task, step, problem.objective, measured=measured, **problem.noise)
     if found.runs is None:
         return problem.undecided(law.name, found.reason)
-    held = found.runs.held
+    runs, held = found.runs, found.runs.held
     details = {
         "objective": problem.objective,
         "step": str(held.step),
@@ -128,7 +128,7 @@ def _sampled(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
         "measured": measured,
         **{name: str(value) for name, value in held.noise.items()},
     }
-    return problem.judged(held.controller, name=law.name, details=details, runs=found.runs, premises=found.premises())
+    return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=found.premises())
 
 
 def _sliding(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:

@@ -1,0 +1,211 @@
+"""Limits that follow a pressure: never reached where they are for, and told to the law where they cut off."""
+
+from dataclasses import asdict, replace
+from fractions import Fraction as F
+from itertools import product
+
+import control
+import numpy as np
+import pytest
+
+from quakedesign import simulate
+from quakedesign.certificates.guarantee import Held, guarantee, task_of
+from quakedesign.controllers import Signals
+from quakedesign.errors import ParameterError
+from quakedesign.fault import load_fault
+from quakedesign.loop import (
+    ErrorPrediction,
+    FollowingLimits,
+    Prediction,
+    SampledController,
+    disturbance_estimate,
+    slip_observer,
+    summed_integrals,
+)
+from quakedesign.simulation import Variation, to_iosystem
+from quakedesign.simulation.campaign import campaign_problem
+from quakedesign.simulation.campaign.space import Sample
+from quakedesign.synthesis.guaranteed.adversary import _Limits
+
+REAL, STEP, GAIN = load_fault("real-fault"), F("0.184"), F("2.282e-8")
+GAINS = F(672300000), F(206000000)
+LATE = Prediction(
+    of_slip=F("0.07"),
+    of_rate=F("0.75"),
+    of_pushes=(F("0.01"), F("0.15")),
+    ahead=((F(1), F("0.184")), (F("0.07"), F("0.75"))),
+    ahead_of_pushes=((F("0.015"), F("0.16")),),
+)
+SLIP_ALONE = ErrorPrediction(
+    of_errors=((F(1), F("0.16")), (F("0.07"), F("0.75"))),
+    of_pushes=((F("0.002"), F("0.01")), (F("0.013"), F("0.15"))),
+    ahead=LATE.ahead,
+    ahead_of_pushes=LATE.ahead_of_pushes,
+)
+
+
+LOOSE = FollowingLimits(width=F(100), per_slip=F(7))
+
+
+@pytest.fixture(scope="module")
+def proved():
+    prediction = Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),))
+    law = disturbance_estimate(GAINS, F("0.57"), prediction, GAIN)
+    return guarantee(task_of(REAL), Held(law=law, step=STEP))
+
+
+def stepped(controller, z, slip_error, rate_error, reference):
+    """Pressure and states after a sample, in floats."""
+    signals = Signals(
+        slip=reference + slip_error,
+        slip_rate=rate_error,
+        slip_error=slip_error,
+        slip_rate_error=rate_error,
+        integrals=tuple(z),
+    )
+    rates = controller.integral_rates(signals)
+    after = [float(v + float(controller.step) * rate) for v, rate in zip(z, rates, strict=True)]
+    return float(controller.pressure(signals)), after
+
+
+def cut(asked, highest, lowest, width):
+    """The limits by hand, at the pressures of before."""
+    return min(max(asked, highest - width), lowest + width)
+
+
+def test_a_law_with_an_estimate_expects_what_is_applied():
+    """π ← of_slip·e1 + of_rate·e2 + Σγ_j(βb·p_j + d) with the p that is applied; one period late p_1 is that too."""
+    law = disturbance_estimate(GAINS, F("0.57"), LATE, GAIN)
+    controller = SampledController(law=law, step=STEP, limits=FollowingLimits(width=F(50), per_slip=F(0)))
+    z, (highest, lowest), random = [0.0] * 6, (0.0, 0.0), np.random.default_rng(5)
+    for _ in range(8):
+        e1, e2 = random.normal(0, 1e-6, 2)
+        expected, level, before = z[:3]
+        level += 0.57 * (e2 - expected) / 0.16
+        pushed = 2.282e-8 * before + level
+        ahead = e1 + 0.184 * e2 + 0.015 * pushed, 0.07 * e1 + 0.75 * e2 + 0.16 * pushed
+        asked = -float(GAINS[0]) * ahead[0] - float(GAINS[1]) * ahead[1] - level / 2.282e-8
+        applied = cut(asked, highest, lowest, 50)
+        highest, lowest = max(highest, applied), min(lowest, applied)
+        predicted = 0.07 * e1 + 0.75 * e2 + 0.01 * (2.282e-8 * applied + level) + 0.15 * pushed
+        pressure, z = stepped(controller, z, e1, e2, 0.0)
+        assert pressure == pytest.approx(applied, rel=1e-9)
+        assert z == pytest.approx([predicted, level, applied, highest, lowest, 0.0], rel=1e-9, abs=1e-12)
+    assert (highest, lowest) != (0.0, 0.0)
+    assert highest - lowest == pytest.approx(50)
+
+
+def test_an_observer_expects_what_is_applied():
+    law = slip_observer(GAINS, (F("0.9"), F("3.5"), F("3.2")), SLIP_ALONE, GAIN)
+    controller = SampledController(law=law, step=STEP, limits=FollowingLimits(width=F(50), per_slip=F(0)))
+    z = [1e-6, -1e-6, 1e-6, 20.0, 30.0, -5.0, 0.0]
+    wide = replace(LOOSE, width=F(10**9))
+    free, loose = (SampledController(law=law, step=STEP, limits=limits) for limits in (None, wide))
+    asked, expected = stepped(free, z[:4], 2e-6, 0.0, 0.0)
+    assert stepped(loose, z, 2e-6, 0.0, 0.0)[0] == pytest.approx(asked)
+    applied, found = stepped(controller, z, 2e-6, 0.0, 0.0)
+    assert applied == cut(asked, 30.0, -5.0, 50) != asked
+    beyond = 2.282e-8 * (applied - asked)
+    expected = [expected[0] + 0.002 * beyond, expected[1] + 0.01 * beyond, expected[2], applied]
+    assert found == pytest.approx([*expected, 30.0, applied, 0.0], rel=1e-9)
+
+
+def test_limits_are_not_reached_where_the_pressure_follows_one_that_moves_with_the_reference():
+    """|p − p*| ≤ 50 Pa and |dp*/dr| ≤ 7 Pa/m, p* from 0: never, however p* turns; beyond 50 Pa they are."""
+    law = summed_integrals((F(1), F(0), F(0), F(0)), F(1))  # p = −e1
+    controller = SampledController(law=law, step=F(1), limits=LOOSE)
+    for away, reached in ((50, False), (70, True)):
+        random, cuts = np.random.default_rng(3), 0
+        for _ in range(20):
+            z, reference, rest = [0.0] * 5, 0.0, 0.0
+            for _ in range(60):
+                moved = random.exponential(3.0) * (random.random() < 0.7)
+                reference, rest = reference + moved, rest + 7 * moved * random.choice([-1, 1, 1])
+                asked = rest + away * random.choice([-1, 1])
+                pressure, z = stepped(controller, z, -asked, 0.0, reference)
+                cuts += not np.isclose(pressure, asked, rtol=1e-12)
+        assert (cuts > 0) == reached
+
+
+def test_on_a_fault_that_sticks_the_pressure_stays_where_it_is_proved_to_stay(proved):
+    """Ahead of a reference that comes to rest the fault rests for ever: the pressure without limits goes on to fall."""
+    claims = proved.claims
+    free, limited = (simulate(REAL, one.controller, plant="coulomb", samples=20_000) for one in (proved.held, proved))
+    assert free.pressure.min() < 1.2 * float(claims.least_pressure)
+    assert limited.pressure.min() > claims.least_pressure
+    for run in (free, limited):
+        assert run.metrics.max_slip_error < claims.slip_error
+        assert run.metrics.max_slip_rate_error < claims.slip_rate_error
+
+
+def test_single_runs_campaigns_and_python_control_cut_alike(proved):
+    tight = replace(proved.controller, limits=FollowingLimits(width=F(4000), per_slip=F(10**6)))
+    run = simulate(REAL, tight, duration=18.4, samples=101)
+    free = simulate(REAL, replace(tight, limits=None), duration=18.4, samples=101)
+    assert np.abs(run.pressure - free.pressure).max() > 1000
+    slow = simulate(REAL, tight, duration=18.4, samples=101, compiled=False)
+    assert np.array_equal(run.pressure, slow.pressure)
+    problem = campaign_problem(REAL, tight, duration=18.4)
+    numbers = asdict(Variation()) | {"initial_slip": 0.0, "initial_slip_rate": 0.0}
+    start = problem.start(Sample(numbers=numbers, noise_seed=0))
+    (end,) = problem.program.ends([start], problem.setting.steps)
+    assert end[2] == pytest.approx(run.slip[-1], rel=1e-12)
+    system = to_iosystem(tight)
+    told = np.vstack([run.slip, run.slip_rate, run.reference, run.reference_rate])
+    response = control.input_output_response(system, 0.184 * np.arange(len(run.time)), told)
+    assert np.allclose(response.outputs, run.pressure, rtol=1e-9, atol=1e-6)
+
+
+def test_a_guarantee_has_limits_of_what_it_proves(proved):
+    """Twice what the proved pressure is beyond p*, and what p* does while a pressure is on its way, rounded up."""
+    claim, limits = proved, proved.limits
+    low, high = claim.task.rest_pressure
+    beyond = max(low - claim.claims.least_pressure, claim.claims.largest_pressure - high)
+    assert 2 * beyond <= limits.width <= F(1001, 1000) * 2 * beyond
+    steepest = 0.0
+    stiff, _, wide = (float(v) for v in claim.task.spreads)
+    for k, n in product((1 - stiff, 1 + stiff), (1 - wide, 1 + wide)):  # friction and p* together carry the spring
+        slip = np.linspace(0, 0.785, 20_001)
+        friction = 0.2353 + 0.1 * np.exp(-slip / 0.27635)
+        rest = 50e6 - (0.3353 * 50e6 - k / n * 30e9 / 5000 * slip) / friction
+        steepest = max(steepest, float(np.abs(np.diff(rest) / np.diff(slip)).max()))
+    assert steepest <= limits.per_slip <= 3 * steepest
+    late = replace(claim, held=replace(claim.held, delay=F(1, 2)))
+    more = float(limits.per_slip * claim.task.reference_rates[0] / 2)
+    assert float(late.limits.width - limits.width) == pytest.approx(more, rel=0.1, abs=0.001 * float(limits.width))
+    assert claim.controller == replace(claim.held.controller, limits=limits)
+
+
+def test_the_adversary_s_limits_are_those_of_the_run(proved):
+    """Of random errors while the reference goes at its largest rate: pressures and states of both, sample by sample."""
+    task, law, random = proved.task, proved.held.law, np.random.default_rng(2)
+    authority, pace = float(task.authority), float(task.reference_rates[0])
+    exact = FollowingLimits(width=F(4000), per_slip=task.drift / task.authority / task.reference_rates[0])
+    controller = replace(proved.controller, limits=exact)
+    limits = replace(_Limits.of(proved, 6, 1), width=4000 * authority, moved=0.0)
+    rows, seen, output, fed = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output, law.feedback))
+    z, told, cuts = [0.0] * 5, np.zeros(2), 0
+    for number in range(40):
+        errors = random.normal(0, [1e-5, 5e-5])
+        asked = output @ told + fed @ errors
+        (state,) = limits.cut(np.array([[*errors, *(rows @ told + seen @ errors), asked * authority, 0.0]]))
+        told = state[2:4]
+        pressure, z = stepped(controller, z, *errors, number * pace * 0.184)
+        cuts += abs(pressure - asked) > 1
+        assert state[4] / authority == pytest.approx(pressure, rel=1e-9)
+        assert told == pytest.approx(z[:2], rel=1e-9)
+        limits.follow(np.zeros((1, 6)), np.zeros((1, 6)))
+        limits.moved = float(task.drift * STEP)
+    assert 5 < cuts < 40
+
+
+def test_behind_a_lag_or_rock_and_for_a_law_that_is_not_told_there_are_none(proved):
+    others = {"lag": F(1)}, {"diffusion": F(1)}, {"law": replace(proved.held.law, applied=())}
+    for other in others:
+        assert replace(proved, held=replace(proved.held, **other)).limits is None
+
+
+@pytest.mark.parametrize(("width", "per_slip"), [(F(0), F(1)), (F(-1), F(1)), (F(1), F(-1))])
+def test_limits_that_make_no_sense_are_refused(width, per_slip):
+    with pytest.raises(ParameterError, match="positive width"):
+        FollowingLimits(width=width, per_slip=per_slip)
