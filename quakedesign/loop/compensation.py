@@ -64,6 +64,7 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
         feedback=output[3:],
         root=root,
         first=tuple(tuple(Fraction(k == 1 == entry) for k in (0, 1)) for entry in (1, 0, 0)),
+        applied=(Fraction(0), gain, Fraction(0)),
     )
 
 

@@ -46,20 +46,28 @@ class FollowingLimits:
             )
 
     def cut(self, asked: sp.Expr, states: tuple[Any, ...], reference: sp.Expr) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
-        """The pressure [Pa] that is applied at a sample in place of what is asked for, and the states after it.
+        """`cut_off` by these limits."""
+        return cut_off(asked, states, reference, to_sympy(self.width), to_sympy(self.per_slip))
 
-        Parameters
-        ----------
-        asked : Expr
-            [Pa].
-        states : tuple of Expr
-            Before it.
-        reference : Expr
-            [m].
-        """
-        highest, lowest, last = states
-        moved = to_sympy(self.per_slip) * sp.Abs(reference - last)
-        width = to_sympy(self.width)
-        least, most = highest - moved - width, lowest + moved + width
-        applied = sp.Max(sp.Min(asked, most), least)
-        return applied, (sp.Max(highest - moved, applied), sp.Min(lowest + moved, applied), reference)
+
+def cut_off(
+    asked: sp.Expr, states: tuple[Any, ...], reference: sp.Expr, width: sp.Expr, per_slip: sp.Expr
+) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
+    """The pressure [Pa] that is applied at a sample in place of what is asked for, and `STATES` after it.
+
+    Parameters
+    ----------
+    asked : Expr
+        [Pa].
+    states : tuple of Expr
+        `STATES` before it.
+    reference : Expr
+        [m].
+    width, per_slip : Expr
+        [Pa], [Pa/m].
+    """
+    highest, lowest, last = states
+    moved = per_slip * sp.Abs(reference - last)
+    least, most = highest - moved - width, lowest + moved + width
+    applied = sp.Max(sp.Min(asked, most), least)
+    return applied, (sp.Max(highest - moved, applied), sp.Min(lowest + moved, applied), reference)

@@ -134,6 +134,7 @@ def _row(premise: "Premise") -> tuple[str, ...]:
 
 
 _OTHER_UNITS = {"scale": "", "weight": "", "divisor": "m^2/kg", "authority": "m^2/kg"}
+_OTHER_UNITS |= {"limit_width": "Pa", "limit_per_slip": "Pa/m"}
 
 
 def _gains(entry: "Entry") -> list[tuple[str, str, Markup]]:

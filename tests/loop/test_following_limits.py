@@ -22,9 +22,11 @@ from quakedesign.loop import (
     slip_observer,
     summed_integrals,
 )
+from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.simulation import Variation, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
+from quakedesign.synthesis import answer
 from quakedesign.synthesis.guaranteed.adversary import _Limits
 
 REAL, STEP, GAIN = load_fault("real-fault"), F("0.184"), F("2.282e-8")
@@ -203,6 +205,31 @@ def test_behind_a_lag_or_rock_and_for_a_law_that_is_not_told_there_are_none(prov
     others = {"lag": F(1)}, {"diffusion": F(1)}, {"law": replace(proved.held.law, applied=())}
     for other in others:
         assert replace(proved, held=replace(proved.held, **other)).limits is None
+
+
+def test_the_compensated_step_is_told_what_is_applied():
+    """Deadbeat, p = (−e1/T_s − e2)/(T_sB0) − d, d ← d + a[(e2 − e2⁻)/(T_sB0) − p⁻ − d] with the p⁻ that was applied."""
+    made = answer(REAL, controller="cta").compensation
+    weight, authority, per_slip = float(made.weight), float(made.authority), float(made.found.limits.per_slip)
+    assert dict(made.limited.sampling.settings)["limit_width"] == made.found.limits.width
+    law, gain = replace(made.controller, sampling=None), 0.184 * authority
+    scheme = Compensated(weight=weight, authority=authority, limit_width=15000.0, limit_per_slip=per_slip)
+    run = simulate(REAL, law, scheme=scheme, duration=18.4, samples=101)
+    errors = zip(run.slip - run.reference, run.slip_rate - run.reference_rate, run.reference, strict=True)
+    level, before, highest, lowest, last, cuts, found = 0.0, None, 0.0, 0.0, 0.0, 0, []
+    for e1, e2, reference in errors:
+        level = 0.0 if before is None else level + weight * ((e2 - before[0]) / gain - before[1] - level)
+        asked = (-e1 / 0.184 - e2) / gain - level
+        moved = per_slip * abs(reference - last)
+        highest, lowest, last = highest - moved, lowest + moved, reference
+        applied = cut(asked, highest, lowest, 15000.0)
+        highest, lowest, before = max(highest, applied), min(lowest, applied), (e2, applied)
+        cuts += applied != asked
+        found.append(applied)
+    assert 5 < cuts < 95
+    assert run.pressure == pytest.approx(found, rel=1e-6, abs=1e-3)
+    with pytest.raises(ParameterError, match="positive width"):
+        Compensated(limit_width=0.0)
 
 
 @pytest.mark.parametrize(("width", "per_slip"), [(F(0), F(1)), (F(-1), F(1)), (F(1), F(-1))])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -9,6 +10,7 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.compensation import answered, followed
+from quakedesign.loop.following_limits import FollowingLimits, cut_off
 from quakedesign.loop.schemes.base import Stepped
 from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.backward import backward_euler, inclusion
@@ -16,6 +18,12 @@ from quakedesign.loop.steps.control_step import Decision, slope_of
 from quakedesign.loop.steps.discrete_law import Law, Values
 from quakedesign.loop.steps.inclusion import end_rate
 from quakedesign.loop.steps.sampled import Sampled
+
+_LIMITS = _asked, _reference, _width, _per_slip, *_states = sp.symbols(
+    "asked reference width per_slip h l r", real=True
+)
+_applied, _after = cut_off(_asked, tuple(_states), _reference, _width, _per_slip)
+_WIDEST = 1e300  # Pa, of no limits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +41,10 @@ class Compensated(Sampled):
     ----------
     weight : float
         a [-], in (0, 1].
+    limit_width : float, optional
+        Of `FollowingLimits` [Pa]; no limits unless told.
+    limit_per_slip : float
+        Of the same [Pa/m].
     substeps, actuator, measurement, authority
         As in `Sampled`; B0 is the geometric middle of the box unless told, so that β/β0 is as far from both limits.
 
@@ -42,14 +54,18 @@ class Compensated(Sampled):
     """
 
     name: ClassVar[str] = "compensated"
-    own_size: ClassVar[int] = 5
+    own_size: ClassVar[int] = 7 + len(FollowingLimits.STATES)
 
     weight: float = 0.5
+    limit_width: float | None = None
+    limit_per_slip: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 < self.weight <= 1:
             raise ParameterError(f"weight must be above 0 and at most 1. Received {self.weight!r}.")
+        if self.limit_width is not None:
+            FollowingLimits(width=Fraction(self.limit_width), per_slip=Fraction(self.limit_per_slip))
 
     @staticmethod
     def derive(law: Law) -> tuple[sp.Expr, ...]:
@@ -61,8 +77,9 @@ class Compensated(Sampled):
 
     @property
     def starts(self) -> tuple[float, ...]:
-        """See `Sampled.starts`: whether a sample has been taken, e2⁻, the feed-forward then, d, and the weight."""
-        return 0.0, 0.0, 0.0, 0.0, float(self.weight)
+        """See `Sampled.starts`: whether a sample has been taken, e2⁻, the feed-forward then, d, weight and limits."""
+        width = _WIDEST if self.limit_width is None else float(self.limit_width)
+        return 0.0, 0.0, 0.0, 0.0, float(self.weight), width, float(self.limit_per_slip), 0.0, 0.0, 0.0
 
     def nominal(self, loop: Stepped) -> float:
         """See `Sampled.nominal`: here √(smallest · largest)."""
@@ -71,12 +88,13 @@ class Compensated(Sampled):
     @property
     def settings(self) -> dict[str, Any]:
         """See `Scheme.settings`."""
-        return super().settings | {"weight": self.weight}
+        limits = {"limit_width": self.limit_width, "limit_per_slip": self.limit_per_slip}
+        return super().settings | {"weight": self.weight} | (limits if self.limit_width else {})
 
     @classmethod
     def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
-        begun, before, ahead_before, estimate, weight = own
+        begun, before, ahead_before, estimate, weight, *limits = own
         pull, feed_forward, slope = found
         gain, rate_error = known[discrete_law.step] * known[discrete_law.authority], known[discrete_law.rate_error]
         pushed = known[discrete_law.held] - ahead_before
@@ -84,6 +102,10 @@ class Compensated(Sampled):
         estimate = ca.if_else(follows, followed(rate_error, before, pushed, estimate, weight, gain), 0)
         solved = inclusion(pull).solve(known)
         ahead, share = discrete_law.values((feed_forward, slope), solved)
-        pressure = answered(rate_error, solved[end_rate], estimate, gain) + ahead
+        asked = answered(rate_error, solved[end_rate], estimate, gain) + ahead
+        reference = known[discrete_law.slip] - known[discrete_law.slip_error]
+        pressure, *passed = discrete_law.values(
+            (_applied, *_after), dict(zip(_LIMITS, (asked, reference, *limits), strict=True))
+        )
         after = [ca.SX(0) if slope == 0 else -estimate / share for _ in law.integrals]
-        return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight])
+        return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight, *limits[:2], *passed])

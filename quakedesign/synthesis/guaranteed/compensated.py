@@ -57,6 +57,15 @@ class Compensation:
         """B0 of the scheme [m²/kg]."""
         return _settings(self.controller)["authority"]
 
+    @property
+    def limited(self) -> SlidingMode:
+        """The controller with the limits against windup of its guarantee, if it has them."""
+        limits, sampling = getattr(self.found, "limits", None), self.controller.sampling
+        if limits is None or sampling is None:
+            return self.controller
+        more = ("limit_width", limits.width), ("limit_per_slip", limits.per_slip)
+        return replace(self.controller, sampling=replace(sampling, settings=(*sampling.settings, *more)))
+
     def sentence(self) -> str:
         """Settings for people, and how the step ends."""
         law = self.controller

@@ -139,7 +139,7 @@ def _compensated(problem: Problem[Designed], base: BaseGains[SlidingMode], certi
         "rho": str(smallest_root(made.controller.scale)),
         **_origin(base),
     }
-    return problem.judged(made.controller, certificate, details=details, runs=found.runs, premises=found.premises())
+    return problem.judged(made.limited, certificate, details=details, runs=found.runs, premises=found.premises())
 
 
 def _scaled(
