@@ -23,7 +23,7 @@ _LIMITS = _asked, _reference, _width, _per_slip, *_states = sp.symbols(
     "asked reference width per_slip h l r", real=True
 )
 _applied, _after = cut_off(_asked, tuple(_states), _reference, _width, _per_slip)
-_WIDEST = 1e300  # Pa, of no limits
+_WIDEST = 1e30  # Pa, of no limits
 
 
 @dataclass(frozen=True, kw_only=True)

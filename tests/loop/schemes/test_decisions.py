@@ -14,12 +14,12 @@ from quakedesign.loop.schemes import own_way, schemes, simulation_scheme
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.steps import discrete_law
-from quakedesign.loop.steps.discrete_law import Law, acceleration, authority, held, rate_error, slip_error, step
+from quakedesign.loop.steps.discrete_law import Law, acceleration, authority, held, rate_error, slip, slip_error, step
 from quakedesign.loop.steps.inclusion import end_rate, end_slip
 
 ONE, TWO = sp.symbols("xi_1 xi_2", real=True)
 LAW = Law(-2 * slip_error - 3 * rate_error - 5 * ONE, (slip_error + 4 * ONE,), (ONE,))
-KNOWN = {slip_error: 1.0, rate_error: 3.0, ONE: 0.5, step: 0.5, authority: 4.0, held: 7.0, acceleration: 6.0}
+KNOWN = {slip_error: 1.0, rate_error: 3.0, ONE: 0.5, step: 0.5, authority: 4.0, held: 7.0, acceleration: 6.0, slip: 9.0}
 
 
 def known(**own):
@@ -54,11 +54,14 @@ def test_the_compensated_scheme_derives_the_pull_with_integral_states_at_zero(pr
 
 
 OWN = [1.0, 2.0, 0.25, 0.125, 0.3]  # a sample was taken; e2 then, feed-forward then, d, weight
+LIMITS = [1e6, 0.5, 20.0, -10.0, 4.0]  # width, per slip, highest and lowest pressure, reference
 
 
-def decided(law, own=OWN):
-    decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in own])
-    return numbers([decision.pressure]), numbers(decision.integrals), numbers(decision.own)
+def decided(law, own=OWN, limits=LIMITS):
+    decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in (*own, *limits)])
+    assert numbers(decision.own[5:7]) == limits[:2]
+    assert numbers(decision.own[9:]) == [8]  # 9 − 1, the reference now
+    return numbers([decision.pressure]), numbers(decision.integrals), numbers(decision.own[:5])
 
 
 def test_the_compensated_scheme_follows_the_disturbance_and_answers_it():
@@ -71,6 +74,22 @@ def test_the_compensated_scheme_follows_the_disturbance_and_answers_it():
     assert decided(LAW, [0.0, *OWN[1:]])[2] == [1, 3, 0, 0, 0.3]
     several = replace(LAW, rates=(slip_error, ONE), integrals=(ONE, TWO))
     assert decided(several)[1] == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("asked", "limits", "applied", "after"),
+    [
+        (5, LIMITS, 5, (18, -8)),  # the reference has moved by 4, the limits have come nearer by 2
+        (5, [3.0, *LIMITS[1:]], 15, (18, -8)),
+        (5, [1.0, 0.5, 2.0, 1.0, 4.0], 4, (4, 3)),
+        (50, LIMITS, 50, (50, -8)),
+        (-50, LIMITS, -50, (18, -50)),
+    ],
+)
+def test_limits_follow_the_pressure(asked, limits, applied, after):
+    law = Law.of(None, float(asked))
+    decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in (*OWN, *limits)])
+    assert numbers([decision.pressure, *decision.own[7:9]]) == [applied, *after]
 
 
 def test_a_feed_forward_is_added_and_known_not_to_be_a_disturbance():
@@ -86,8 +105,13 @@ def test_a_constant_pressure_is_no_law_to_compensate():
 
 def test_the_compensated_scheme_starts_without_a_sample_and_in_the_middle_of_the_box():
     scheme, fault = simulation_scheme("compensated", weight=0.25), load_fault("real-fault")
-    assert scheme.starts == (0, 0, 0, 0, 0.25)
-    assert scheme.own_size == len(scheme.starts) == 5
+    assert scheme.starts[:5] == (0, 0, 0, 0, 0.25)
+    assert scheme.starts[6:] == (0, 0, 0, 0)
+    assert scheme.own_size == len(scheme.starts) == 10
+    limited = simulation_scheme("compensated", limit_width=7.0, limit_per_slip=3.0)
+    assert limited.starts[5:] == (7, 3, 0, 0, 0)
+    assert (limited.settings["limit_width"], limited.settings["limit_per_slip"]) == (7, 3)
+    assert "limit_width" not in scheme.settings
     assert scheme.settings["weight"] == 0.25
     assert Compensated().weight == 0.5
     assert Compensated(weight=1).weight == 1
