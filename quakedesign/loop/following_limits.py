@@ -25,7 +25,7 @@ class FollowingLimits:
     per_slip : Fraction
         [Pa/m].
     STATES : tuple of str
-        Highest and lowest pressure so far [Pa], which come nearer as the reference moves, and the reference [m].
+        Largest p + per_slip·r and smallest p − per_slip·r of all samples so far [Pa]; r, the reference, never falls.
 
     Raises
     ------
@@ -33,7 +33,7 @@ class FollowingLimits:
         For a width that is not positive, or a negative change per slip.
     """
 
-    STATES: ClassVar[tuple[str, ...]] = ("highest_pressure", "lowest_pressure", "last_reference")
+    STATES: ClassVar[tuple[str, ...]] = ("highest_pressure", "lowest_pressure")
 
     width: Fraction
     per_slip: Fraction
@@ -66,8 +66,12 @@ def cut_off(
     width, per_slip : Expr
         [Pa], [Pa/m].
     """
-    highest, lowest, last = states
-    moved = per_slip * sp.Abs(reference - last)
-    least, most = highest - moved - width, lowest + moved + width
-    applied = sp.Max(sp.Min(asked, most), least)
-    return applied, (sp.Max(highest - moved, applied), sp.Min(lowest + moved, applied), reference)
+    highest, lowest = states
+    moved = per_slip * reference
+    applied = asked + _beyond(highest - moved - width, asked) - _beyond(asked, lowest + moved + width)
+    return applied, (highest + _beyond(applied + moved, highest), lowest - _beyond(lowest, applied - moved))
+
+
+def _beyond(value: sp.Expr, limit: sp.Expr) -> sp.Expr:
+    """What a value is more than a limit, exactly 0 if it is not: a run does that without a branch."""
+    return sp.Max(value - limit, 0)

@@ -70,7 +70,7 @@ class SampledController(Controller):
     @property
     def integral_units(self) -> tuple[str, ...]:  # type: ignore[override]
         """One for every state; the law's own."""
-        return ("-",) * len(self.law.states) + (("Pa", "Pa", "m") if self.limits else ())
+        return ("-",) * len(self.law.states) + (("Pa",) * len(FollowingLimits.STATES) if self.limits else ())
 
     def pressure(self, signals: Signals) -> sp.Expr:
         """Cz + Dy within the limits [Pa]."""

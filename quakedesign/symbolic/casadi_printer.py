@@ -133,12 +133,17 @@ def _powers(library: Any) -> dict[Any, Any]:
     def absolute(x: Any, a: sp.Expr) -> Any:
         return _power(library, library.fabs(x), a)
 
+    def larger(first: Any, *others: Any) -> Any:
+        """The positive part, a maximum with 0, without a branch: x/2 + |x|/2 is exactly x or 0."""
+        rest = reduce(library.fmax, others)
+        return (rest + library.fabs(rest)) / 2 if isinstance(first, float) and first == 0 else library.fmax(first, rest)
+
     elementary = {getattr(sp, name): getattr(library, name) for name in ("exp", "log", "sin", "cos", "tan", "tanh")}
     return {
         SignedPower: signed,
         AbsolutePower: absolute,
         sp.Pow: lambda x, a: _power(library, x, a),
-        sp.Max: lambda *parts: reduce(library.fmax, parts),
+        sp.Max: larger,
         sp.Min: lambda *parts: reduce(library.fmin, parts),
         sp.Abs: library.fabs,
         sp.sign: library.sign,

@@ -19,10 +19,8 @@ from quakedesign.loop.steps.discrete_law import Law, Values
 from quakedesign.loop.steps.inclusion import end_rate
 from quakedesign.loop.steps.sampled import Sampled
 
-_LIMITS = _asked, _reference, _width, _per_slip, *_states = sp.symbols(
-    "asked reference width per_slip h l r", real=True
-)
-_applied, _after = cut_off(_asked, tuple(_states), _reference, _width, _per_slip)
+_LIMITS = sp.symbols("asked reference width per_slip highest lowest", real=True)
+_applied, _after = cut_off(_LIMITS[0], _LIMITS[4:], *_LIMITS[1:4])
 _WIDEST = 1e30  # Pa, of no limits
 
 
@@ -79,7 +77,7 @@ class Compensated(Sampled):
     def starts(self) -> tuple[float, ...]:
         """See `Sampled.starts`: whether a sample has been taken, e2⁻, the feed-forward then, d, weight and limits."""
         width = _WIDEST if self.limit_width is None else float(self.limit_width)
-        return 0.0, 0.0, 0.0, 0.0, float(self.weight), width, float(self.limit_per_slip), 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, float(self.weight), width, float(self.limit_per_slip), 0.0, 0.0
 
     def nominal(self, loop: Stepped) -> float:
         """See `Sampled.nominal`: here √(smallest · largest)."""
@@ -104,8 +102,7 @@ class Compensated(Sampled):
         ahead, share = discrete_law.values((feed_forward, slope), solved)
         asked = answered(rate_error, solved[end_rate], estimate, gain) + ahead
         reference = known[discrete_law.slip] - known[discrete_law.slip_error]
-        pressure, *passed = discrete_law.values(
-            (_applied, *_after), dict(zip(_LIMITS, (asked, reference, *limits), strict=True))
-        )
+        passing = dict(zip(_LIMITS, (asked, reference, *limits), strict=True))
+        pressure, *passed = discrete_law.values((_applied, *_after), passing)
         after = [ca.SX(0) if slope == 0 else -estimate / share for _ in law.integrals]
         return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight, *limits[:2], *passed])
