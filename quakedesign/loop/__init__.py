@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from quakedesign.loop.continuous import ContinuousLaw as ContinuousLaw
     from quakedesign.loop.continuous import continuous_loop as continuous_loop
     from quakedesign.loop.continuous import exact_integrals as exact_integrals
-    from quakedesign.loop.following_limits import FollowingLimits as FollowingLimits
     from quakedesign.loop.held import SHORTEST as SHORTEST
     from quakedesign.loop.held import held_loop as held_loop
     from quakedesign.loop.held import starts as starts
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.periodic import Fading as Fading
     from quakedesign.loop.periodic import PeriodicLoop as PeriodicLoop
     from quakedesign.loop.periodic import Segment as Segment
+    from quakedesign.loop.rest_limit import RestLimit as RestLimit
     from quakedesign.loop.running import SampledController as SampledController
     from quakedesign.loop.sliding import SlidingModel as SlidingModel
     from quakedesign.loop.sliding import at_once as at_once

@@ -11,8 +11,8 @@ import sympy as sp
 
 from quakedesign.controllers import Controller, LoopField, Sampling, Signals
 from quakedesign.errors import UnsupportedError
-from quakedesign.loop.following_limits import FollowingLimits
 from quakedesign.loop.laws import LinearLaw
+from quakedesign.loop.rest_limit import RestLimit
 from quakedesign.rationals import to_sympy
 
 
@@ -27,8 +27,8 @@ class SampledController(Controller):
         T_s [s] for which it is meant.
     lag, diffusion : Fraction
         As of `Sampling` [s].
-    limits : FollowingLimits, optional
-        Of its pressure; its states are then told what is applied, and those of the limits follow them.
+    rest_limit : RestLimit, optional
+        Of its pressure; its states are then told what is applied, and those of the limit follow them.
     gains : mapping of str to Fraction
         Read off the law: p = −k1·e1 − k2·e2 − Σ gain·state, every state under its name.
     """
@@ -42,14 +42,14 @@ class SampledController(Controller):
     step: Fraction
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
-    limits: FollowingLimits | None = None
+    rest_limit: RestLimit | None = None
 
     def __post_init__(self) -> None:
         values = (-v for v in (*self.law.feedback, *self.law.output))
         object.__setattr__(self, "gains", MappingProxyType(dict(zip(self.gain_units, values, strict=True))))
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
-        told = {name: getattr(self, name) for name in ("law", "step", "lag", "diffusion", "limits")}
+        told = {name: getattr(self, name) for name in ("law", "step", "lag", "diffusion", "rest_limit")}
         return partial(type(self), **told), ()
 
     @property
@@ -70,14 +70,14 @@ class SampledController(Controller):
     @property
     def integral_units(self) -> tuple[str, ...]:  # type: ignore[override]
         """One for every state; the law's own."""
-        return ("-",) * len(self.law.states) + (("Pa",) * len(FollowingLimits.STATES) if self.limits else ())
+        return ("-",) * len(self.law.states) + (RestLimit.UNITS if self.rest_limit else ())
 
     def pressure(self, signals: Signals) -> sp.Expr:
-        """Cz + Dy within the limits [Pa]."""
+        """Cz + Dy, at rest within the limit [Pa]."""
         return self._decided(signals)[0]
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
-        """(Fz + Gy − z)/T_s, of what the limits cut off what the law makes of it besides, and of the limits' states."""
+        """(Fz + Gy − z)/T_s, of what the limit cuts off what the law makes of it besides, and of the limit's states."""
         cut, after = self._decided(signals)[1:]
         z, seen, period = signals.integrals, self._read(signals), to_sympy(self.step)
         told = self.law.applied or (Fraction(0),) * len(self.law.states)
@@ -86,13 +86,13 @@ class SampledController(Controller):
         return (*rates, *((new - old) / period for new, old in zip(after, z[len(rates) :], strict=True)))
 
     def _decided(self, signals: Signals) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...]]:
-        """The pressure that is applied, what that is more than is asked for, over T_s, and the limits' states after."""
+        """The pressure that is applied, what that is more than is asked for, over T_s, and the limit's states after."""
         asked = _combined((*self.law.output, *self.law.feedback), self._read(signals))
-        if self.limits is None:
+        if self.rest_limit is None:
             return asked, sp.S.Zero, ()
         states = signals.integrals[len(self.law.states) :]
-        applied, after = self.limits.cut(asked, states, signals.slip - signals.slip_error)
-        return applied, (applied - asked) / to_sympy(self.step), after
+        applied, *after = self.rest_limit.cut(asked, states, signals.slip, signals.slip - signals.slip_error)
+        return applied, (applied - asked) / to_sympy(self.step), tuple(after)
 
     def _read(self, signals: Signals) -> tuple[Any, ...]:
         return (*signals.integrals[: len(self.law.states)], signals.slip_error, signals.slip_rate_error)

@@ -134,7 +134,7 @@ def _row(premise: "Premise") -> tuple[str, ...]:
 
 
 _OTHER_UNITS = {"scale": "", "weight": "", "divisor": "m^2/kg", "authority": "m^2/kg"}
-_OTHER_UNITS |= {"limit_width": "Pa", "limit_per_slip": "Pa/m"}
+_OTHER_UNITS |= {"rest_width": "Pa", "rest_per_slip": "Pa/m", "rest_resolution": "m"}
 
 
 def _gains(entry: "Entry") -> list[tuple[str, str, Markup]]:

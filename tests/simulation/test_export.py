@@ -16,8 +16,8 @@ from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop import (
     ErrorPrediction,
-    FollowingLimits,
     Prediction,
+    RestLimit,
     SampledController,
     disturbance_estimate,
     slip_observer,
@@ -59,11 +59,11 @@ OBSERVER = SampledController(
     ),
     step=F(1, 1000),
 )
-LIMITS = FollowingLimits(width=F(2000), per_slip=F(10**7))
+LIMIT = RestLimit(width=F(2000), per_slip=F(10**7), resolution=F(1, 10**6))
 CASES = {
     "observer": (OBSERVER, "explicit", {}),
     "sampled": (SAMPLED, "explicit", {}),
-    "sampled, with limits": (replace(SAMPLED, limits=LIMITS), "explicit", {}),
+    "sampled, with a limit": (replace(SAMPLED, rest_limit=LIMIT), "explicit", {}),
     "cta": (PUBLISHED["cta"], "explicit", {}),
     "dia": (PUBLISHED["dia"], "explicit", {}),
     "elqr": (PUBLISHED["elqr"], "explicit", {}),

@@ -15,11 +15,11 @@ from quakedesign.certificates.guarantee.theorem import Bounds, Gains, NoGuarante
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.loop import (
     NOISES,
-    FollowingLimits,
     Layer,
     LinearLaw,
     Model,
     PeriodicLoop,
+    RestLimit,
     held_loop,
     starts,
     with_known_area,
@@ -35,6 +35,7 @@ _NOISE_WORDS = {
     "rate_noise": "with any noise of at most {:.6g} m/s in the measured slip rate",
 }
 _MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
+_RESTS = Fraction(1, 100)
 _TURNS = 32  # of claims that follow from themselves
 
 
@@ -248,10 +249,11 @@ class Guarantee:
         return self.held.loop(self.task)
 
     @property
-    def limits(self) -> FollowingLimits | None:
-        """Limits that the pressure of the law never reaches; None behind a lag or rock, or for a law that is not told.
+    def rest_limit(self) -> RestLimit | None:
+        """A limit that the pressure of the law never reaches; None behind a lag or rock, or for a law that is not told.
 
-        What the law asks for acts a delay later, while the reference moves on.
+        What the law asks for acts a delay later, while the reference moves on. A fault that moves by less than its
+        measurement tells, or by a hundredth of the reference's largest rate, rests.
         """
         held, (low, high) = self.held, self.task.rest_pressure
         if held.lag or held.diffusion or not held.law.applied:
@@ -259,12 +261,14 @@ class Guarantee:
         away = max(self.claims.largest_pressure - high, low - self.claims.least_pressure)
         per_slip = max(map(abs, self.task.slip_chord)) / self.task.authority
         late = per_slip * held.delay * self.task.reference_rates[0]
-        return FollowingLimits(width=_above(2 * away + late), per_slip=_above(per_slip))
+        width = _above(2 * away + late)
+        resolution = _above(2 * held.slip_noise + _RESTS * self.task.reference_rates[0] * held.step)
+        return RestLimit(width=width, per_slip=_above(per_slip), resolution=resolution)
 
     @property
     def controller(self) -> "SampledController":
-        """The law for `simulate`, as that of `Held`, with limits against windup."""
-        return replace(self.held.controller, limits=self.limits)
+        """The law for `simulate`, as that of `Held`, with its limit against windup."""
+        return replace(self.held.controller, rest_limit=self.rest_limit)
 
     def bounds(self) -> Bounds | NoGuarantee:
         """What the theorem gives, computed anew."""

@@ -10,7 +10,7 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.compensation import answered, followed
-from quakedesign.loop.following_limits import FollowingLimits, cut_off
+from quakedesign.loop.rest_limit import RestLimit, cut_off
 from quakedesign.loop.schemes.base import Stepped
 from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.backward import backward_euler, inclusion
@@ -19,9 +19,9 @@ from quakedesign.loop.steps.discrete_law import Law, Values
 from quakedesign.loop.steps.inclusion import end_rate
 from quakedesign.loop.steps.sampled import Sampled
 
-_LIMITS = sp.symbols("asked reference width per_slip highest lowest", real=True)
-_applied, _after = cut_off(_LIMITS[0], _LIMITS[4:], *_LIMITS[1:4])
-_WIDEST = 1e30  # Pa, of no limits
+_LIMIT = sp.symbols("asked slip reference width per_slip resolution highest last", real=True)
+_CUT = cut_off(_LIMIT[0], _LIMIT[6:], *_LIMIT[1:6])
+_WIDEST = 1e30  # Pa, of no limit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,10 +39,10 @@ class Compensated(Sampled):
     ----------
     weight : float
         a [-], in (0, 1].
-    limit_width : float, optional
-        Of `FollowingLimits` [Pa]; no limits unless told.
-    limit_per_slip : float
-        Of the same [Pa/m].
+    rest_width : float, optional
+        Of `RestLimit` [Pa]; no limit unless told.
+    rest_per_slip, rest_resolution : float
+        Of the same [Pa/m], [m].
     substeps, actuator, measurement, authority
         As in `Sampled`; B0 is the geometric middle of the box unless told, so that β/β0 is as far from both limits.
 
@@ -52,18 +52,20 @@ class Compensated(Sampled):
     """
 
     name: ClassVar[str] = "compensated"
-    own_size: ClassVar[int] = 7 + len(FollowingLimits.STATES)
+    own_size: ClassVar[int] = 8 + len(RestLimit.STATES)
 
     weight: float = 0.5
-    limit_width: float | None = None
-    limit_per_slip: float = 0.0
+    rest_width: float | None = None
+    rest_per_slip: float = 0.0
+    rest_resolution: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 < self.weight <= 1:
             raise ParameterError(f"weight must be above 0 and at most 1. Received {self.weight!r}.")
-        if self.limit_width is not None:
-            FollowingLimits(width=Fraction(self.limit_width), per_slip=Fraction(self.limit_per_slip))
+        if self.rest_width is not None:
+            width, *others = map(Fraction, (self.rest_width, self.rest_per_slip, self.rest_resolution))
+            RestLimit(width=width, per_slip=others[0], resolution=others[1])
 
     @staticmethod
     def derive(law: Law) -> tuple[sp.Expr, ...]:
@@ -75,9 +77,10 @@ class Compensated(Sampled):
 
     @property
     def starts(self) -> tuple[float, ...]:
-        """See `Sampled.starts`: whether a sample has been taken, e2⁻, the feed-forward then, d, weight and limits."""
-        width = _WIDEST if self.limit_width is None else float(self.limit_width)
-        return 0.0, 0.0, 0.0, 0.0, float(self.weight), width, float(self.limit_per_slip), 0.0, 0.0
+        """See `Sampled.starts`: whether a sample has been taken, e2⁻, the feed-forward then, d, weight and limit."""
+        width = _WIDEST if self.rest_width is None else float(self.rest_width)
+        limit = width, float(self.rest_per_slip), float(self.rest_resolution)
+        return 0.0, 0.0, 0.0, 0.0, float(self.weight), *limit, 0.0, 0.0
 
     def nominal(self, loop: Stepped) -> float:
         """See `Sampled.nominal`: here √(smallest · largest)."""
@@ -86,13 +89,13 @@ class Compensated(Sampled):
     @property
     def settings(self) -> dict[str, Any]:
         """See `Scheme.settings`."""
-        limits = {"limit_width": self.limit_width, "limit_per_slip": self.limit_per_slip}
-        return super().settings | {"weight": self.weight} | (limits if self.limit_width else {})
+        names = ("rest_width", "rest_per_slip", "rest_resolution") if self.rest_width else ()
+        return super().settings | {"weight": self.weight} | {name: getattr(self, name) for name in names}
 
     @classmethod
     def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
-        begun, before, ahead_before, estimate, weight, *limits = own
+        begun, before, ahead_before, estimate, weight, *limit = own
         pull, feed_forward, slope = found
         gain, rate_error = known[discrete_law.step] * known[discrete_law.authority], known[discrete_law.rate_error]
         pushed = known[discrete_law.held] - ahead_before
@@ -102,7 +105,7 @@ class Compensated(Sampled):
         ahead, share = discrete_law.values((feed_forward, slope), solved)
         asked = answered(rate_error, solved[end_rate], estimate, gain) + ahead
         reference = known[discrete_law.slip] - known[discrete_law.slip_error]
-        passing = dict(zip(_LIMITS, (asked, reference, *limits), strict=True))
-        pressure, *passed = discrete_law.values((_applied, *_after), passing)
+        passing = dict(zip(_LIMIT, (asked, known[discrete_law.slip], reference, *limit), strict=True))
+        pressure, *passed = discrete_law.values(_CUT, passing)
         after = [ca.SX(0) if slope == 0 else -estimate / share for _ in law.integrals]
-        return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight, *limits[:2], *passed])
+        return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight, *limit[:3], *passed])

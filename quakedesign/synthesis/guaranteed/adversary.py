@@ -78,43 +78,45 @@ class _Pieces:
 
 
 @dataclass(slots=True)
-class _Limits:
-    """Limits of the pressure that is asked for, as b·(p − p*) [m/s²], of every course."""
+class _Limit:
+    """Limit at rest of the pressure that is asked for, as b·(p − p*) [m/s²], of every course."""
 
     place: int
     told: np.ndarray
     width: float
     moved: float
+    rests: np.ndarray
     highest: np.ndarray
-    lowest: np.ndarray
+    last: np.ndarray
 
     @classmethod
-    def of(cls, claim: Guarantee, size: int, courses: int) -> "_Limits | None":
-        """Those of a guarantee; None where it has none."""
-        limits, law, authority = claim.limits, claim.held.law, float(claim.task.authority)
-        if limits is None:
+    def of(cls, claim: Guarantee, size: int, back: np.ndarray) -> "_Limit | None":
+        """That of a guarantee along references of some rates [m/s]; None where it has none."""
+        limit, law, authority = claim.rest_limit, claim.held.law, float(claim.task.authority)
+        if limit is None:
             return None
-        place = 2 + len(law.states)
+        place, step = 2 + len(law.states), float(claim.held.step)
         told = np.zeros(size)
         told[2:place], told[place] = [float(v) / authority for v in law.applied], 1
-        moved = float(claim.task.drift * claim.held.step)
-        return cls(place, told, float(limits.width) * authority, moved, np.zeros(courses), np.zeros(courses))
+        rests = float(limit.resolution) - back * step  # of the slip error from sample to sample
+        moved, none = float(claim.task.drift) * step, np.zeros(len(back))
+        return cls(place, told, float(limit.width) * authority, moved, rests, none, none)
 
-    def anew(self) -> "_Limits":
+    def anew(self) -> "_Limit":
         """At the start of a course."""
-        return replace(self, highest=np.zeros_like(self.highest), lowest=np.zeros_like(self.lowest))
+        return replace(self, highest=np.zeros_like(self.highest), last=np.zeros_like(self.last))
 
     def cut(self, state: np.ndarray) -> np.ndarray:
         """States after a sample, the law told what is applied."""
-        asked, highest, lowest = state[:, self.place], self.highest - self.moved, self.lowest + self.moved
-        applied = np.maximum(np.minimum(asked, lowest + self.width), highest - self.width)
-        self.highest, self.lowest = np.maximum(highest, applied), np.minimum(lowest, applied)
+        asked, highest = state[:, self.place], self.highest - self.moved
+        stuck = state[:, 0] - self.last <= self.rests
+        applied = np.where(stuck, np.maximum(asked, highest - self.width), asked)
+        self.highest, self.last = np.maximum(highest, applied), state[:, 0].copy()
         return np.asarray(state + np.outer(applied - asked, self.told))
 
     def follow(self, before: np.ndarray, after: np.ndarray) -> None:
         """p* drifts, and with it what all pressures are less it."""
-        drifted = after[:, self.place] - before[:, self.place]
-        self.highest, self.lowest = self.highest + drifted, self.lowest + drifted
+        self.highest = self.highest + after[:, self.place] - before[:, self.place]
 
 
 class _Search:
@@ -147,7 +149,9 @@ class _Search:
             courses = 2 * max(courses // 2 * _PERIODS // periods, _LEAST_COURSES)
         paces = np.where(np.arange(courses) // 2 % 2, 1, _SLOW)
         self.back = float(task.reference_rates[0]) * paces if sticks else None
-        self.limits = _Limits.of(claim, self.size, courses) if sticks and isinstance(claim, Guarantee) else None
+        self.rest_limit = None
+        if self.back is not None and isinstance(claim, Guarantee):
+            self.rest_limit = _Limit.of(claim, self.size, self.back)
         self.allowed = np.ones((courses, len(vertices)), dtype=bool)
         slow = isinstance(claim, Guarantee) and claim.slow_gain is not None
         if (slow or self.limit is not None) and beta[0] < beta[1]:  # β is slow; it stays at either end
@@ -180,14 +184,14 @@ class _Search:
 
     def _forward(self, costates: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
         state, chosen, held = self._started(costates[0]), [], []
-        limits = self.limits and self.limits.anew()
+        limit = self.rest_limit and self.rest_limit.anew()
         self._seen(state)
         for number, costate in enumerate(costates):
             part = self.parts[number // _PIECES % len(self.parts)]
             if number % _PIECES == 0:
                 state = self._sampled(part, state, costate, number)
-                if limits and number // _PIECES % len(self.parts) == 0:
-                    state = limits.cut(state)
+                if limit and number // _PIECES % len(self.parts) == 0:
+                    state = limit.cut(state)
             ahead = np.einsum("vij,cj->cvi", part.steps, state)
             push = _pushes(part.added, costate)
             gain = np.einsum("cvi,ci->cv", ahead, costate) + np.abs(push).sum(axis=2)
@@ -196,8 +200,8 @@ class _Search:
             following = ahead[row, best] + np.einsum("cij,cj->ci", part.added[best], np.sign(push[row, best]))
             chosen.append(best)
             held.append(self._held(state, following, part.length))
-            if limits:
-                limits.follow(state, following)
+            if limit:
+                limit.follow(state, following)
             state = following
             self._seen(state)
         return chosen, held

@@ -11,7 +11,7 @@ from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.fault import Fault
-from quakedesign.loop import FollowingLimits, LinearLaw
+from quakedesign.loop import LinearLaw, RestLimit
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
 from quakedesign.synthesis.guaranteed.families import MEASURED
@@ -147,7 +147,7 @@ class Answer:
             "worst_found": _seen(self.worst),
             "worst_found_with_stick": _seen(self.worst_with_stick),
             "grows_at_rest": self.grows_at_rest,
-            "limits": _limits(self.found.limits),
+            "rest_limit": _rest_limit(self.found.rest_limit),
             "limit": _limit(self.limit),
             "step": str(self.found.held.step),
             "measured": MEASURED[self.found.held.law.of_slip_alone],
@@ -194,8 +194,9 @@ def _limit(limit: SmallestPeak | None) -> dict[str, str | None] | None:
     return {"slip_rate_error": limit.slip_rate_error.exact, "slip_error": None if slip is None else slip.exact}
 
 
-def _limits(limits: FollowingLimits | None) -> dict[str, str] | None:
-    return None if limits is None else {"width": str(limits.width), "per_slip": str(limits.per_slip)}
+def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
+    names = ("width", "per_slip", "resolution")
+    return None if limit is None else {name: str(getattr(limit, name)) for name in names}
 
 
 def _law(law: LinearLaw) -> dict[str, Any]:

@@ -59,11 +59,11 @@ class Compensation:
 
     @property
     def limited(self) -> SlidingMode:
-        """The controller with the limits against windup of its guarantee, if it has them."""
-        limits, sampling = getattr(self.found, "limits", None), self.controller.sampling
-        if limits is None or sampling is None:
+        """The controller with the limit against windup of its guarantee, if it has one."""
+        limit, sampling = getattr(self.found, "rest_limit", None), self.controller.sampling
+        if limit is None or sampling is None:
             return self.controller
-        more = ("limit_width", limits.width), ("limit_per_slip", limits.per_slip)
+        more = ("rest_width", limit.width), ("rest_per_slip", limit.per_slip), ("rest_resolution", limit.resolution)
         return replace(self.controller, sampling=replace(sampling, settings=(*sampling.settings, *more)))
 
     def sentence(self) -> str:

@@ -54,12 +54,12 @@ def test_the_compensated_scheme_derives_the_pull_with_integral_states_at_zero(pr
 
 
 OWN = [1.0, 2.0, 0.25, 0.125, 0.3]  # a sample was taken; e2 then, feed-forward then, d, weight
-LIMITS = [1e6, 0.5, 22.0, -12.0]  # width, per slip; largest p + r/2 and smallest p − r/2 so far; now r = 9 − 1
+LIMIT = [1e6, 0.5, 0.125, 22.0, 9.0]  # width, per slip, resolution; largest p + r/2 so far, last slip; now r = 9 − 1
 
 
-def decided(law, own=OWN, limits=LIMITS):
-    decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in (*own, *limits)])
-    assert numbers(decision.own[5:7]) == limits[:2]
+def decided(law, own=OWN, limit=LIMIT):
+    decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in (*own, *limit)])
+    assert numbers(decision.own[5:8]) == limit[:3]
     return numbers([decision.pressure]), numbers(decision.integrals), numbers(decision.own[:5])
 
 
@@ -76,19 +76,19 @@ def test_the_compensated_scheme_follows_the_disturbance_and_answers_it():
 
 
 @pytest.mark.parametrize(
-    ("asked", "limits", "applied", "after"),
+    ("asked", "limit", "applied", "highest"),
     [
-        (5, LIMITS, 5, (22, -12)),
-        (5, [3.0, 0.5, 22.0, -1.0], 15, (22, -1)),  # no less than 22 − 4 − 3
-        (5, [1.0, 0.5, 7.0, -1.0], 4, (8, -1)),  # no more than −1 + 4 + 1
-        (50, LIMITS, 50, (54, -12)),
-        (-50, LIMITS, -50, (22, -54)),
+        (5, LIMIT, 5, 22),
+        (5, [3.0, *LIMIT[1:]], 15, 22),  # no less than 22 − 4 − 3
+        (5, [3.0, *LIMIT[1:4], 8.9], 15, 22),
+        (5, [3.0, *LIMIT[1:4], 8.5], 5, 22),  # the fault moved by more than the resolution
+        (50, LIMIT, 50, 54),
     ],
 )
-def test_limits_follow_the_pressure(asked, limits, applied, after):
+def test_at_rest_the_pressure_has_a_limit(asked, limit, applied, highest):
     law = Law.of(None, float(asked))
-    decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in (*OWN, *limits)])
-    assert numbers([decision.pressure, *decision.own[7:]]) == [applied, *after]
+    decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in (*OWN, *limit)])
+    assert numbers([decision.pressure, *decision.own[8:]]) == [applied, highest, 9]
 
 
 def test_a_feed_forward_is_added_and_known_not_to_be_a_disturbance():
@@ -105,12 +105,12 @@ def test_a_constant_pressure_is_no_law_to_compensate():
 def test_the_compensated_scheme_starts_without_a_sample_and_in_the_middle_of_the_box():
     scheme, fault = simulation_scheme("compensated", weight=0.25), load_fault("real-fault")
     assert scheme.starts[:5] == (0, 0, 0, 0, 0.25)
-    assert scheme.starts[6:] == (0, 0, 0)
-    assert scheme.own_size == len(scheme.starts) == 9
-    limited = simulation_scheme("compensated", limit_width=7.0, limit_per_slip=3.0)
-    assert limited.starts[5:] == (7, 3, 0, 0)
-    assert (limited.settings["limit_width"], limited.settings["limit_per_slip"]) == (7, 3)
-    assert "limit_width" not in scheme.settings
+    assert scheme.starts[6:] == (0, 0, 0, 0)
+    assert scheme.own_size == len(scheme.starts) == 10
+    limited = simulation_scheme("compensated", rest_width=7.0, rest_per_slip=3.0, rest_resolution=2.0)
+    assert limited.starts[5:] == (7, 3, 2, 0, 0)
+    assert [limited.settings[f"rest_{name}"] for name in ("width", "per_slip", "resolution")] == [7, 3, 2]
+    assert "rest_width" not in scheme.settings
     assert scheme.settings["weight"] == 0.25
     assert Compensated().weight == 0.5
     assert Compensated(weight=1).weight == 1

@@ -81,8 +81,8 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     assert design.controller.sampling.step == found.held.step == STEP
     assert design.compensation.found is found
     settings = dict(design.controller.sampling.settings)
-    limits = {"limit_width": found.limits.width, "limit_per_slip": found.limits.per_slip}
-    assert settings == {name: design.gains[name] for name in ("weight", "authority")} | limits
+    limit = {f"rest_{name}": getattr(found.rest_limit, name) for name in ("width", "per_slip", "resolution")}
+    assert settings == {name: design.gains[name] for name in ("weight", "authority")} | limit
     premises = {p.name: p for p in design.premises}
     assert [p.name for p in design.conditions] == ["sampling_time", "delay"]
     assert all(p.holds for p in premises.values())
@@ -108,8 +108,8 @@ def test_what_runs_is_what_is_guaranteed():
 
 def test_it_runs_in_no_other_way():
     law = designed().controller
-    limits = {name: float(law.numbers[name]) for name in ("limit_width", "limit_per_slip")}
-    own = dict(weight=0.35, authority=2.282e-8, **limits)
+    limit = {name: float(law.numbers[name]) for name in ("rest_width", "rest_per_slip", "rest_resolution")}
+    own = dict(weight=0.35, authority=2.282e-8, **limit)
     same = run(law, scheme=simulation_scheme("compensated", **own), step=0.184)
     assert np.array_equal(same.pressure, run(law).pressure)
     for other in (
@@ -120,7 +120,7 @@ def test_it_runs_in_no_other_way():
     ):
         with pytest.raises(
             ParameterError,
-            match=r"compensated, weight 0\.35, authority 2\.282e-08, limit_width .* and the step 0\.184 s",
+            match=r"compensated, weight 0\.35, authority 2\.282e-08, rest_width .* and the step 0\.184 s",
         ):
             run(law, **other)
 

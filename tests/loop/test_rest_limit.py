@@ -1,4 +1,4 @@
-"""Limits that follow a pressure: never reached where they are for, and told to the law where they cut off."""
+"""A limit of the pressure at rest: never reached where it is proved, and told to the law where it cuts off."""
 
 from dataclasses import asdict, replace
 from fractions import Fraction as F
@@ -15,8 +15,8 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop import (
     ErrorPrediction,
-    FollowingLimits,
     Prediction,
+    RestLimit,
     SampledController,
     disturbance_estimate,
     slip_observer,
@@ -27,7 +27,7 @@ from quakedesign.simulation import Variation, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
 from quakedesign.synthesis import answer
-from quakedesign.synthesis.guaranteed.adversary import _Limits
+from quakedesign.synthesis.guaranteed.adversary import _Limit
 
 REAL, STEP, GAIN = load_fault("real-fault"), F("0.184"), F("2.282e-8")
 GAINS = F(672300000), F(206000000)
@@ -46,7 +46,7 @@ SLIP_ALONE = ErrorPrediction(
 )
 
 
-LOOSE = FollowingLimits(width=F(100), per_slip=F(7))
+LOOSE = RestLimit(width=F(100), per_slip=F(7), resolution=F(10**9))  # wherever the fault goes, it rests
 
 
 @pytest.fixture(scope="module")
@@ -70,16 +70,17 @@ def stepped(controller, z, slip_error, rate_error, reference):
     return float(controller.pressure(signals)), after
 
 
-def cut(asked, highest, lowest, width):
-    """The limits by hand, at the pressures of before."""
-    return min(max(asked, highest - width), lowest + width)
+def cut(asked, highest, width):
+    """The limit by hand, at the pressures of before."""
+    return max(asked, highest - width)
 
 
 def test_a_law_with_an_estimate_expects_what_is_applied():
     """π ← of_slip·e1 + of_rate·e2 + Σγ_j(βb·p_j + d) with the p that is applied; one period late p_1 is that too."""
     law = disturbance_estimate(GAINS, F("0.57"), LATE, GAIN)
-    controller = SampledController(law=law, step=STEP, limits=FollowingLimits(width=F(50), per_slip=F(0)))
-    z, (highest, lowest), random = [0.0] * 5, (0.0, 0.0), np.random.default_rng(5)
+    limit = RestLimit(width=F(50), per_slip=F(0), resolution=F(1))
+    controller = SampledController(law=law, step=STEP, rest_limit=limit)
+    z, highest, cuts, random = [0.0] * 5, 0.0, 0, np.random.default_rng(5)
     for _ in range(8):
         e1, e2 = random.normal(0, 1e-6, 2)
         expected, level, before = z[:3]
@@ -87,35 +88,35 @@ def test_a_law_with_an_estimate_expects_what_is_applied():
         pushed = 2.282e-8 * before + level
         ahead = e1 + 0.184 * e2 + 0.015 * pushed, 0.07 * e1 + 0.75 * e2 + 0.16 * pushed
         asked = -float(GAINS[0]) * ahead[0] - float(GAINS[1]) * ahead[1] - level / 2.282e-8
-        applied = cut(asked, highest, lowest, 50)
-        highest, lowest = max(highest, applied), min(lowest, applied)
+        applied = cut(asked, highest, 50)
+        cuts, highest = cuts + (applied != asked), max(highest, applied)
         predicted = 0.07 * e1 + 0.75 * e2 + 0.01 * (2.282e-8 * applied + level) + 0.15 * pushed
         pressure, z = stepped(controller, z, e1, e2, 0.0)
         assert pressure == pytest.approx(applied, rel=1e-9)
-        assert z == pytest.approx([predicted, level, applied, highest, lowest], rel=1e-9, abs=1e-12)
-    assert (highest, lowest) != (0.0, 0.0)
-    assert highest - lowest == pytest.approx(50)
+        assert z == pytest.approx([predicted, level, applied, highest, e1], rel=1e-9, abs=1e-12)
+    assert 0 < cuts < 8
 
 
 def test_an_observer_expects_what_is_applied():
     law = slip_observer(GAINS, (F("0.9"), F("3.5"), F("3.2")), SLIP_ALONE, GAIN)
-    controller = SampledController(law=law, step=STEP, limits=FollowingLimits(width=F(50), per_slip=F(0)))
-    z = [1e-6, -1e-6, 1e-6, 20.0, 30.0, -5.0]
-    wide = replace(LOOSE, width=F(10**9))
-    free, loose = (SampledController(law=law, step=STEP, limits=limits) for limits in (None, wide))
+    limit = RestLimit(width=F(50), per_slip=F(0), resolution=F(1, 10**6))
+    limited, free = (SampledController(law=law, step=STEP, rest_limit=one) for one in (limit, None))
+    z = [1e-6, -1e-6, 1e-6, 20.0, 30.0, 1.5e-6]
     asked, expected = stepped(free, z[:4], 2e-6, 0.0, 0.0)
-    assert stepped(loose, z, 2e-6, 0.0, 0.0)[0] == pytest.approx(asked)
-    applied, found = stepped(controller, z, 2e-6, 0.0, 0.0)
-    assert applied == pytest.approx(cut(asked, 30.0, -5.0, 50), rel=1e-12) != asked
+    applied, found = stepped(limited, z, 2e-6, 0.0, 0.0)
+    assert applied == pytest.approx(-20, rel=1e-12)
+    assert asked < -21
     beyond = 2.282e-8 * (applied - asked)
     expected = [expected[0] + 0.002 * beyond, expected[1] + 0.01 * beyond, expected[2], applied]
-    assert found == pytest.approx([*expected, 30.0, applied], rel=1e-9)
+    assert found == pytest.approx([*expected, 30.0, 2e-6], rel=1e-9)
+    moving = [*z[:5], 0.5e-6]  # by more than the resolution
+    assert stepped(limited, moving, 2e-6, 0.0, 0.0)[0] == asked
 
 
-def test_limits_are_not_reached_where_the_pressure_follows_one_that_moves_with_the_reference():
-    """|p − p*| ≤ 50 Pa and |dp*/dr| ≤ 7 Pa/m, p* from 0: never, however p* turns; beyond 50 Pa they are."""
+def test_it_is_not_reached_where_the_pressure_follows_one_that_moves_with_the_reference():
+    """|p − p*| ≤ 50 Pa and |dp*/dr| ≤ 7 Pa/m, p* from 0: never, however p* turns; beyond 50 Pa it is."""
     law = summed_integrals((F(1), F(0), F(0), F(0)), F(1))  # p = −e1
-    controller = SampledController(law=law, step=F(1), limits=LOOSE)
+    controller = SampledController(law=law, step=F(1), rest_limit=LOOSE)
     for away, reached in ((50, False), (70, True)):
         random, cuts = np.random.default_rng(3), 0
         for _ in range(20):
@@ -125,7 +126,7 @@ def test_limits_are_not_reached_where_the_pressure_follows_one_that_moves_with_t
                 reference, rest = reference + moved, rest + 7 * moved * random.choice([-1, 1, 1])
                 asked = rest + away * random.choice([-1, 1])
                 pressure, z = stepped(controller, z, -asked, 0.0, reference)
-                cuts += not np.isclose(pressure, asked, rtol=1e-12)
+                cuts += not np.isclose(pressure, asked, rtol=1e-9, atol=1e-9)
         assert (cuts > 0) == reached
 
 
@@ -141,9 +142,10 @@ def test_on_a_fault_that_sticks_the_pressure_stays_where_it_is_proved_to_stay(pr
 
 
 def test_single_runs_campaigns_and_python_control_cut_alike(proved):
-    tight = replace(proved.controller, limits=FollowingLimits(width=F(4000), per_slip=F(10**6)))
+    limit = RestLimit(width=F(4000), per_slip=F(10**6), resolution=F(1))
+    tight = replace(proved.controller, rest_limit=limit)
     run = simulate(REAL, tight, duration=18.4, samples=101)
-    free = simulate(REAL, replace(tight, limits=None), duration=18.4, samples=101)
+    free = simulate(REAL, replace(tight, rest_limit=None), duration=18.4, samples=101)
     assert np.abs(run.pressure - free.pressure).max() > 1000
     slow = simulate(REAL, tight, duration=18.4, samples=101, compiled=False)
     assert np.array_equal(run.pressure, slow.pressure)
@@ -160,10 +162,10 @@ def test_single_runs_campaigns_and_python_control_cut_alike(proved):
 
 def test_a_guarantee_has_limits_of_what_it_proves(proved):
     """Twice what the proved pressure is beyond p*, and what p* does while a pressure is on its way, rounded up."""
-    claim, limits = proved, proved.limits
+    claim, limit = proved, proved.rest_limit
     low, high = claim.task.rest_pressure
     beyond = max(low - claim.claims.least_pressure, claim.claims.largest_pressure - high)
-    assert 2 * beyond <= limits.width <= F(1001, 1000) * 2 * beyond
+    assert 2 * beyond <= limit.width <= F(1001, 1000) * 2 * beyond
     steepest = 0.0
     stiff, _, wide = (float(v) for v in claim.task.spreads)
     for k, n in product((1 - stiff, 1 + stiff), (1 - wide, 1 + wide)):  # friction and p* together carry the spring
@@ -171,68 +173,82 @@ def test_a_guarantee_has_limits_of_what_it_proves(proved):
         friction = 0.2353 + 0.1 * np.exp(-slip / 0.27635)
         rest = 50e6 - (0.3353 * 50e6 - k / n * 30e9 / 5000 * slip) / friction
         steepest = max(steepest, float(np.abs(np.diff(rest) / np.diff(slip)).max()))
-    assert steepest <= limits.per_slip <= 3 * steepest
+    assert steepest <= limit.per_slip <= 3 * steepest
     late = replace(claim, held=replace(claim.held, delay=F(1, 2)))
-    more = float(limits.per_slip * claim.task.reference_rates[0] / 2)
-    assert float(late.limits.width - limits.width) == pytest.approx(more, rel=0.1, abs=0.001 * float(limits.width))
-    assert claim.controller == replace(claim.held.controller, limits=limits)
+    more = float(limit.per_slip * claim.task.reference_rates[0] / 2)
+    assert float(late.rest_limit.width - limit.width) == pytest.approx(more, rel=0.1, abs=0.001 * float(limit.width))
+    assert claim.controller == replace(claim.held.controller, rest_limit=limit)
+    way = float(claim.task.reference_rates[0]) * 0.184
+    assert float(limit.resolution) == pytest.approx(way / 100, rel=1e-3)
+    noisy = replace(claim, held=replace(claim.held, slip_noise=F(1, 10**6)))
+    assert float(noisy.rest_limit.resolution) == pytest.approx(2e-6 + way / 100, rel=1e-3)
 
 
-def test_the_adversary_s_limits_are_those_of_the_run(proved):
+def test_the_adversary_s_limit_is_that_of_the_run(proved):
     """Of random errors while the reference goes at its largest rate: pressures and states of both, sample by sample."""
     task, law, random = proved.task, proved.held.law, np.random.default_rng(2)
     authority, pace = float(task.authority), float(task.reference_rates[0])
-    exact = FollowingLimits(width=F(4000), per_slip=task.drift / task.authority / task.reference_rates[0])
-    controller = replace(proved.controller, limits=exact)
-    limits = replace(_Limits.of(proved, 6, 1), width=4000 * authority, moved=0.0)
+    exact = RestLimit(
+        width=F(4000), per_slip=task.drift / task.authority / task.reference_rates[0], resolution=F(1, 10**6)
+    )
+    controller = replace(proved.controller, rest_limit=exact)
+    limit = replace(
+        _Limit.of(proved, 6, np.array([pace])),
+        width=4000 * authority,
+        moved=0.0,
+        rests=np.array([1e-6 - pace * 0.184]),
+    )
+    limit.last = limit.last + pace * 0.184  # the reference has not moved before the first sample
     rows, seen, output, fed = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output, law.feedback))
     z, told, cuts = [0.0] * 4, np.zeros(2), 0
-    for number in range(40):
+    for number in range(60):
         errors = random.normal(0, [1e-5, 5e-5])
         asked = output @ told + fed @ errors
-        (state,) = limits.cut(np.array([[*errors, *(rows @ told + seen @ errors), asked * authority, 0.0]]))
+        (state,) = limit.cut(np.array([[*errors, *(rows @ told + seen @ errors), asked * authority, 0.0]]))
         told = state[2:4]
         pressure, z = stepped(controller, z, *errors, number * pace * 0.184)
         cuts += abs(pressure - asked) > 1
         assert state[4] / authority == pytest.approx(pressure, rel=1e-9, abs=1e-6)
         assert told == pytest.approx(z[:2], rel=1e-9)
-        limits.follow(np.zeros((1, 6)), np.zeros((1, 6)))
-        limits.moved = float(task.drift * STEP)
+        limit.follow(np.zeros((1, 6)), np.zeros((1, 6)))
+        limit.moved = float(task.drift * STEP)
     assert 5 < cuts < 40
 
 
 def test_behind_a_lag_or_rock_and_for_a_law_that_is_not_told_there_are_none(proved):
     others = {"lag": F(1)}, {"diffusion": F(1)}, {"law": replace(proved.held.law, applied=())}
     for other in others:
-        assert replace(proved, held=replace(proved.held, **other)).limits is None
+        assert replace(proved, held=replace(proved.held, **other)).rest_limit is None
 
 
 def test_the_compensated_step_is_told_what_is_applied():
     """Deadbeat, p = (−e1/T_s − e2)/(T_sB0) − d, d ← d + a[(e2 − e2⁻)/(T_sB0) − p⁻ − d] with the p⁻ that was applied."""
     made = answer(REAL, controller="cta").compensation
-    weight, authority, per_slip = float(made.weight), float(made.authority), float(made.found.limits.per_slip)
-    assert dict(made.limited.sampling.settings)["limit_width"] == made.found.limits.width
+    weight, authority, per_slip = float(made.weight), float(made.authority), float(made.found.rest_limit.per_slip)
+    assert dict(made.limited.sampling.settings)["rest_width"] == made.found.rest_limit.width
     law, gain = replace(made.controller, sampling=None), 0.184 * authority
-    scheme = Compensated(weight=weight, authority=authority, limit_width=15000.0, limit_per_slip=per_slip)
+    scheme = Compensated(
+        weight=weight, authority=authority, rest_width=15000.0, rest_per_slip=per_slip, rest_resolution=1.0
+    )
     run = simulate(REAL, law, scheme=scheme, duration=18.4, samples=101)
     errors = zip(run.slip - run.reference, run.slip_rate - run.reference_rate, run.reference, strict=True)
-    level, before, highest, lowest, last, cuts, found = 0.0, None, 0.0, 0.0, 0.0, 0, []
+    level, before, highest, last, cuts, found = 0.0, None, 0.0, 0.0, 0, []
     for e1, e2, reference in errors:
         level = 0.0 if before is None else level + weight * ((e2 - before[0]) / gain - before[1] - level)
         asked = (-e1 / 0.184 - e2) / gain - level
-        moved = per_slip * abs(reference - last)
-        highest, lowest, last = highest - moved, lowest + moved, reference
-        applied = cut(asked, highest, lowest, 15000.0)
-        highest, lowest, before = max(highest, applied), min(lowest, applied), (e2, applied)
+        highest, last = highest - per_slip * abs(reference - last), reference
+        applied = cut(asked, highest, 15000.0)
+        highest, before = max(highest, applied), (e2, applied)
         cuts += applied != asked
         found.append(applied)
     assert 5 < cuts < 95
     assert run.pressure == pytest.approx(found, rel=1e-6, abs=1e-3)
     with pytest.raises(ParameterError, match="positive width"):
-        Compensated(limit_width=0.0)
+        Compensated(rest_width=0.0)
 
 
-@pytest.mark.parametrize(("width", "per_slip"), [(F(0), F(1)), (F(-1), F(1)), (F(1), F(-1))])
-def test_limits_that_make_no_sense_are_refused(width, per_slip):
+@pytest.mark.parametrize("wrong", [(0, 1, 0), (-1, 1, 0), (1, -1, 0), (1, 1, -1)])
+def test_a_limit_that_makes_no_sense_is_refused(wrong):
+    width, per_slip, resolution = map(F, wrong)
     with pytest.raises(ParameterError, match="positive width"):
-        FollowingLimits(width=width, per_slip=per_slip)
+        RestLimit(width=width, per_slip=per_slip, resolution=resolution)
