@@ -25,3 +25,32 @@ def law_expressions(controller: Controller) -> tuple[sp.Expr, tuple[sp.Expr, ...
         reference_acceleration=r_acceleration,
     )
     return controller.pressure(signals), controller.integral_rates(signals)
+
+
+def cut_off(
+    asked: sp.Expr,
+    states: tuple[sp.Expr, ...],
+    slip: sp.Expr,
+    reference: sp.Expr,
+    width: sp.Expr,
+    per_slip: sp.Expr,
+    resolution: sp.Expr,
+) -> tuple[sp.Expr, ...]:
+    """The pressure [Pa] that is applied at a sample in place of what is asked for, and `RestLimit.STATES` after it.
+
+    Parameters
+    ----------
+    asked : Expr
+        [Pa].
+    states : tuple of Expr
+        `RestLimit.STATES` before it.
+    slip, reference : Expr
+        [m].
+    width, per_slip, resolution : Expr
+        [Pa], [Pa/m], [m].
+    """
+    highest, last = states
+    moved = per_slip * reference
+    short = sp.Max(highest - moved - width - asked, 0)
+    applied = asked + sp.Piecewise((short, slip <= last + resolution), (0, True))
+    return applied, highest + sp.Max(applied + moved - highest, 0), slip

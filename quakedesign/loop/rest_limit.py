@@ -2,12 +2,9 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, ClassVar
-
-import sympy as sp
+from typing import ClassVar
 
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import to_sympy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,37 +49,3 @@ class RestLimit:
                 f"{float(self.width):.4g} Pa, {float(self.per_slip):.4g} Pa/m and {float(self.resolution):.4g} m. "
                 "Check their signs."
             )
-
-    def cut(self, asked: sp.Expr, states: tuple[Any, ...], slip: sp.Expr, reference: sp.Expr) -> tuple[sp.Expr, ...]:
-        """`cut_off` by this limit."""
-        numbers = (to_sympy(v) for v in (self.width, self.per_slip, self.resolution))
-        return cut_off(asked, states, slip, reference, *numbers)
-
-
-def cut_off(
-    asked: sp.Expr,
-    states: tuple[Any, ...],
-    slip: sp.Expr,
-    reference: sp.Expr,
-    width: sp.Expr,
-    per_slip: sp.Expr,
-    resolution: sp.Expr,
-) -> tuple[sp.Expr, ...]:
-    """The pressure [Pa] that is applied at a sample in place of what is asked for, and `RestLimit.STATES` after it.
-
-    Parameters
-    ----------
-    asked : Expr
-        [Pa].
-    states : tuple of Expr
-        `RestLimit.STATES` before it.
-    slip, reference : Expr
-        [m].
-    width, per_slip, resolution : Expr
-        [Pa], [Pa/m], [m].
-    """
-    highest, last = states
-    moved = per_slip * reference
-    short = sp.Max(highest - moved - width - asked, 0)
-    applied = asked + sp.Piecewise((short, slip <= last + resolution), (0, True))
-    return applied, highest + sp.Max(applied + moved - highest, 0), slip

@@ -11,6 +11,7 @@ import sympy as sp
 
 from quakedesign.controllers import Controller, LoopField, Sampling, Signals
 from quakedesign.errors import UnsupportedError
+from quakedesign.loop.law_expressions import cut_off
 from quakedesign.loop.laws import LinearLaw
 from quakedesign.loop.rest_limit import RestLimit
 from quakedesign.rationals import to_sympy
@@ -91,7 +92,9 @@ class SampledController(Controller):
         if self.rest_limit is None:
             return asked, sp.S.Zero, ()
         states = signals.integrals[len(self.law.states) :]
-        applied, *after = self.rest_limit.cut(asked, states, signals.slip, signals.slip - signals.slip_error)
+        limit, reference = self.rest_limit, signals.slip - signals.slip_error
+        numbers = (to_sympy(v) for v in (limit.width, limit.per_slip, limit.resolution))
+        applied, *after = cut_off(asked, states, signals.slip, reference, *numbers)
         return applied, (applied - asked) / to_sympy(self.step), tuple(after)
 
     def _read(self, signals: Signals) -> tuple[Any, ...]:

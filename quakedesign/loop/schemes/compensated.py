@@ -10,7 +10,8 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.compensation import answered, followed
-from quakedesign.loop.rest_limit import RestLimit, cut_off
+from quakedesign.loop.law_expressions import cut_off
+from quakedesign.loop.rest_limit import RestLimit
 from quakedesign.loop.schemes.base import Stepped
 from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.backward import backward_euler, inclusion
