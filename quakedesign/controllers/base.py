@@ -265,6 +265,11 @@ class Controller(Law):
         return None
 
     @property
+    def while_moving(self) -> "Controller":
+        """The law of a fault that moves, without what it does at rest alone."""
+        return self
+
+    @property
     def scale(self) -> Fraction | None:
         """λ [-], which stretches the loop; None for a law without."""
         return None

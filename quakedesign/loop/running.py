@@ -1,7 +1,7 @@
 """A linear law of samples as a controller that simulations run."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
@@ -62,6 +62,11 @@ class SampledController(Controller):
     def of_slip(self) -> LinearLaw | None:
         """The law, if it does without the slip rate."""
         return self.law if self.law.of_slip_alone else None
+
+    @property
+    def while_moving(self) -> "SampledController":
+        """The linear law, without its limit at rest."""
+        return replace(self, rest_limit=None)
 
     @property
     def gain_units(self) -> Mapping[str, str]:  # type: ignore[override]

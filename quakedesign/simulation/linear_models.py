@@ -64,7 +64,7 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0) -> Any:
     ----------
     fault : Fault
     controller : Controller
-        A linear law. One of samples is taken with a pressure that is held over its T_s.
+        A linear law, as it is while the fault moves. One of samples has a pressure that is held over its T_s.
     at : float
         Slip [m] about which the fault is linearised.
 
@@ -87,7 +87,7 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0) -> Any:
     """
     import control
 
-    plant, law = to_statespace(fault, at), _linear(to_iosystem(controller))
+    plant, law = to_statespace(fault, at), _linear(to_iosystem(controller.while_moving))
     if law.dt:
         plant = control.sample_system(plant, law.dt, method="zoh")
     return control.ss(-law * plant, name=f"{controller.name} around {fault.name}", inputs=["p"], outputs=["answer"])

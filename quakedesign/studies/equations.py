@@ -44,9 +44,10 @@ def _with_state(fault: Fault) -> list[str]:
 
 
 def law_latex(law: Controller | None) -> list[str]:
-    """Pressure that a law asks for and the rates of its states, with its numbers to four digits; none of no law."""
+    """Pressure that a law asks for while a fault moves and the rates of its states, in four digits; none of no law."""
     if law is None:
         return []
+    law = law.while_moving
     states = sp.symbols([f"z_{i}" for i in range(1, len(law.integral_units) + 1)], real=True)
     signals = Signals(
         slip=plant.x1,

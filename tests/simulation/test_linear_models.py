@@ -67,7 +67,7 @@ def test_a_law_of_samples_meets_a_fault_that_is_held():
     assert loop.dt == pytest.approx(0.184)
     steep, push, _ = closed_form(0.0)
     held = expm(np.array([[0, 1, 0], [steep, -1.6, push], [0, 0, 0]]) * 0.184)
-    law = qd.to_iosystem(design.controller)
+    law = qd.to_iosystem(design.controller.while_moving)
     n = law.nstates
 
     def closed(z):  # one period, step by step
