@@ -42,6 +42,8 @@ def test_a_designed_loop_with_its_file(call, tmp_path):
     assert F(found["pressure"][0]) < -14_000_000
     assert F(found["pressure"][1]) > 14_000_000
     assert 0 < found["small_gain"] < 1
+    assert len(found["law"]["applied"]) == len(found["law"]["states"])
+    assert F(found["rest_limit"]["width"]) >= 2 * (F(found["pressure"][1]) - 14_050_000)  # p* is at most 14.05 MPa
     for seen in ("worst_found", "worst_found_with_stick"):
         assert 0 < found[seen]["slip_error"] <= F(found["slip_error"])
         assert F(found["slip_rate_error"]) / 2 <= found[seen]["slip_rate_error"] <= F(found["slip_rate_error"])

@@ -27,7 +27,7 @@ from quakedesign.simulation import Variation, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
 from quakedesign.synthesis import answer
-from quakedesign.synthesis.guaranteed.adversary import _Limit
+from quakedesign.synthesis.guaranteed.adversary import _Limit, _searched
 
 REAL, STEP, GAIN = load_fault("real-fault"), F("0.184"), F("2.282e-8")
 GAINS = F(672300000), F(206000000)
@@ -213,6 +213,15 @@ def test_the_adversary_s_limit_is_that_of_the_run(proved):
         limit.follow(np.zeros((1, 6)), np.zeros((1, 6)))
         limit.moved = float(task.drift * STEP)
     assert 5 < cuts < 40
+
+
+def test_the_adversary_is_held_by_the_limit_and_only_with_stick(proved, monkeypatch):
+    """Where the pressure may never fall, however fast the fault goes, what pushes forward makes an earthquake."""
+    before = [_searched(proved, sticks) for sticks in (False, True)]
+    never = RestLimit(width=F(1, 100), per_slip=F(0), resolution=F(10**9))
+    monkeypatch.setattr(type(proved), "rest_limit", property(lambda _: never))
+    assert _searched(proved, False) == before[0]
+    assert before[1][1] < proved.claims.slip_rate_error < _searched(proved, True)[1] / 10
 
 
 def test_behind_a_lag_or_rock_and_for_a_law_that_is_not_told_there_are_none(proved):

@@ -35,7 +35,7 @@ _NOISE_WORDS = {
     "rate_noise": "with any noise of at most {:.6g} m/s in the measured slip rate",
 }
 _MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
-_RESTS = Fraction(1, 100)
+_RESTS = Fraction(1, 100)  # of the largest rate of the reference: below that a fault counts as at rest
 _TURNS = 32  # of claims that follow from themselves
 
 

@@ -209,4 +209,5 @@ def _law(law: LinearLaw) -> dict[str, Any]:
         "measured": [[str(v) for v in row] for row in law.measured],
         "output": [str(v) for v in law.output],
         "feedback": [str(v) for v in law.feedback],
+        "applied": [str(v) for v in law.applied],
     }

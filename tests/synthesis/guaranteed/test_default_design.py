@@ -49,6 +49,8 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     assert (design.verdict, found.check()) == (Verdict.PROVED, Verdict.PROVED)
     assert design.certificate is None
     assert design.controller.step == found.held.step == F("0.184")
+    assert design.controller.rest_limit == found.rest_limit
+    assert found.rest_limit is not None
     assert found.claims.slip_rate_error < F(3, 10**4)
     assert all(p.holds for p in design.premises)
     assert premises(design)["sampling_time"].certified >= F("0.6")

@@ -37,7 +37,9 @@ def test_a_design_is_searched_once(task, tmp_path, monkeypatch):
     monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
     first = design.first_held(task, STEP)[0]
     monkeypatch.setattr(design, "_search", None)
-    assert design.first_held(task, STEP)[0] == first
+    again = design.first_held(task, STEP)[0]
+    assert (again, again.rest_limit) == (first, first.rest_limit)
+    assert again.held.law.applied == first.held.law.applied != ()
     with pytest.raises(TypeError):
         design.first_held(task, STEP / 2)
     worst = adversary.worst_found(first)
