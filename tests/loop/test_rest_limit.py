@@ -174,9 +174,9 @@ def test_a_guarantee_has_limits_of_what_it_proves(proved):
         rest = 50e6 - (0.3353 * 50e6 - k / n * 30e9 / 5000 * slip) / friction
         steepest = max(steepest, float(np.abs(np.diff(rest) / np.diff(slip)).max()))
     assert steepest <= limit.per_slip <= 3 * steepest
-    late = replace(claim, held=replace(claim.held, delay=F(1, 2)))
-    more = float(limit.per_slip * claim.task.reference_rates[0] / 2)
-    assert float(late.rest_limit.width - limit.width) == pytest.approx(more, rel=0.1, abs=0.001 * float(limit.width))
+    late = replace(claim, held=replace(claim.held, delay=F(100)))  # so that it counts in four digits
+    more = float(limit.per_slip * claim.task.reference_rates[0] * 100)
+    assert float(late.rest_limit.width - limit.width) == pytest.approx(more, rel=0.01)
     assert claim.controller == replace(claim.held.controller, rest_limit=limit)
     way = float(claim.task.reference_rates[0]) * 0.184
     assert float(limit.resolution) == pytest.approx(way / 100, rel=1e-3)
@@ -213,6 +213,13 @@ def test_the_adversary_s_limit_is_that_of_the_run(proved):
         limit.follow(np.zeros((1, 6)), np.zeros((1, 6)))
         limit.moved = float(task.drift * STEP)
     assert 5 < cuts < 40
+
+
+def test_where_p_star_drifts_all_pressures_that_count_from_it_move(proved):
+    limit = _Limit.of(proved, 6, np.array([0.0])).anew()
+    limit.cut(np.array([[0.0, 0.0, 0.0, 0.0, 3.0, 0.0]]))
+    limit.follow(np.zeros((1, 6)), np.array([[0.0, 0.0, 0.0, 0.0, -2.0, 0.0]]))
+    assert limit.highest == pytest.approx([1.0])
 
 
 def test_the_adversary_is_held_by_the_limit_and_only_with_stick(proved, monkeypatch):
