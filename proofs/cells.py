@@ -62,6 +62,25 @@ def restrict(function: SignedSum, cell: "Cell", values: dict[str, Fraction]) -> 
     return total
 
 
+def restrict_to_ends(function: SignedSum, cell: "Cell", loop: Loop, name: str) -> tuple[Polynomial, Polynomial]:
+    """Write an argument on one cell with the smallest and the largest coefficients that roots in their ranges give it.
+
+    Every root is at least 0, so that a term is extreme where all its roots are at the same end.
+    """
+    small: Polynomial = {}
+    large: Polynomial = {}
+    lower, upper = ({key: ends[i] for key, ends in loop.uncertain.items()} for i in (0, 1))
+    for key, number in function.items():
+        at_ends = restrict({key: number}, cell, lower), restrict({key: number}, cell, upper)
+        (exponents,) = at_ends[1] or [()]
+        values = [entry.get(exponents, Fraction(0)) for entry in at_ends]
+        add(small, exponents, min(values))
+        add(large, exponents, max(values))
+    signs = [small.get(e, Fraction(0)) * large.get(e, Fraction(0)) for e in small | large]
+    need(all(sign > 0 for sign in signs), name, "with coefficients whose signs the ranges of roots decide", "others")
+    return small, large
+
+
 def degree_of(form: Polynomial, name: str) -> int:
     """Return the degree of a nonzero form."""
     degrees = {sum(exponents) for exponents in form}
@@ -90,9 +109,11 @@ def reach_of(form: Polynomial, reaches: dict[int, set[int]], count: int) -> set[
 
 
 def cells_with_lifts(loop: Loop) -> list[Cell]:
-    """Return the cells with an interior; a lift P gives t*w^n = P or, where only its sign occurs, t*P >= 0."""
+    """Return the cells with an interior; a lift P gives t*w^n = P or, where only its sign occurs, t*P >= 0.
+
+    Where roots in P vary, t*P takes its largest coefficients: the variables are not negative.
+    """
     count, degrees, cells = len(loop.weights), dict[str, int](), []
-    fixed = {name: low for name, (low, high) in loop.uncertain.items() if low == high}
     terms = [*chain(*loop.field.values()), *(term for term in chain(*loop.lifts.values()) if term.number)]
     for i, lift in enumerate(loop.lifts, count):
         need(any(term.odd[i] or term.exponents[i] for term in terms), f"lift {lift}", "used", "one that is not")
@@ -101,16 +122,19 @@ def cells_with_lifts(loop: Loop) -> list[Cell]:
     for label, signs in cells_of([(1, -1)] * (count + len(arguments))).items():
         cell, reaches = Cell(f" {label}", count, signs, dict.fromkeys(range(count), 1), [], []), dict[int, set[int]]()
         for i, (lift, argument) in enumerate(zip(loop.lifts, arguments, strict=True), count):
-            form, size = restrict(argument, cell, fixed), len(cell.degrees)
+            (small, form), size = restrict_to_ends(argument, cell, loop, f"lift {lift}"), len(cell.degrees)
             degree = degree_of(form, f"lift {lift}")
             need(degrees.setdefault(lift, degree) == degree, f"lift {lift}", "of one degree on all cells", degree)
             reach = reach_of(form, reaches, count)
             if i in raised:
+                need(
+                    small == form, f"lift {lift}", "without roots that vary, or used by its sign only", "a power of it"
+                )
                 reaches[size], cell.degrees[i] = reach, degree
                 power: Polynomial = {(*[0] * size, degree): signs[i]}
                 cell.equalities.append(add_scaled(power, Fraction(-1), widen([form], size + 1)[0]))
             else:
-                cell.inequalities.append(add_scaled({}, Fraction(signs[i]), form))
+                cell.inequalities.append(add_scaled({}, Fraction(signs[i]), form if signs[i] > 0 else small))
         if cell.has_interior():
             cells.append(cell)
     return cells

@@ -93,7 +93,7 @@ def pad_terms(terms: list[Term], size: int) -> list[Term]:
 def read_lifts(value: dict[str, Any], loop: Loop) -> dict[str, list[Term]]:
     """Read the arguments of nested powers, each of states and of the lifts before it.
 
-    Terms with a gain or constant zero are disregarded; the others must not vary at a given state.
+    Terms with a gain or constant zero are disregarded; of the others only roots may have a range.
     """
     lifts: dict[str, list[Term]] = {}
     for lift, entries in value.items():
@@ -101,7 +101,7 @@ def read_lifts(value: dict[str, Any], loop: Loop) -> dict[str, list[Term]]:
         lifts[lift] = read_terms(entries, where, replace(loop, lifts=lifts))
         for name in chain.from_iterable(term.uncertain for term in lifts[lift] if term.number):
             low, high = loop.uncertain[name]
-            need(low == high, where, "without parameters that vary", name)
+            need(low == high or name in loop.roots, where, "without parameters that vary", name)
     return {lift: pad_terms(terms, len(loop.weights) + len(lifts)) for lift, terms in lifts.items()}
 
 

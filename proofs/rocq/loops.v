@@ -350,6 +350,75 @@ Proof.
     destruct (Rle_lt_dec 0 b); nra.
 Qed.
 
+(* Where no parameter is negative, every term at the ends of the ranges where it is largest on a cell. *)
+Definition ends (signs : list bool) (columns : list column) (ranges : list (Q * Q)) (t : monomial_term) : list Q :=
+  match cell_powers signs columns (powers t) with
+  | Some (n, _) => if Bool.eqb n (Qnum (number t) <? 0)%Z then map snd ranges else map fst ranges
+  | None => nil
+  end.
+Fixpoint at_most (signs : list bool) (columns : list column) (ranges : list (Q * Q)) (e : expression) : option polynomial :=
+  match e with
+  | nil => Some nil
+  | t :: e => match cell_polynomial signs columns (ends signs columns ranges t) [t], at_most signs columns ranges e with
+              | Some a, Some p => Some (a ++ p)
+              | _, _ => None
+              end
+  end.
+Definition not_negative (ranges : list (Q * Q)) (e : expression) : bool :=
+  forallb (fun t => forallb (fun i => Qle_bool 0 (nth i (map fst ranges) 0%Q)) (parameters t)) e.
+
+Lemma between : forall ranges l, in_ranges l ranges -> forall i,
+  at_vertex (map fst ranges) i <= listed l i <= at_vertex (map snd ranges) i.
+Proof.
+  assert (zero : Q2R 0 = 0) by (unfold Q2R; cbn; field).
+  induction ranges as [| [low high] ranges H]; intros [| t l] inside i; cbn in inside; try contradiction.
+  - unfold at_vertex, listed. destruct i; cbn; lra.
+  - destruct inside as [here more]. destruct i as [| i]; [exact here | exact (H l more i)].
+Qed.
+
+Lemma parameters_between ranges l q : in_ranges l ranges ->
+  forallb (fun i => Qle_bool 0 (nth i (map fst ranges) 0%Q)) q = true ->
+  0 <= parameters_value (at_vertex (map fst ranges)) q <= parameters_value (listed l) q /\
+  parameters_value (listed l) q <= parameters_value (at_vertex (map snd ranges)) q.
+Proof.
+  intro inside. unfold parameters_value. induction q as [| i q H]; cbn [forallb fold_right]; intro pos; [lra |].
+  apply andb_prop in pos as [pi pq]. destruct (H pq) as [[h0 h1] h2]. destruct (between _ _ inside i) as [b1 b2].
+  apply Qle_bool_iff, Qle_Rle in pi. replace (Q2R 0) with 0 in pi by (unfold Q2R; cbn; field).
+  fold (at_vertex (map fst ranges) i) in pi. repeat split; [apply Rmult_le_pos; assumption | |]; apply Rmult_le_compat; lra.
+Qed.
+
+Lemma monomial_positive u : (forall k, 0 < u k) -> forall l k, 0 < monomial_value u k l.
+Proof.
+  intro pos. induction l as [| n l H]; intro k; cbn; [lra |]. apply Rmult_lt_0_compat; [now apply pow_lt | apply H].
+Qed.
+
+Lemma at_point_app u a b : at_point u (a ++ b) = at_point u a + at_point u b.
+Proof. unfold at_point. induction a as [| c a H]; cbn; [ring | rewrite H; ring]. Qed.
+
+Lemma value_at_most x u signs columns ranges l : in_cell x u 0 signs columns -> (forall k, 0 < u k) -> in_ranges l ranges ->
+  forall e p, not_negative ranges e = true -> at_most signs columns ranges e = Some p ->
+  expression_value x (listed l) e <= at_point u p.
+Proof.
+  intros cell pos inside. induction e as [| t e H]; intros p fine some; cbn [at_most] in some; [injection some as <-; cbn; lra |].
+  cbn [not_negative forallb] in fine. apply andb_prop in fine as [ft fe].
+  destruct (cell_polynomial signs columns (ends signs columns ranges t) [t]) as [a |] eqn:one; [| discriminate].
+  destruct (at_most signs columns ranges e) as [q |]; [| discriminate]. injection some as <-.
+  rewrite at_point_app, expression_value_cons. pose proof (H q fe eq_refl) as rest.
+  rewrite (value_cell_polynomial _ _ _ _ _ cell _ _ one), expression_value_cons. cbn [expression_value fold_right].
+  enough (term_value x (listed l) t <= term_value x (at_vertex (ends signs columns ranges t)) t) by lra.
+  destruct (parameters_between ranges l (parameters t) inside ft) as [[low0 low] high]. unfold term_value, ends.
+  cbn [cell_polynomial] in one. destruct (cell_powers signs columns (powers t)) as [[n es] |] eqn:known; [| discriminate].
+  rewrite (value_cell_powers _ _ _ _ _ _ _ _ known cell). pose proof (monomial_positive u pos es 0) as mono.
+  assert (size : if (Qnum (number t) <? 0)%Z then Q2R (number t) <= 0 else 0 <= Q2R (number t)).
+  { pose proof (Rinv_0_lt_compat _ (IZR_lt 0 _ (Pos2Z.is_pos (Qden (number t))))) as inv. unfold Q2R.
+    destruct (Z.ltb_spec (Qnum (number t)) 0) as [neg | up].
+    - apply IZR_lt in neg. nra.
+    - apply IZR_le in up. nra. }
+  set (m := monomial_value u 0 es) in *. set (c := Q2R (number t)) in *.
+  destruct n, (Qnum (number t) <? 0)%Z; cbn [Bool.eqb]; [assert (0 <= - c * m) by nra | assert (0 <= c * m) by nra |
+    assert (0 <= - c * m) by nra | assert (0 <= c * m) by nra]; nra.
+Qed.
+
 (* ---------------------------------------------------------------- every cell and every end *)
 
 (* A polynomial over its common denominator. *)
@@ -389,12 +458,12 @@ Definition magnitude (lift : nat * expression) : expression :=
   product_of [Monomial 1 nil (power_of (fst lift) (0%Q, true))] (snd lift).
 Definition constant (e : expression) : bool := forallb (fun t => match parameters t with nil => true | _ => false end) e.
 
-Fixpoint prepared_on (signs : list bool) (l : list expression) : list prepared :=
+Fixpoint prepared_by (form : expression -> option polynomial) (l : list expression) : list prepared :=
   match l with
   | nil => nil
-  | e :: l => match cell_polynomial signs columns nil e with
-              | Some p => prepare p :: prepared_on signs l
-              | None => prepared_on signs l
+  | e :: l => match form e with
+              | Some p => prepare p :: prepared_by form l
+              | None => prepared_by form l
               end
   end.
 
@@ -408,8 +477,8 @@ Definition matching (a : prepared) (gs hs : list prepared) entry : bool :=
        forallb (fun g => if is_variable g then true else first (fun c => equal c (prepare g)) gs) (inequalities q)
   else false.
 Definition covered (e : expression) (known : list (question * (prepared * (list prepared * list prepared)))) (signs : list bool) : bool :=
-  let hs := prepared_on signs (map difference lifts) in
-  let gs := prepared_on signs (map magnitude lifts) in
+  let hs := prepared_by (cell_polynomial signs columns nil) (map difference (filter (fun lift => constant (snd lift)) lifts)) in
+  let gs := prepared_by (at_most signs columns ranges) (map magnitude lifts) in
   if first (fun h => positive_terms (snd h) || positive_terms (scale (-1) (snd h))) hs then true
   else if first (fun g => positive_terms (scale (-1) (snd g))) gs then true
   else forallb (fun v => match cell_polynomial signs columns v e with
@@ -423,7 +492,7 @@ Fixpoint all_signs (l : list column) : list (list bool) :=
   end.
 Definition covers (e : expression) : bool :=
   let known := table in
-  affine e && forallb (fun lift => constant (snd lift)) lifts && forallb (covered e known) (all_signs columns).
+  affine e && forallb (fun lift => not_negative ranges (snd lift)) lifts && forallb (covered e known) (all_signs columns).
 
 Lemma power_of_value x : forall k p j, powers_value x j (power_of k p) = signed_power (x (j + k)%nat) p.
 Proof.
@@ -461,23 +530,23 @@ Qed.
 
 Variable x : nat -> R.
 Hypothesis nonzero : forall k, x k <> 0.
-Hypothesis lifted : Forall (fun lift => x (fst lift) = expression_value x (fun _ => 0) (snd lift)) lifts.
-Hypothesis constants : forallb (fun lift => constant (snd lift)) lifts = true.
+Variable now : list R.
+Hypothesis admissible : in_ranges now ranges.
+Hypothesis lifted : Forall (fun lift => x (fst lift) = expression_value x (listed now) (snd lift)) lifts.
 
-Lemma difference_value p lift : In lift lifts -> expression_value x p (difference lift) = 0.
+Lemma difference_value p lift : In lift lifts -> constant (snd lift) = true -> expression_value x p (difference lift) = 0.
 Proof.
-  intro here. unfold difference. rewrite expression_value_cons, negated_value. unfold term_value; cbn [number parameters powers].
+  intros here fixed. unfold difference. rewrite expression_value_cons, negated_value. unfold term_value; cbn [number parameters powers].
   rewrite power_of_value, first_power by apply nonzero. cbn [Nat.add].
   rewrite (proj1 (Forall_forall _ _) lifted _ here).
-  rewrite (constant_value x p (fun _ => 0) (snd lift)) by exact (proj1 (forallb_forall _ _) constants _ here).
+  rewrite (constant_value x p (listed now) (snd lift) fixed).
   unfold Q2R; cbn. field.
 Qed.
 
-Lemma magnitude_value p lift : In lift lifts -> 0 <= expression_value x p (magnitude lift).
+Lemma magnitude_value lift : In lift lifts -> 0 <= expression_value x (listed now) (magnitude lift).
 Proof.
   intro here. unfold magnitude. rewrite expression_value_product, expression_value_cons. unfold term_value at 1; cbn [number parameters powers].
   rewrite power_of_value, zeroth_power. cbn [Nat.add].
-  rewrite (constant_value x p (fun _ => 0) (snd lift)) by exact (proj1 (forallb_forall _ _) constants _ here).
   rewrite <- (proj1 (Forall_forall _ _) lifted _ here). pose proof (nonzero (fst lift)) as nz.
   replace (Q2R 1) with 1 by (unfold Q2R; cbn; field). cbn [parameters_value fold_right expression_value].
   unfold sign. destruct (Rle_dec 0 (x (fst lift))); nra.
@@ -512,15 +581,21 @@ Proof.
   - left. now apply in_map.
 Qed.
 
-Lemma prepared_conditions signs (u : nat -> R) (holds : R -> Prop) l : in_cell x u 0 signs columns ->
-  (forall e, In e l -> holds (expression_value x (at_vertex nil) e)) ->
-  forall a, In a (prepared_on signs l) -> exists p, a = prepare p /\ holds (at_point u p).
+Lemma prepared_conditions form (u : nat -> R) (holds : R -> Prop) l :
+  (forall e p, In e l -> form e = Some p -> holds (at_point u p)) ->
+  forall a, In a (prepared_by form l) -> exists p, a = prepare p /\ holds (at_point u p).
 Proof.
-  intros cell all a. induction l as [| e l H]; [easy |]. cbn [prepared_on].
-  assert (rest : forall e, In e l -> holds (expression_value x (at_vertex nil) e)) by (intros; apply all; now right).
-  destruct (cell_polynomial signs columns nil e) as [p |] eqn:some; [| now apply H].
-  intros [<- | later]; [| now apply H]. exists p. split; [reflexivity |].
-  rewrite (value_cell_polynomial _ _ _ _ _ cell _ _ some). apply all. now left.
+  intros all a. induction l as [| e l H]; [easy |]. cbn [prepared_by].
+  assert (rest : forall e p, In e l -> form e = Some p -> holds (at_point u p)) by (intros f p later; apply all; now right).
+  destruct (form e) as [p |] eqn:some; [| now apply H].
+  intros [<- | later]; [| now apply H]. exists p. split; [reflexivity |]. apply (all e); [now left | exact some].
+Qed.
+
+Lemma not_negative_magnitude lift : not_negative ranges (snd lift) = true -> not_negative ranges (magnitude lift) = true.
+Proof.
+  unfold magnitude, product_of. cbn [flat_map]. rewrite app_nil_r. unfold not_negative. intro fine.
+  apply forallb_forall. intros t here. apply in_map_iff in here as [t' [<- here]].
+  cbn [product_of_terms parameters app]. exact (proj1 (forallb_forall _ _) fine t' here).
 Qed.
 
 Lemma first_in {A : Type} good (l : list A) : first good l = true -> exists a, In a l /\ good a = true.
@@ -535,16 +610,21 @@ Theorem covers_sound e : covers e = true ->
   Forall (fun q => forall u, (forall k, 0 < u k) -> within u q -> 0 <= at_point u (target q)) questions ->
   forall l, in_ranges l ranges -> 0 <= expression_value x (listed l) e.
 Proof.
-  intros all pos hold l inside. apply andb_prop in all as [aff all]. apply andb_prop in aff as [aff _].
+  intros all pos hold l inside. apply andb_prop in all as [aff all]. apply andb_prop in aff as [aff fine].
   apply (ends_decide x e aff ranges nil); [| exact inside]. intros v here. cbn [app].
   pose proof (proj1 (forallb_forall _ _) all _ (own_signs columns 0 pos)) as mine.
   pose proof (in_own_cell columns 0 (fun j c H => H)) as cell. set (signs := signs_from 0 columns) in *.
-  assert (zeros : forall h, In h (prepared_on signs (map difference lifts)) -> exists p, h = prepare p /\ at_point root_of p = 0).
-  { apply (prepared_conditions signs root_of (fun r => r = 0)); [exact cell |]. intros d is_d.
-    apply in_map_iff in is_d as [lift [<- il]]. now apply difference_value. }
-  assert (ups : forall g, In g (prepared_on signs (map magnitude lifts)) -> exists p, g = prepare p /\ 0 <= at_point root_of p).
-  { apply (prepared_conditions signs root_of (fun r => 0 <= r)); [exact cell |]. intros d is_d.
-    apply in_map_iff in is_d as [lift [<- il]]. now apply magnitude_value. }
+  assert (zeros : forall h, In h (prepared_by (cell_polynomial signs columns nil)
+      (map difference (filter (fun lift => constant (snd lift)) lifts))) -> exists p, h = prepare p /\ at_point root_of p = 0).
+  { apply (prepared_conditions _ root_of (fun r => r = 0)). intros d p is_d some.
+    rewrite (value_cell_polynomial _ _ _ _ _ cell _ _ some).
+    apply in_map_iff in is_d as [lift [<- il]]. apply filter_In in il as [il fixed]. now apply difference_value. }
+  assert (ups : forall g, In g (prepared_by (at_most signs columns ranges) (map magnitude lifts)) ->
+      exists p, g = prepare p /\ 0 <= at_point root_of p).
+  { apply (prepared_conditions _ root_of (fun r => 0 <= r)). intros d p is_d some.
+    apply in_map_iff in is_d as [lift [<- il]]. eapply Rle_trans; [apply (magnitude_value lift il) |].
+    apply (value_at_most x root_of signs columns ranges now cell roots_positive admissible _ _) with (2 := some).
+    apply not_negative_magnitude. exact (proj1 (forallb_forall _ _) fine lift il). }
   unfold covered in mine. cbv zeta in mine.
   match type of mine with (if ?a then _ else _) = _ => destruct a eqn:impossible end.
   { exfalso. apply first_in in impossible as [h [ih one]]. destruct (zeros h ih) as [p [-> z]].
@@ -579,34 +659,33 @@ End Coverage.
 (* ---------------------------------------------------------------- the two inequalities of a loop *)
 
 Definition nowhere_zero (x : nat -> R) := forall k, x k <> 0.
-(* Columns after those of the states: x_k = P(x), and x_k > 0 where it says so. *)
-Definition with_lifts (x : nat -> R) (columns : list column) (lifts : list (nat * expression)) : Prop :=
+(* Columns after those of the states: x_k = P(x) with parameters p, and x_k > 0 where it says so. *)
+Definition with_lifts (x : nat -> R) (p : list R) (columns : list column) (lifts : list (nat * expression)) : Prop :=
   (forall k c, nth_error columns k = Some c -> positive_only c = true -> 0 < x k) /\
-  Forall (fun lift => x (fst lift) = expression_value x (fun _ => 0) (snd lift)) lifts.
+  Forall (fun lift => x (fst lift) = expression_value x (listed p) (snd lift)) lifts.
 Definition all_hold (questions : list question) : Prop :=
   Forall (fun q => forall u, (forall k, 0 < u k) -> within u q -> 0 <= at_point u (target q)) questions.
-Definition constant_lifts (lifts : list (nat * expression)) : bool := forallb (fun lift => constant (snd lift)) lifts.
 Definition rest (v margin : expression) : expression := v ++ negated margin.
 Definition fall (v : expression) (field : list expression) (margin : expression) : expression :=
   negated (rate_from 0 v field ++ margin).
 
 Theorem bound_sound columns questions v margin : all_hold questions ->
-  covers columns nil nil questions (rest v margin) = true -> forall x, nowhere_zero x -> with_lifts x columns nil ->
+  covers columns nil nil questions (rest v margin) = true -> forall x, nowhere_zero x -> with_lifts x nil columns nil ->
   expression_value x (listed nil) margin <= expression_value x (listed nil) v.
 Proof.
   intros hold all x nz [pos lifted].
-  pose proof (covers_sound columns nil nil questions x nz lifted eq_refl _ all pos hold nil I) as ge.
+  pose proof (covers_sound columns nil nil questions x nz nil I lifted _ all pos hold nil I) as ge.
   unfold rest in ge. rewrite expression_value_app, negated_value in ge. lra.
 Qed.
 
-Theorem fall_sound columns lifts ranges questions v field margin : all_hold questions -> constant_lifts lifts = true ->
+Theorem fall_sound columns lifts ranges questions v field margin : all_hold questions ->
   covers columns lifts ranges questions (fall v field margin) = true ->
-  forall x, nowhere_zero x -> with_lifts x columns lifts -> forall p, in_ranges p ranges ->
+  forall x, nowhere_zero x -> forall p, in_ranges p ranges -> with_lifts x p columns lifts ->
   forall d, (forall i, derivable_pt_lim (fun t => expression_value (update x i t) (listed p) v) (x i) (d i)) ->
   along_field d x (listed p) 0 field <= - expression_value x (listed p) margin.
 Proof.
-  intros hold fixed all x nz [pos lifted] p inside d der.
-  pose proof (covers_sound columns lifts ranges questions x nz lifted fixed _ all pos hold p inside) as ge.
+  intros hold all x nz p inside [pos lifted] d der.
+  pose proof (covers_sound columns lifts ranges questions x nz p inside lifted _ all pos hold p inside) as ge.
   unfold fall in ge. rewrite negated_value, expression_value_app in ge.
   rewrite (rate_value x (listed p) v d nz der field 0) in ge. lra.
 Qed.

@@ -114,13 +114,10 @@ class Obligations:
     def lift_degrees(self) -> dict[str, int]:
         """Degree n of every lift's argument, a form in the cell variables."""
         degrees: dict[str, int] = {}
-        for lift, terms in self.loop.lifts.items():
-            values = self._fixed_values()
+        for lift in self.loop.lifts:
             weights = {**self.loop.states, **degrees}
             found = {
-                sum(e)
-                for signs in _signs(tuple(weights))
-                for e in cell_polynomial(self._live(terms, values), weights, signs, values) or [()]
+                sum(e) for signs in _signs(tuple(weights)) for e in self._argument(lift, weights, signs)[1] or [()]
             }
             require(len(found) == 1 and min(found) >= 1, f"the argument of {lift} is no form of one positive degree.")
             degrees[lift] = found.pop()
@@ -149,24 +146,21 @@ class Obligations:
 
     def _cell(self, signs: Mapping[str, int]) -> Cell | None:
         """Cell with its conditions; None where a condition leaves it without interior."""
-        values, weights = self._fixed_values(), {**self.loop.states, **self.lift_degrees}
+        weights = {**self.loop.states, **self.lift_degrees}
         equalities, inequalities = [], []
-        whole = {
-            lift: cell_polynomial(self._live(terms, values), weights, signs, values)
-            for lift, terms in self.loop.lifts.items()
-        }
-        self._require_null_zeros(whole)
-        for lift, terms in self.loop.lifts.items():
-            argument = self._kept(cell_polynomial(self._live(terms, values), weights, signs, values))
+        whole = {lift: self._argument(lift, weights, signs) for lift in self.loop.lifts}
+        self._require_null_zeros({lift: high for lift, (_, high) in whole.items()})
+        for lift, (low, high) in whole.items():
             if lift in self.with_variable:
                 position = len(self.loop.states) + self.with_variable.index(lift)
                 power = tuple(self.lift_degrees[lift] * (i == position) for i in range(self.variables))
-                condition = combination([(Fraction(signs[lift]), {power: Fraction(1)}), (Fraction(-1), argument)])
-                equalities.append(condition)
-                if len({c > 0 for c in condition.values()}) == 1:
+                equality = [(Fraction(signs[lift]), {power: Fraction(1)}), (Fraction(-1), self._kept(high))]
+                equalities.append(combination(equality))
+                if len({c > 0 for c in equalities[-1].values()}) == 1:
                     return None
             else:
-                inequalities.append({e: signs[lift] * c for e, c in argument.items()})
+                largest = self._kept(high if signs[lift] > 0 else low)
+                inequalities.append({e: signs[lift] * c for e, c in largest.items()})
                 if all(c < 0 for c in inequalities[-1].values()):
                     return None
         _require_different(inequalities, [lift for lift in self.loop.lifts if lift not in self.with_variable])
@@ -177,16 +171,41 @@ class Obligations:
         """Number of cell variables of states and lifts."""
         return len(self.loop.states) + len(self.with_variable)
 
-    def _fixed_values(self) -> dict[str, Fraction]:
-        """Values of everything that is a point."""
-        points = {name: low for name, (low, high) in self.loop.ranges.items() if low == high}
-        return {**self.loop.parameters, **points}
+    def _argument(
+        self, lift: str, weights: Mapping[str, int], signs: Mapping[str, int]
+    ) -> tuple[Polynomial, Polynomial]:
+        """Argument of a lift on a cell, with the least and with the largest coefficients that ranges of roots allow.
 
-    def _live(self, terms: tuple[Term, ...], values: Mapping[str, Fraction]) -> tuple[Term, ...]:
-        """Terms of a lift without those that a zero parameter removes; refused if one has a range."""
-        known = self.loop.parameters
-        live = tuple(t for t in terms if all(known.get(p, Fraction(1)) for p in t.parameters))
-        vague = [p for t in live for p in t.parameters if p not in values]
+        Variables and roots are not negative: the argument lies between the two. Refused where the sign of a
+        coefficient depends on the roots.
+        """
+        least, largest = dict[Exponents, Fraction](), dict[Exponents, Fraction]()
+        for term in self._live(lift):
+            ends = [cell_polynomial((term,), weights, signs, values) for values in self._ends]
+            for e in ends[1]:
+                for total, c in zip((least, largest), sorted(p.get(e, Fraction(0)) for p in ends), strict=True):
+                    total[e] = total.get(e, Fraction(0)) + c
+        occurring = [e for e in least if least[e] or largest[e]]
+        known = all(least[e] * largest[e] > 0 for e in occurring)
+        require(known, f"the sign of a coefficient in the argument of {lift} depends on a root.")
+        return {e: least[e] for e in occurring}, {e: largest[e] for e in occurring}
+
+    @cached_property
+    def _ends(self) -> tuple[dict[str, Fraction], ...]:
+        """Values of everything that is a point, with the lower and with the upper ends of roots."""
+        points = {name: ends for name, ends in self.loop.uncertain.items() if ends[0] == ends[1]}
+        ranges = points | {name: ends for name, (_, ends) in self.loop.roots.items()}
+        return tuple({**self.loop.parameters, **{name: ends[i] for name, ends in ranges.items()}} for i in (0, 1))
+
+    def _live(self, lift: str) -> tuple[Term, ...]:
+        """Terms of a lift without those that a zero parameter removes.
+
+        Refused if one has a range: that of a root may, if only the sign of the lift occurs.
+        """
+        known, (low, high) = self.loop.parameters, self._ends
+        live = tuple(t for t in self.loop.lifts[lift] if all(known.get(p, Fraction(1)) for p in t.parameters))
+        names = [p for t in live for p in t.parameters]
+        vague = [p for p in names if p not in low or (lift in self.with_variable and low[p] < high[p])]
         require(
             not vague,
             f"the argument of a lift has a parameter with a range, {', '.join(vague[:1])}. "

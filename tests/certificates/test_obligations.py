@@ -241,6 +241,37 @@ def test_the_parameter_of_a_lift_is_one_number():
     assert {cell.name for cell in cells} == {"++", "--"}
 
 
+ROOTED = {"n": (power(1, ("x", 1, "s")), power("1/5", ("y", 1, "s"), parameters=("r",)))}
+RANGE = {"gains": {"k": F(2)}, "roots": {"r": ("k", (F(7, 5), F(3, 2)))}}
+
+
+def test_the_sign_of_an_argument_with_a_root_is_known_for_its_whole_range():
+    """Wherever t (x + r y/5) >= 0 for one r of the range, g >= 0; at one end of the range both are the same."""
+    cells = lifted(ROOTED, ("n", 0, "s"), **RANGE).cells
+    assert {cell.name for cell in cells} == {"+++", "+-+", "+--", "-++", "-+-", "---"}
+    ends = (F(7, 25), F(3, 10))
+    for cell in cells:
+        x_sign, y_sign, t = (1 if s == "+" else -1 for s in cell.name)
+        (g,) = cell.inequalities
+        arguments = [{(1, 0): F(t * x_sign), (0, 1): t * y_sign * end} for end in ends]
+        assert g in arguments
+        assert g[0, 1] == max(argument[0, 1] for argument in arguments)
+        assert g[1, 0] == t * x_sign
+
+
+def test_a_root_with_a_range_stands_under_signs_alone_and_leaves_no_sign_open():
+    with pytest.raises(CertificateError, match="a parameter with a range, r"):
+        _ = lifted(ROOTED, ("n", 1, "s"), **RANGE).cells
+    for number in ("-29/20", "-7/5", "-3/2"):
+        open_ = {"n": (power(1, ("x", 1, "s"), parameters=("r",)), power(number, ("x", 1, "s")))}
+        with pytest.raises(CertificateError, match="the sign of a coefficient in the argument of n depends on a root"):
+            _ = lifted(open_, ("n", 0, "s"), states=("x",), **RANGE).cells
+    point = RANGE | {"gains": {"k": F(9, 4)}, "roots": {"r": ("k", (F(3, 2), F(3, 2)))}}
+    assert lifted(ROOTED, ("n", 1, "s"), **point).cells[0].equalities == (
+        {(0, 0, 1): 1, (1, 0, 0): -1, (0, 1, 0): F(-3, 10)},
+    )
+
+
 def test_an_argument_vanishes_on_a_null_set_only():
     """Of x, y, z and lifts n(x), m(y), l: x + n is zero on open sets, y + n and x y + x m are not."""
     loop = own(states=("x", "y", "z"))

@@ -306,6 +306,28 @@ def nested_sign():
     return document
 
 
+def nested_root_sign():
+    """x' = -2 sign(x) - sign(n), y' = -2 sign(y) - s sign(n), n = x + s y with s = 2^(1/2) in [7/5, 3/2].
+
+    -V' = 4u + 4w + 2t (x + s y). Of the signs of n only g = t (x + b y) >= 0 is used, b the end where g is largest:
+    3/2 where t y > 0, else 7/5. So -V' - u - w = 2g + 3u + (3 - 2|s - b|) w. No cell has -t for the signs of x and y.
+    """
+    document = nested_sign()
+    document |= {"gains": {}, "lifts": {"n": [["1", [], [["x", "1", "s"]]], ["1", ["s"], [["y", "1", "s"]]]]}}
+    document["field"]["y"] = [["-2", [], [["y", "0", "s"]]], ["-1", ["s"], [["n", "0", "s"]]]]
+    document["witnesses"][1:] = [
+        witness(
+            f"decrease {cell} s={end}",
+            square([1, 0], [[0, 0]], "3"),
+            square([0, 1], [[0, 0]], "3" if (end == "3/2") == (cell[1] == cell[2]) else "14/5"),
+            inequalities=[[square([0, 0], [[0, 0]], "2")]],
+        )
+        for cell in ("+++", "+-+", "+--")
+        for end in ("7/5", "3/2")
+    ]
+    return document
+
+
 def refuted(document, **refutation):
     for key in ("V", "claims", "witnesses"):
         del document[key]
@@ -336,7 +358,16 @@ def inhomogeneous_rest():
 
 PROOFS = [relay, disturbed_relay, decay, oscillator, oscillator_on_cells, weighted_pair]
 PROOFS += [bounded_oscillator, bounded_pair]
-PROOFS += [rooted_relay, settling_relay, nested_root, nested_size, nested_sum, nested_sign, cubic_relay]
+PROOFS += [
+    rooted_relay,
+    settling_relay,
+    nested_root,
+    nested_size,
+    nested_sum,
+    nested_sign,
+    nested_root_sign,
+    cubic_relay,
+]
 REFUTATIONS = [overpowered_relay, sliding_rest, inhomogeneous_rest]
 
 
@@ -904,8 +935,28 @@ BROKEN = {
     "lift in V": (nested_sum, [("V", 0, 2, [["n", "2", "a"]])], "power of a state"),
     "lift of two degrees": (nested_sum, [("lifts", "n", 0, 2, [["x", "2", "s"]])], "form of one degree"),
     "lift empty": (nested_sum, [("lifts", "n", [])], "form of one degree"),
-    "lift that varies": (nested_sign, [("lifts", "n", 0, 1, ["s"])], "that vary"),
-    "lift with a nonzero term": (nested_sign, [("gains", "c", "1")], "that vary"),
+    "lift that varies": (
+        nested_sign,
+        [("uncertain", {"p": ["1", "1001/1000"]}), ("lifts", "n", 0, 1, ["p"])],
+        "that vary",
+    ),
+    "lift with a nonzero term": (nested_sign, [("gains", "c", "1")], "form of one degree"),
+    "lift with a root and a power": (nested_root_sign, [("field", "x", 1, 2, [["n", "1", "s"]])], "by its sign only"),
+    "lift with an open sign": (
+        nested_root_sign,
+        [("lifts", "n", [*nested_root_sign()["lifts"]["n"], ["-29/20", [], [["y", "1", "s"]]]])],
+        "the ranges of roots decide",
+    ),
+    "lift with an open zero": (
+        nested_root_sign,
+        [("lifts", "n", [*nested_root_sign()["lifts"]["n"], ["-3/2", [], [["y", "1", "s"]]]])],
+        "the ranges of roots decide",
+    ),
+    "root in a lift of another range": (
+        nested_root_sign,
+        [("roots", "s", ["k", "7/5", "29/20"])],
+        "identity",
+    ),
     "lift to a fraction": (nested_sum, [("field", "x", 1, 2, [["n", "1/2", "s"]])], "integers"),
     "lift twice": (nested_sum, [("field", "x", 1, 2, [["n", "1", "s"], ["n", "1", "a"]])], "at most once"),
     "lift on reals": (decay, [("lifts", {"n": [["1", [], [["x", "1", "s"]]]]})], "lifts"),

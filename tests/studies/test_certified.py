@@ -1,10 +1,12 @@
 """Answers about given gains in facts and words."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 
 import pytest
 
 from quakedesign.certificates import Verdict
+from quakedesign.controllers.dia import DiscontinuousIntegral
 from quakedesign.errors import ParameterError
 from quakedesign.studies.certified import certified
 
@@ -94,10 +96,29 @@ def test_the_limit_is_told_beside_a_range_as_well():
     assert (answer.facts["verdict"], answer.facts["limit"]) == ("refuted", "2")
 
 
+@pytest.mark.slow
+def test_gains_with_an_irrational_root_in_a_sign_are_proved_over_a_range():
+    # k_I4 ≠ 0 brings the root of k_I1 into the argument of the sign
+    answer = certified("dia", ("2", "5", "1", "1/10"), lipschitz="0.78", gain_range=("1", "3"))
+    assert answer.verdict is Verdict.PROVED is answer.certificate.check()
+    assert len(answer.certificate.lyapunov) == 10
+
+
+class WithRoot(DiscontinuousIntegral):
+    """The 2-DIA with e1 for a state: the root of k_I1 stands under a cube root."""
+
+    @classmethod
+    def loop_field(cls):
+        loop = super().loop_field()
+        ((root, gain),) = loop.roots.items()
+        f1, e2, _ = loop.states
+        field = {state: rate.subs(f1, f1 * gain * root) for state, rate in loop.field.items()}
+        return replace(loop, field={**field, f1: e2}, units={})
+
+
 def test_gains_that_no_certificate_can_express_are_undecided_with_the_reason():
-    # k_I4 ≠ 0 needs the root of k_I1, which is irrational
     for wish in ({"lipschitz": "0.1"}, {"maximize": "lipschitz"}):
-        answer = certified("dia", ("3", "20", "1", "0.1"), **wish)
+        answer = certified(WithRoot, ("3", "20", "1", "0"), **wish)
         assert answer.verdict is Verdict.UNDECIDED
         assert "has a parameter with a range, kappa. Choose gains" in answer.lines[-1]
 

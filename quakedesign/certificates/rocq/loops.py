@@ -10,7 +10,7 @@ from quakedesign.certificates.rocq import gallina
 from quakedesign.symbolic.terms import Term, value
 
 _POTENTIAL = "V"
-_HYPOTHESES = "forall x, nowhere_zero x -> with_lifts x"
+_POINTS = "forall x, nowhere_zero x ->"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +120,7 @@ def _bound(claim: str, margin: str) -> str:
         [
             f"Definition margin_{claim} : expression :=\n  {margin}.",
             gallina.accepted(f"covers states nil nil questions (rest function margin_{claim})", f"covered_{claim}"),
-            f"Theorem {claim} : {_HYPOTHESES} states nil ->\n  ({values})%R.",
+            f"Theorem {claim} : {_POINTS} with_lifts x nil states nil ->\n  ({values})%R.",
             f"Proof. exact (bound_sound states questions function margin_{claim} certificate covered_{claim}). Qed.",
         ]
     )
@@ -135,9 +135,9 @@ def _fall(claim: str, margin: str) -> str:
             gallina.accepted(
                 f"covers columns arguments ranges questions (fall function field margin_{claim})", f"covered_{claim}"
             ),
-            f"Theorem {claim} : {_HYPOTHESES} columns arguments ->",
-            f"  forall p, in_ranges p ranges -> forall d, (forall i, {derivative}) ->",
+            f"Theorem {claim} : {_POINTS} forall p, in_ranges p ranges -> with_lifts x p columns arguments ->",
+            f"  forall d, (forall i, {derivative}) ->",
             f"  (along_field d x (listed p) 0 field <= - expression_value x (listed p) margin_{claim})%R.",
-            f"Proof. exact (fall_sound {data} certificate eq_refl covered_{claim}). Qed.",
+            f"Proof. exact (fall_sound {data} certificate covered_{claim}). Qed.",
         ]
     )
