@@ -16,6 +16,7 @@ from guarantee_slow import read_slow
 from guarantee_task import Task, read_task
 
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
+ASKED = ("least_asked", "largest_asked")  # at the valve
 
 
 def verify(document: dict[str, Any]) -> list[str]:
@@ -28,20 +29,25 @@ def verify(document: dict[str, Any]) -> list[str]:
     """
     more = [name for name in ("slow_gain", "start") if name in document]
     keys(document, "the file", "format", "kind", "fault", "reference", "disturbance", "loop", "claims", *more)
-    claims = numbers(document["claims"], "claims", *CLAIMS)
+    asked = ASKED if type(document["claims"]) is dict and any(name in document["claims"] for name in ASKED) else ()
+    claims = numbers(document["claims"], "claims", *CLAIMS, *asked)
     task = read_task(document)
     start = read_start(document["start"]) if "start" in more else [Fraction(0)] * 2
     loop = read_loop(document["loop"], task, start)
     errors = [claims[name] + off for name, off in zip(CLAIMS[:2], loop.noise, strict=True)]
+    need(
+        loop.asked or not asked, "without a lag and rock the claims must not tell the valve's pressure from the fault's"
+    )
     within = loop.root is None or root_within(loop.root, loop.step, *errors)
     need(within, "the root of the implicit step must lie between its lines for all errors that are claimed")
     slow = read_slow(document["slow_gain"], task, loop) if "slow_gain" in more else None
-    (slip, rate, push), small = bounds(task, loop, slow, claims["slip_error"])
+    (slip, rate, *pushes), small = bounds(task, loop, slow, claims["slip_error"])
     need(not slow or slip < claims["slip_error"], "the slip error that moves the input gain must stay below its claim")
-    low, high = task.rest[0] - push / task.b, task.rest[1] + push / task.b
-    found = dict(zip(CLAIMS, (slip, rate, rate + task.reference_rate, low, high), strict=True))
-    for name, value in found.items():
-        holds = value >= claims[name] if name == "least_pressure" else value <= claims[name]
+    ends = [end for push in pushes for end in (task.rest[0] - push / task.b, task.rest[1] + push / task.b)]
+    found = dict(zip([*CLAIMS, *ASKED], (slip, rate, rate + task.reference_rate, *ends), strict=False))
+    for name in claims:
+        value = found[name]
+        holds = value >= claims[name] if name.startswith("least") else value <= claims[name]
         need(holds, f"the claim {name} must follow from the rest. It does not")
     return statement(document, task, claims, small)
 
@@ -86,5 +92,10 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",
         f"|slip - reference| <= {upper(claims['slip_error'])} m, "
         f"|slip rate - reference's| <= {upper(claims['slip_rate_error'])} m/s",
-        f"pressure from {lower(claims['least_pressure'])} Pa to {upper(claims['largest_pressure'])} Pa",
+        f"pressure from {lower(claims['least_pressure'])} Pa to {upper(claims['largest_pressure'])} Pa"
+        + (
+            f", at the valve from {lower(claims[ASKED[0]])} Pa to {upper(claims[ASKED[1]])} Pa"
+            if len(claims) > 5
+            else ""
+        ),
     ]

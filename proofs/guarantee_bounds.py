@@ -17,6 +17,7 @@ ONE_OVER_E = Fraction(3679, 10000)  # from above
 def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fraction(0)) -> tuple[Row, Fraction]:
     """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee); the best of both classes.
 
+    Where the valve's pressure is not the fault's, its b|p − p*| is a fourth.
     With a slow gain they hold while the slip error stays below `slip`.
     """
     spread = None
@@ -42,36 +43,37 @@ def of_class(
 
     `spread`: how far a slow beta is off that of a nominal loop by itself, and by its past.
     """
+    pushes = len(loop.outputs) - loop.asked  # up to there outputs are errors and what acts on the fault
     half = [(high - low) / 2 for low, high in (task.s, task.w, task.beta)]
     force, drift, coupling, shifted = inputs(task, half[2])
     half[2] = spread[0] if spread else half[2]
-    own, shares = [force, drift], [half, [Fraction(0), coupling, Fraction(0)]]
+    none = [Fraction(0)] * len(loop.outputs)
+    own, shares = [force, drift], [[*half, *none[3:]], [none[0], coupling, *none[2:]]]
     if loop.root:
         low, high = loop.root.slopes
         wide = (high - low) / 2 / loop.step
         own.append(loop.root.remainder + wide * loop.noise[0])
-        shares.append([wide, Fraction(0), Fraction(0)])
+        shares.append([wide, *none[1:]])
     noise = [off for off in loop.noise if off]
     own += noise
-    shares += [[Fraction(0)] * 3] * len(noise)
+    shares += [none] * len(noise)
     if not loop.events and len(loop.inputs) == 4:
         own += [task.reference_acceleration, task.reference_jerk]
-        shares += [[Fraction(0)] * 3] * 2
-    if len(loop.outputs) > 3:  # the last one bounds what the modes of a layer leave out
-        shares = [[*share, Fraction(0)] for share in shares]
+        shares += [none] * 2
+    if loop.layer:  # the fourth output bounds what its modes leave out
         if loop.fade:
-            shares.append([Fraction(0)] * 4)
+            shares.append([*none])
         shares[-1 if loop.fade else 0][3] = half[2]  # it acts as b(p - p*) does, in the small gain
-        shares += [[*[Fraction(0)] * 3, Fraction(1)]] * 2  # what is awaited, and told of it
+        shares += [[*none[:3], Fraction(1), *none[4:]]] * 2  # what is awaited, and told of it
         own += [Fraction(0)] * (len(shares) - len(own))
     if loop.start:
         own.append(Fraction(1))
-        shares.append([Fraction(0)] * len(loop.outputs))
+        shares.append(none)
     if spread:
         own.append(Fraction(0))
-        shares.append([Fraction(0), Fraction(0), *[spread[1]] * (len(loop.outputs) - 2)])
+        shares.append([spread[1] if 2 <= i < pushes else Fraction(0) for i in range(len(none))])
     peaks, small = peaks_of(found, own, shares)
-    return [peaks[0], peaks[1], sum(peaks[2:]) + shifted], small
+    return [peaks[0], peaks[1], sum(peaks[2:pushes]) + shifted, *(v + shifted for v in peaks[pushes:])], small
 
 
 def peaks_of(found: list[list[list[Fraction]]], own: Row, shares: list[Row]) -> tuple[Row, Fraction]:

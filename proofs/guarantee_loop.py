@@ -44,7 +44,8 @@ class Loop:
     event. `noise` bounds what the measured e1 and e2 are off, an input each where it is not 0. Without events there may
     be two inputs more, the second and third derivatives of the reference.
     With a layer of rock, L^2/D = `layer`, a fourth output bounds what its modes leave out; where `fade` is given, that
-    is one more input, the last one. `start` has the columns of the box from which it starts, none where that is rest.
+    is one more input, the last one. Where `asked`, the last output is the pressure at the valve. `start` has the
+    columns of the box from which it starts, none where that is rest.
     """
 
     flow: list[Row]
@@ -59,6 +60,7 @@ class Loop:
     fade: Fade | None = None
     layer: Fraction = Fraction(0)
     start: list[Row] = field(default_factory=list)
+    asked: bool = False
 
 
 @dataclass
@@ -110,7 +112,8 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     inputs += [entry for entry, off in zip(told, law.noise, strict=True) if off]
     outputs = [unit(size)[0], unit(size)[1], push]
     loop = Loop(flow, events, outputs, inputs, root, step, law.noise, start=starts_of(law, errors))
-    return with_left_out(loop, law) if law.diffusion else loop
+    loop = with_left_out(loop, law) if law.diffusion else loop
+    return replace(loop, outputs=[*loop.outputs, unit(size)[law.valve]], asked=True) if law.path else loop
 
 
 def read_held(value: Any) -> Held:

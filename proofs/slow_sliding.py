@@ -234,7 +234,7 @@ def around(loop: Loop, cell: Cell, valve: int) -> Loop:
     inputs += [loop.inputs[1]] if fault.drift() else []
     inputs += [loop.inputs[2]] if cell.path.noise else []
     inputs += [[middle(cell.mu) * v for v in stress]] if loop.fade else []
-    outputs = [y, ageing, strong, z, unit_rows[0], push, unit_rows[valve], *loop.outputs[3:]]
+    outputs = [y, ageing, strong, z, unit_rows[0], push, loop.outputs[-1], *loop.outputs[3:-1]]
     return replace(loop, flow=flow, inputs=inputs, outputs=outputs)
 
 

@@ -37,7 +37,8 @@ def held_loop(
 
     Inputs: ``acceleration`` a in e2' = s·e1 − w·e2 + βb(p − p*) + a [m/s²]; ``drift`` b·dp*/dt [m/s³]. Outputs:
     ``slip_error`` [m], ``slip_rate_error`` [m/s], ``push`` b·(p − p*) [m/s²], with a layer but for what its modes leave
-    out, which ``left_out`` bounds [m/s²] and, where the well steps, an input of this name brings into e2' by its share.
+    out, which ``left_out`` bounds [m/s²] and, where the well steps, an input of this name brings into e2' by its share;
+    where the fault's pressure is not the valve's, ``asked``, b·(p − p*) at the valve [m/s²].
     With an implicit root the loop has w = −γe1/T_s with the middle of its slopes, and w + γe1/T_s [m/s] is the sampled
     input ``root``. If asked for, what the measured e1 and e2 are more than the true ones are the sampled inputs
     ``slip_noise`` [m] and ``rate_noise`` [m/s]: the law does with them what it does with e1 and e2, w included.
@@ -74,12 +75,13 @@ def held_loop(
     maps = [(jump, path.part or step), *([(arrival, step - path.part)] if path.part else [])]
     left_out, fading = _left_out(path)
     push = _push(path)
+    asked = {"asked": _unit(n, path.valve)} if path.behind else {}
     return PeriodicLoop(
         states=("e1", "e2", *law.states, *(f"waiting{i}" for i in range(path.waiting)), "valve", *path.behind),
         flow=_flow(path, push, model, model.gain / authority),
         segments=tuple(Segment(jump=j, duration=time, ends=ends, past_ends=past_ends) for j, time in maps),
         inputs={"acceleration": _unit(n, 1), "drift": _drift(law, authority, path)},
-        outputs={"slip_error": _unit(n, 0), "slip_rate_error": _unit(n, 1), "push": push, **left_out},
+        outputs={"slip_error": _unit(n, 0), "slip_rate_error": _unit(n, 1), "push": push, **left_out, **asked},
         sampled=sampled,
         fading=fading,
     )

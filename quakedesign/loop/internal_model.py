@@ -100,4 +100,5 @@ def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: 
         measured=tuple(row[-2:] for row in rows),
         output=asked[:-2],
         feedback=asked[-2:],
+        applied=(gain * model.of_asked, Fraction(0), *(gain * (1 - sum(row)) for row in model.kept)),
     )

@@ -298,6 +298,7 @@ def test_matrices_say_what_moves_where(delay, lag, jumps):
         "slip_error": {"e1": 1},
         "slip_rate_error": {"e2": 1},
         "push": dict.fromkeys(pressures, 1),
+        **({"asked": {"valve": 1}} if F(lag) else {}),
     }
     assert loop.sampled == {}
 

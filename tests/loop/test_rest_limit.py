@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from quakedesign import simulate
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Held, guarantee, task_of
 from quakedesign.controllers import Signals
 from quakedesign.errors import ParameterError
@@ -22,6 +23,8 @@ from quakedesign.loop import (
     slip_observer,
     summed_integrals,
 )
+from quakedesign.loop.actuators import Actuator, Delay, Diffusion, Lag
+from quakedesign.loop.layer import Layer
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.simulation import Variation, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
@@ -215,6 +218,29 @@ def test_the_adversary_s_limit_is_that_of_the_run(proved):
     assert 5 < cuts < 40
 
 
+def test_what_the_adversary_cuts_off_moves_all_that_stands_at_the_valve(proved):
+    """The pressure that waits alone; or the valve's, its last step, what is less it, and the kick of the rock."""
+    layer, gain = Layer(time=F(1)), float(sum(proved.task.beta) / 2)
+    modes = {f"layer{i}": -1.0 for i in range(8)}
+    cases = (
+        ({"delay": F("0.2")}, {"waiting0": 1.0}),
+        ({"lag": F(1)}, {"valve": 1.0, "behind": -1.0}),
+        ({"lag": F(1), "diffusion": F(1)}, {"valve": 1.0, "behind": -1.0}),
+        ({"diffusion": F(1)}, {"valve": 1.0, "stepped": 1.0, "e2": -gain * float(layer.area), **modes}),
+        ({"diffusion": F(1), "delay": F("0.1")}, {"waiting0": 1.0}),
+    )
+    own = dict(zip(("predicted_rate", "disturbance"), proved.held.law.applied, strict=True))
+    asked = {"least_asked": LowerBound(-(10**8)), "largest_asked": UpperBound(10**8)}
+    for around, expected in cases:
+        behind = any(name != "delay" for name in around)
+        claims = replace(proved.claims, **(asked if behind else {}))
+        claim = replace(proved, claims=claims, held=replace(proved.held, **around))
+        states = claim.loop.states
+        told = _Limit.of(claim, len(states) + 1, np.zeros(1)).told
+        expected |= {name: float(v / proved.task.authority) for name, v in own.items()}
+        assert told == pytest.approx([expected.get(name, 0.0) for name in (*states, "disturbance of the class")])
+
+
 def test_where_p_star_drifts_all_pressures_that_count_from_it_move(proved):
     limit = _Limit.of(proved, 6, np.array([0.0])).anew()
     limit.cut(np.array([[0.0, 0.0, 0.0, 0.0, 3.0, 0.0]]))
@@ -231,10 +257,44 @@ def test_the_adversary_is_held_by_the_limit_and_only_with_stick(proved, monkeypa
     assert before[1][1] < proved.claims.slip_rate_error < _searched(proved, True)[1] / 10
 
 
-def test_behind_a_lag_or_rock_and_for_a_law_that_is_not_told_there_are_none(proved):
-    others = {"lag": F(1)}, {"diffusion": F(1)}, {"law": replace(proved.held.law, applied=())}
-    for other in others:
-        assert replace(proved, held=replace(proved.held, **other)).rest_limit is None
+def test_behind_a_lag_it_is_that_of_what_is_claimed_at_the_valve(proved):
+    low, high = proved.task.rest_pressure
+    asked = {"least_asked": LowerBound(low - 10**6), "largest_asked": UpperBound(high + 3 * 10**6)}
+    for around in ({"lag": F(1)}, {"diffusion": F(1)}):
+        behind = replace(proved, held=replace(proved.held, **around))
+        assert behind.rest_limit is None
+        assert replace(behind, claims=replace(proved.claims, **asked)).rest_limit.width == 6 * 10**6
+    assert replace(proved, held=replace(proved.held, law=replace(proved.held.law, applied=()))).rest_limit is None
+
+
+LAG, ROCK = Lag(time_constant=0.2), Diffusion(length=1.0, diffusivity=1.0)
+THROUGH = {"diffusion": F(1)}
+BEHIND = {
+    "lag": (F("0.184"), {"lag": F("0.2")}, (LAG,), 8),
+    "late, lag": (F("0.184"), {"lag": F("0.05"), "delay": F("0.184")}, (Delay(samples=1), Lag(time_constant=0.05)), 16),
+    "rock": (F("0.05"), THROUGH, (ROCK,), 30),
+    "lag, rock": (F("0.05"), {"lag": F("0.2"), **THROUGH}, (LAG, ROCK), 30),
+}
+
+
+@pytest.mark.parametrize("name", [pytest.param(k, marks=pytest.mark.slow) if "rock" in k else k for k in BEHIND])
+def test_behind_a_lag_and_rock_a_fault_that_sticks_does_not_wind_up(name):
+    """Ahead of its reference the fault rests, and without the limit the pressure falls on. One that moves is free."""
+    step, around, stages, substeps = BEHIND[name]
+    found = answer(REAL, step=step, **around).found
+    told = {"actuator": Actuator(stages=stages), "substeps": substeps, "duration": 4000.0, "samples": 500}
+    free = replace(found.controller, rest_limit=None)
+    runs = {
+        (plant, one.rest_limit is None): simulate(REAL, one, plant=plant, **told)
+        for plant in ("smooth", "coulomb")
+        for one in (found.controller, free)
+    }
+    assert np.array_equal(runs["smooth", True].pressure, runs["smooth", False].pressure)
+    assert runs["coulomb", True].pressure.min() < 1.5 * runs["coulomb", False].pressure.min()
+    assert runs["coulomb", False].pressure.min() > -1.02 * float(found.rest_limit.width)
+    for run in (runs["coulomb", False], runs["smooth", False]):
+        assert run.metrics.max_slip_error < found.claims.slip_error
+        assert run.metrics.max_slip_rate_error < found.claims.slip_rate_error
 
 
 def test_the_compensated_step_is_told_what_is_applied():

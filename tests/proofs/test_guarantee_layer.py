@@ -26,7 +26,7 @@ LAW = disturbance_estimate(
     F("2.282e-8"),
 )
 HELD = Held(law=LAW, step=STEP, diffusion=F("0.1"))
-OUTPUTS = ("slip_error", "slip_rate_error", "push", "left_out")
+OUTPUTS = ("slip_error", "slip_rate_error", "push", "left_out", "asked")
 ORDER = ("acceleration", "drift", "left_out", "awaited", "awaited_told")
 
 

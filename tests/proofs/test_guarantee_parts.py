@@ -284,7 +284,8 @@ HEARD = (NOISES, NOISES[:1], NOISES[1:], ("root", *NOISES), ("root", "slip_noise
     ("more", "held"),
     [((), True), (("root",), True), (FORWARD, False), ((), False), *((more, True) for more in HEARD)],
 )
-def test_both_draw_the_same_bounds_from_the_same_gains(more, held, monkeypatch):
+@pytest.mark.parametrize("asked", [(), ("asked",)])
+def test_both_draw_the_same_bounds_from_the_same_gains(more, held, asked, monkeypatch):
     """Three parts of a period, of which another one is the worst for every output; the better of both classes."""
     random, proved, entered = Random(4), 0, []
     names, parts = ("acceleration", "drift", *more), 3 if held else 1
@@ -292,8 +293,9 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, monkeypatch):
         (task, read), step = some_tasks()[1 if more == FORWARD else i % 4], some(random, 1, 9, 4)
         root = some_root(random) if "root" in more else None
         noise = {name: some(random, 1, 9, 4) for name in more if name in NOISES}
-        table = {(y, k): tuple(some(random, 0, 9, 900 >> i) for _ in range(parts)) for y in OUTPUTS for k in names}
-        answers = iter([[list(table[y, k]) for y in OUTPUTS] for k in names])
+        seen = (*OUTPUTS, *asked)
+        table = {(y, k): tuple(some(random, 0, 9, 900 >> i) for _ in range(parts)) for y in seen for k in names}
+        answers = iter([[list(table[y, k]) for y in seen] for k in names])
         events = [([], step)] if held else []
         monkeypatch.setattr(
             checker, "gains", lambda _l, _e, sudden, queue=answers: entered.append(sudden) or next(queue)
@@ -301,7 +303,7 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, monkeypatch):
         monkeypatch.setattr(theorem, "norms" if held else "flow_norms", lambda _, known=table: known)
         given = checker.Root([], list(root.slopes), root.remainder) if root else None
         off = tuple(noise.get(name, F(0)) for name in NOISES)
-        loop = checker.Loop([], events, [[]] * 3, [[] for _ in names], given, step, off)
+        loop = checker.Loop([], events, [[]] * len(seen), [[] for _ in names], given, step, off, asked=bool(asked))
         segments = tuple(Segment(jump=(), duration=step) for _ in events)
         ours = PeriodicLoop(states=(), flow=(), segments=segments, inputs={}, outputs={})
         found = certified_bounds(task, ours, root, noise)
@@ -309,7 +311,8 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, monkeypatch):
         assert (theirs is None) == (not isinstance(found, Bounds))
         if theirs:
             proved += 1
-            assert theirs[0] == [found.slip_error, found.slip_rate_error, found.push]
+            assert theirs[0] == [found.slip_error, found.slip_rate_error, found.push, found.asked][: len(seen)]
+            assert (found.asked is None) == (not asked)
             assert abs(theirs[1] - found.small_gain) <= max(found.small_gain / 2**19, F(1, 2**40))
     assert 2 < proved < 8
     assert not held or entered == 8 * [name in ("root", *NOISES) for name in names]  # with the sample alone

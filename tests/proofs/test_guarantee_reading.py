@@ -54,6 +54,7 @@ def changed(raw, *changes):
 TERM = {"factor": ["1/2", "1"], "power": "1/3", "of": "slip"}
 ROOT = {"pull": [TERM, {"factor": ["1", "1"], "power": "1", "of": [TERM]}], "slopes": ["1/2", "1"], "remainder": "1/9"}
 ROOTED = changed(HELD, (("loop", "root"), ROOT), (("loop", "measured"), [["1"] * 3]), (("loop", "feedback"), ["1"] * 3))
+BEHIND = changed(HELD, (("loop", "lag"), "1"))
 CONTINUOUS = changed(
     HELD,
     (("loop",), {"rates": [["0"]], **{key: HELD["loop"][key] for key in ("states", "measured", "output", "feedback")}}),
@@ -165,20 +166,43 @@ def test_both_take_what_is_just_allowed_and_refuse_what_is_just_beyond(raw, path
             assert (standalone, package) == (expected, expected), value
 
 
-@pytest.mark.parametrize("name", CLAIMS)
+@pytest.mark.parametrize("name", [*CLAIMS, "least_asked", "largest_asked"])
 def test_every_claim_may_be_what_follows_and_no_less(name, monkeypatch):
-    """Bounds 1 m, 2 m/s and, of the push, 3 m/s², with b = 1/25 m²/kg; the rest by the task."""
+    """Bounds 1 m, 2 m/s and, of the push, 3 m/s², at the valve 4 m/s², with b = 1/25 m²/kg; the rest by the task."""
     task = checker.read_task(HELD)
-    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(1), F(2), F(3)], F(1, 3)))
+    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(1), F(2), F(3), F(4)], F(1, 3)))
     assert task.b == F(1, 25)
-    tight = (F(1), F(2), 2 + task.reference_rate, task.rest[0] - 75, task.rest[1] + 75)
-    claims = dict(zip(CLAIMS, map(str, tight), strict=True))
-    assert len(checker.verify(HELD | {"claims": claims})) == 7
-    inward = F(claims[name]) + F(1 if name == "least_pressure" else -1, 10**12)
+    low, high = task.rest
+    tight = (F(1), F(2), 2 + task.reference_rate, low - 75, high + 75, low - 100, high + 100)
+    claims = dict(zip([*CLAIMS, "least_asked", "largest_asked"], map(str, tight), strict=True))
+    found = checker.verify(BEHIND | {"claims": claims})
+    ends = checker.lower(tight[5]), checker.upper(tight[6])
+    assert len(found) == 7
+    assert found[-1].endswith(f", at the valve from {ends[0]} Pa to {ends[1]} Pa")
+    side = 1 if name.startswith("least") else -1
     with pytest.raises(checker.Refused, match=f"claim {name} must follow"):
-        checker.verify(HELD | {"claims": claims | {name: str(inward)}})
-    outward = F(claims[name]) - F(1 if name == "least_pressure" else -1, 10**12)
-    assert checker.verify(HELD | {"claims": claims | {name: str(outward)}})
+        checker.verify(BEHIND | {"claims": claims | {name: str(F(claims[name]) + F(side, 10**12))}})
+    assert checker.verify(BEHIND | {"claims": claims | {name: str(F(claims[name]) - F(side, 10**12))}})
+    fewer = {key: claims[key] for key in CLAIMS}
+    assert "valve" not in "".join(checker.verify(BEHIND | {"claims": fewer})[3:])
+    with pytest.raises(checker.Refused, match="least_asked, largest_asked"):
+        checker.verify(BEHIND | {"claims": fewer | {"least_asked": claims["least_asked"]}})
+    with pytest.raises(checker.Refused, match="must not tell the valve's pressure"):
+        checker.verify(HELD | {"claims": claims})
+
+
+@pytest.mark.usefixtures("coarse")
+def test_the_package_reads_claims_about_the_valve_behind_a_lag_alone_and_both_or_none():
+    both = {"least_asked": "-1", "largest_asked": "1"}
+    found = parse_guarantee(json.dumps(BEHIND | {"claims": HELD["claims"] | both})).claims
+    assert (found.least_asked, found.largest_asked) == (-1, 1)
+    assert parse_guarantee(json.dumps(BEHIND)).claims.least_asked is None
+    for name in both:
+        with pytest.raises(CertificateError, match="exactly the keys"):
+            parse_guarantee(json.dumps(BEHIND | {"claims": HELD["claims"] | {name: both[name]}}))
+    for raw in (HELD, CONTINUOUS):
+        with pytest.raises(CertificateError, match="must not tell the valve's pressure"):
+            parse_guarantee(json.dumps(raw | {"claims": HELD["claims"] | both}))
 
 
 @pytest.mark.parametrize(

@@ -283,26 +283,35 @@ def test_the_spread_is_asked_for_by_hand(monkeypatch):
     assert asked == [("slow", (F(1, 4) + F(10, 13), aged)), ("slow", (F(1, 4), aged)), (("jumping", 2), None)]
 
 
+@pytest.mark.parametrize("asked", [False, True])
 @pytest.mark.parametrize("outputs", [3, 4])
 @pytest.mark.parametrize("spread", [None, (F(1, 3), F(1, 5))])
-def test_the_inputs_solve_what_the_outputs_make_of_them(outputs, spread):
+def test_the_inputs_solve_what_the_outputs_make_of_them(outputs, spread, asked):
     """W = F + S·G·W in floats, for gains by hand; the fourth output is what the modes of a layer leave out.
 
-    That counts as v does, also in what is past, and wholly in what is awaited of it and told.
+    That counts as v does, also in what is past, and wholly in what is awaited of it and told. The last one is what is
+    asked for at the valve: it counts nowhere.
     """
     task, layer = _task_by_hand(), [0] * (outputs - 3)
     inputs = 2 + (spread is not None) + 2 * len(layer)
+    outputs += asked
     found = [[[F(1, 30 + 7 * k + 3 * y * y)] for y in range(outputs)] for k in range(inputs)]
     gains = np.array([[float(found[k][y][0]) for k in range(inputs)] for y in range(outputs)])
     push = spread[0] if spread else F(1)
     shares = [[1 / 2, 3 / 2, float(push), *(float(push) for _ in layer)], [0, 0, 0, *layer]]
     shares += [[0, 0, 0, 1]] * 2 if layer else []
     shares += [[0, 0, float(spread[1]), *(float(spread[1]) for _ in layer)]] if spread else []
+    shares = [[*row, 0] if asked else row for row in shares]
     own = np.array([2 + 1 / 2, 3, 0, 0, 0][:inputs])
     peaks = gains @ np.linalg.solve(np.eye(inputs) - np.array(shares, float) @ gains, own)
-    loop = checker.Loop([], [([], F(1))], [[]] * outputs, [[]] * 2, None, F(1))
-    (slip, rate, total), _ = checker.of_class(task, loop, found, spread)
-    assert [float(v) for v in (slip, rate, total)] == pytest.approx([*peaks[:2], sum(peaks[2:])], rel=1e-12)
+    loop = checker.Loop([], [([], F(1))], [[]] * outputs, [[]] * 2, None, F(1), layer=F(len(layer)), asked=asked)
+    bounds, _ = checker.of_class(task, loop, found, spread)
+    last = outputs - asked
+    expected = [*peaks[:2], sum(peaks[2:last]), *peaks[last:]]
+    assert [float(v) for v in bounds] == pytest.approx(expected, rel=1e-12)
+    shifted, _ = checker.of_class(replace(task, change=F(0), amplitude=F(2)), loop, found, spread)
+    still, _ = checker.of_class(replace(task, change=F(0), amplitude=F(0)), loop, found, spread)
+    assert all(big - small >= 2 for big, small in zip(shifted[2:], still[2:], strict=True))  # p* by φ/(βb), β ≥ 1
 
 
 def _task_by_hand():

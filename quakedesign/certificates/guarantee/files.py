@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeVar
 
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
 from quakedesign.certificates.guarantee.slow_gain import SlowGain
 from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held
@@ -53,7 +54,8 @@ _ZERO = Fraction(0)
 def guarantee_text(claim: Claim) -> str:
     """Text of the file."""
     about = _of_sliding(claim) if isinstance(claim, SlidingGuarantee) else _of_tracking(claim)
-    claims = {part.name: getattr(claim.claims, part.name).exact for part in fields(claim.claims)}
+    bounds = {part.name: getattr(claim.claims, part.name) for part in fields(claim.claims)}
+    claims = {name: bound.exact for name, bound in bounds.items() if bound is not None}
     return json.dumps({"format": 1, **about, "claims": claims}, indent=1) + "\n"
 
 
@@ -171,7 +173,10 @@ def _read_tracking(raw: Any) -> Guarantee | ContinuousPeaks:
         slow_gain = _slow_gain(raw["slow_gain"], task) if "slow_gain" in more else None
         held = _held(loop, _start(raw["start"]) if "start" in more else {})
         claim = Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
-    _require_few(claim.loop.states)
+    loop = claim.loop
+    told = "asked" in loop.outputs or claims.least_asked is None
+    need(told, "without a lag and rock the claims must not tell the valve's pressure from the fault's")
+    _require_few(loop.states)
     return claim
 
 
@@ -190,8 +195,12 @@ def _require_few(states: tuple[str, ...]) -> None:
 
 
 def _claims(kind: type[_Claimed], raw: dict[str, Any]) -> _Claimed:
-    bounds: dict[str, Any] = {part.name: part.type for part in fields(kind)}
-    return kind(**{name: bounds[name](value) for name, value in read_exactly(raw["claims"], bounds).items()})
+    given, known = raw["claims"], fields(kind)
+    more = {part.name for part in known if part.default is None}
+    left_out = more if isinstance(given, dict) and not more & set(given) else set[str]()
+    found = read_exactly(given, (part.name for part in known if part.name not in left_out))
+    ends: dict[str, Any] = {name: LowerBound if name.startswith("least") else UpperBound for name in found}
+    return kind(**{name: ends[name](value) for name, value in found.items()})
 
 
 def _name(fault: dict[str, Any]) -> str:

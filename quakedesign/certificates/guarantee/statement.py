@@ -36,6 +36,7 @@ _NOISE_WORDS = {
 }
 _MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
 _RESTS = Fraction(1, 100)  # of the largest rate of the reference: below that a fault counts as at rest
+_ENDS = ("least_pressure", "largest_pressure", "least_asked", "largest_asked")
 _TURNS = 32  # of claims that follow from themselves
 
 
@@ -155,6 +156,8 @@ class Claims:
         [Pa].
     largest_pressure : UpperBound
         [Pa].
+    least_asked, largest_asked : LowerBound and UpperBound, optional
+        The same of the pressure at the valve [Pa]; None where that is the fault's.
     """
 
     slip_error: UpperBound
@@ -162,19 +165,32 @@ class Claims:
     peak_slip_rate: UpperBound
     least_pressure: LowerBound
     largest_pressure: UpperBound
+    least_asked: LowerBound | None = None
+    largest_asked: UpperBound | None = None
 
     @classmethod
     def of(cls, task: Task, bounds: Bounds) -> "Claims":
         """Tightest claims that bounds support."""
         low, high = task.rest_pressure
         push = bounds.push / task.authority
+        asked = None if bounds.asked is None else bounds.asked / task.authority
         return cls(
             slip_error=UpperBound(bounds.slip_error),
             slip_rate_error=UpperBound(bounds.slip_rate_error),
             peak_slip_rate=UpperBound(bounds.slip_rate_error + task.reference_rates[0]),
             least_pressure=LowerBound(low - push),
             largest_pressure=UpperBound(high + push),
+            least_asked=None if asked is None else LowerBound(low - asked),
+            largest_asked=None if asked is None else UpperBound(high + asked),
         )
+
+    @property
+    def pressures(self) -> tuple[tuple[LowerBound, UpperBound], ...]:
+        """In the fault, and at the valve where that is another one [Pa]."""
+        fault = self.least_pressure, self.largest_pressure
+        if self.least_asked is None or self.largest_asked is None:
+            return (fault,)
+        return fault, (self.least_asked, self.largest_asked)
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts, SI."""
@@ -182,19 +198,20 @@ class Claims:
             "slip_error": self.slip_error.exact,
             "slip_rate_error": self.slip_rate_error.exact,
             "peak_slip_rate": self.peak_slip_rate.exact,
-            "pressure": [self.least_pressure.exact, self.largest_pressure.exact],
+            **{
+                name: [low.exact, high.exact]
+                for name, (low, high) in zip(("pressure", "asked_pressure"), self.pressures, strict=False)
+            },
         }
 
     def rounded(self) -> "Claims":
         """The same, a little weaker and with few digits."""
-        low, high = self.least_pressure, self.largest_pressure
-        room = (high - low) * (_MARGIN - 1)
+        ends: list[Any] = [end for low, high in self.pressures for end in _wider(low, high)]
         return Claims(
             slip_error=UpperBound(_above(self.slip_error * _MARGIN)),
             slip_rate_error=UpperBound(_above(self.slip_rate_error * _MARGIN)),
             peak_slip_rate=UpperBound(_above(self.peak_slip_rate * _MARGIN)),
-            least_pressure=LowerBound(-_above(room - low)),
-            largest_pressure=UpperBound(_above(high + room)),
+            **dict(zip(_ENDS, ends, strict=False)),
         )
 
     def covers(self, other: "Claims") -> bool:
@@ -203,8 +220,11 @@ class Claims:
             self.slip_error >= other.slip_error
             and self.slip_rate_error >= other.slip_rate_error
             and self.peak_slip_rate >= other.peak_slip_rate
-            and self.least_pressure <= other.least_pressure
-            and self.largest_pressure >= other.largest_pressure
+            and len(self.pressures) <= len(other.pressures)
+            and all(
+                low <= least and high >= largest
+                for (low, high), (least, largest) in zip(self.pressures, other.pressures, strict=False)
+            )
         )
 
 
@@ -250,15 +270,15 @@ class Guarantee:
 
     @property
     def rest_limit(self) -> RestLimit | None:
-        """A limit that the pressure of the law never reaches; None behind a lag or rock, or for a law that is not told.
+        """A limit that the valve's pressure never reaches; None where nothing is claimed of it, or the law not told.
 
         What the law asks for acts a delay later, while the reference moves on. A fault that moves by less than its
         measurement tells, or by a hundredth of the reference's largest rate, rests.
         """
-        held, (low, high) = self.held, self.task.rest_pressure
-        if held.lag or held.diffusion or not held.law.applied:
+        held, (low, high), (*fault, (least, largest)) = self.held, self.task.rest_pressure, self.claims.pressures
+        if not held.law.applied or (not fault and (held.lag or held.diffusion)):
             return None
-        away = max(self.claims.largest_pressure - high, low - self.claims.least_pressure)
+        away = max(largest - high, low - least)
         per_slip = max(map(abs, self.task.slip_chord)) / self.task.authority
         late = per_slip * held.delay * self.task.reference_rates[0]
         width = _above(2 * away + late)
@@ -311,11 +331,11 @@ def sentence_of(task: Task, claims: Claims, when: str, start: str = "from rest")
         kind += f" that starts at 0 and changes by at most {LowerBound(task.change):.3g} m/s^3 (class rate)"
     if not task.amplitude:
         kind = "without disturbance"
-    pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
+    pressures = [f"between {low.quantity('Pa')} and {high.quantity('Pa')}" for low, high in claims.pressures]
     return (
         f"{start}, {when}, {kind}, for all friction and constant parameters of the box: "
         f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
-        f"{claims.slip_error:.3g} m of the reference, the pressure between {pressures} "
+        f"{claims.slip_error:.3g} m of the reference, the pressure {', at the valve '.join(pressures)} "
         "(for a plant continued to negative slip rates)"
     )
 
@@ -391,6 +411,11 @@ def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
 def _unstable(held: Held) -> NoGuarantee:
     reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
     return NoGuarantee(reason=reason, small_gain=None)
+
+
+def _wider(low: LowerBound, high: UpperBound) -> tuple[LowerBound, UpperBound]:
+    room = (high - low) * (_MARGIN - 1)
+    return LowerBound(-_above(room - low)), UpperBound(_above(high + room))
 
 
 def _above(value: Fraction) -> Fraction:

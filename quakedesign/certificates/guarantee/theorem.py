@@ -133,6 +133,8 @@ class Bounds:
         |e2| [m/s].
     push : Fraction
         b·|p − p*| [m/s²].
+    asked : Fraction, optional
+        The same at the valve [m/s²]; None where that is the fault's.
     small_gain : Fraction
         Spectral radius of M [-] from above, below 1.
     """
@@ -141,6 +143,7 @@ class Bounds:
     slip_rate_error: Fraction
     push: Fraction
     small_gain: Fraction
+    asked: Fraction | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,7 +199,9 @@ def best_bounds(
     proved = [bounds for bounds in answers if isinstance(bounds, Bounds)]
     if not proved:
         return answers[0]
-    return Bounds(**{part.name: min(getattr(bounds, part.name) for bounds in proved) for part in fields(Bounds)})
+    every = {part.name: [getattr(bounds, part.name) for bounds in proved] for part in fields(Bounds)}
+    best: dict[str, Any] = {name: None if None in values else min(values) for name, values in every.items()}
+    return Bounds(**best)
 
 
 def bounds_from(
@@ -219,6 +224,7 @@ def bounds_from(
         slip_rate_error=Fraction(peaks["slip_rate_error"]),
         push=Fraction(peaks["push"] + peaks.get("left_out", _ZERO) + _unshifted(task)),
         small_gain=Fraction(small_gain),
+        asked=Fraction(peaks["asked"] + _unshifted(task)) if "asked" in peaks else None,
     )
 
 

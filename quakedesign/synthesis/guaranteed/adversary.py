@@ -97,7 +97,8 @@ class _Limit:
             return None
         place, step = 2 + len(law.states), float(claim.held.step)
         told = np.zeros(size)
-        told[2:place], told[place] = [float(v) / authority for v in law.applied], 1
+        told[: len(claim.loop.states)] = _of_asked(claim)
+        told[2:place] = [float(v) / authority for v in law.applied]
         rests = float(limit.resolution) - back * step  # of the slip error from sample to sample
         moved, none = float(claim.task.drift) * step, np.zeros(len(back))
         return cls(place, told, float(limit.width) * authority, moved, rests, none, none)
@@ -117,6 +118,15 @@ class _Limit:
     def follow(self, before: np.ndarray, after: np.ndarray) -> None:
         """p* drifts, and with it what all pressures are less it."""
         self.highest = self.highest + after[:, self.place] - before[:, self.place]
+
+
+def _of_asked(claim: Guarantee) -> list[float]:
+    """What the first jump of a period makes of what is asked for, [m/s²] and all states: of a law that asks for e1."""
+    held, zero = claim.held, Fraction(0)
+    still = tuple((zero, zero) for _ in held.law.states)
+    law = replace(held.law, measured=still, feedback=(1 / claim.task.authority, zero), root=None, first=())
+    jump = replace(held, law=law, rate_noise=zero).loop(claim.task).segments[0].jump
+    return [float(row[0] - (i == 0)) for i, row in enumerate(jump)]
 
 
 class _Search:

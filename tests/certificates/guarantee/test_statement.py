@@ -29,6 +29,8 @@ CLAIMS = Claims(
     peak_slip_rate=UpperBound(F(2, 7)),
     least_pressure=LowerBound(F(-10, 3)),
     largest_pressure=UpperBound(F(20, 3)),
+    least_asked=LowerBound(F(-13, 3)),
+    largest_asked=UpperBound(F(17, 3)),
 )
 BOUNDS = Bounds(slip_error=F(0), slip_rate_error=F(1, 7), push=3 * TASK.authority, small_gain=F(1, 2))
 NONE = NoGuarantee(reason="none", small_gain=None)
@@ -43,16 +45,29 @@ def test_claims_are_the_bounds_of_the_errors_beside_the_reference_and_the_pressu
     found = Claims.of(TASK, BOUNDS)
     assert (found.slip_error, found.slip_rate_error) == (0, F(1, 7))
     assert found.peak_slip_rate == F(1, 7) + TASK.reference_rates[0]
-    assert (found.least_pressure, found.largest_pressure) == (TASK.rest_pressure[0] - 3, TASK.rest_pressure[1] + 3)
+    low, high = TASK.rest_pressure
+    assert (found.least_pressure, found.largest_pressure) == (low - 3, high + 3)
+    assert found.pressures == ((low - 3, high + 3),)
+    behind = Claims.of(TASK, replace(BOUNDS, asked=7 * TASK.authority))
+    assert behind.pressures == ((low - 3, high + 3), (low - 7, high + 7))
+    assert behind.to_dict()["asked_pressure"] == [str(low - 7), str(high + 7)]
+    assert "asked_pressure" not in found.to_dict()
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_claims_cover_what_is_tighter_in_every_entry_and_nothing_else(name):
-    kind, outward = (LowerBound, -1) if name == "least_pressure" else (UpperBound, 1)
+    kind, outward = (LowerBound, -1) if name.startswith("least") else (UpperBound, 1)
     other = replace(CLAIMS, **{name: kind(getattr(CLAIMS, name) + F(outward, 10**12))})
     assert CLAIMS.covers(CLAIMS)
     assert other.covers(CLAIMS)
     assert not CLAIMS.covers(other)
+
+
+def test_claims_that_say_nothing_of_the_valve_cover_those_that_do_and_not_the_other_way_round():
+    short = replace(CLAIMS, least_asked=None, largest_asked=None)
+    assert short.covers(CLAIMS)
+    assert not CLAIMS.covers(short)
+    assert short.rounded() == replace(CLAIMS.rounded(), least_asked=None, largest_asked=None)
 
 
 def test_rounded_claims_are_a_thousandth_weaker_with_four_digits():
@@ -61,6 +76,7 @@ def test_rounded_claims_are_a_thousandth_weaker_with_four_digits():
     assert (found.slip_error, found.slip_rate_error) == (F("0.3337"), F("0.143"))  # 0.33366… and 1001/7000 itself
     assert found.peak_slip_rate == F("0.286")
     assert (found.least_pressure, found.largest_pressure) == (F("-3.344"), F("6.677"))  # ∓ 10/1000
+    assert (found.least_asked, found.largest_asked) == (F("-4.344"), F("5.677"))
 
 
 @pytest.mark.parametrize(("value", "rounded"), [("12345.1", "12350"), ("-12345.1", "-12340"), ("0", "0"), ("1", "1")])
@@ -124,6 +140,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
 def test_claims_are_shown_as_the_exact_numbers():
     assert CLAIMS.to_dict() == {
         "slip_error": "1/3", "slip_rate_error": "1/7", "peak_slip_rate": "2/7", "pressure": ["-10/3", "20/3"],
+        "asked_pressure": ["-13/3", "17/3"],
     }  # fmt: skip
 
 
@@ -133,7 +150,7 @@ def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     assert said.startswith("from rest, held over 0.1 s, 0.02 s late, through a lag of 0.03 s, for every disturbance")
     assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith("from rest, held over 0.1 s, for every")
     assert "never exceeds 0.286 m/s, the slip stays within 0.334 m of the reference" in said
-    assert "the pressure between -3.34 Pa and 6.67 Pa" in said
+    assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa (for" in said
 
 
 def test_a_law_runs_once_a_step_without_delay_and_lag_unless_it_has_an_implicit_root():
