@@ -651,7 +651,7 @@ def test_a_small_gain_that_is_not_below_one_is_named(gain, said):
         reference_acceleration=zero, reference_jerk=zero, smooth=True, reference_force=zero, drift=zero, amplitude=one,
         change=None, slope_of_beta=zero, steady_beta=True,
     )  # fmt: skip
-    loop = checker.Loop([], [([], one)], [], [[], []], None, one)
+    loop = checker.Loop([], [([], one)], [[]] * 3, [[], []], None, one)
     found = [[[F(gain)], [zero], [zero]], [[zero], [zero], [zero]]]
     if said:
         with pytest.raises(checker.Refused, match=said):
@@ -668,7 +668,7 @@ def test_of_a_disturbance_of_bounded_rate_what_the_gains_range_leaves_counts():
         reference_acceleration=zero, reference_jerk=zero, smooth=True, reference_force=zero, drift=zero, amplitude=F(6),
         change=zero, slope_of_beta=zero, steady_beta=False,
     )  # fmt: skip
-    loop = checker.Loop([], [([], one)], [], [[], []], None, one)
+    loop = checker.Loop([], [([], one)], [[]] * 3, [[], []], None, one)
     found = [[[one], [zero], [zero]], [[zero], [zero], [zero]]]
     assert checker.of_class(task, loop, found)[0] == [3, 0, 3]
 
