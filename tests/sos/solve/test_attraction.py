@@ -30,7 +30,8 @@ ROWS = {row[0]: row for row in re.findall(r"^\| (?!system|field)([a-z0-9-]+)" + 
 SYSTEMS = tomllib.loads((ROOT / "tests" / "sos" / "regions.toml").read_text(encoding="utf-8"))
 TRUTH = {
     "cubic": 1, "cubic-quartic": 1, "rational-cubic": 1, "drake-12876": 1 / 20, "hahn": 8 * sqrt(3) / 9,
-    "ahmadi-krstic-parrilo": 27 / 4, "tibken": 4,
+    "ahmadi-krstic-parrilo": 27 / 4, "tibken": 4, "tan-2": 1 / 3,
+    "tan-3": 1 - 1 / sqrt(2),
 }  # fmt: skip  # by hand
 PLANAR = [name for name, row in SYSTEMS.items() if len(row["field"]) == 2]
 VAN_DER_POL = SYSTEMS["van-der-pol"]["field"]
@@ -79,6 +80,7 @@ def least_on_the_zero_set(name):
     """Least V > 0 where V̇ = 0: V at all such points on the lines x = root of the resultant of Lagrange's equations."""
     (x, y), f, V = symbolic(name)
     rate = sp.expand(sp.diff(V, x) * f[0] + sp.diff(V, y) * f[1])
+    rate = sp.expand(sp.cancel(rate / sp.gcd(rate, V)))  # V is no factor of what vanishes away from the origin
     tangent = sp.expand(sp.diff(V, x) * sp.diff(rate, y) - sp.diff(V, y) * sp.diff(rate, x))
     factors = sp.factor_list(sp.resultant(rate, tangent, y), x)[1]
     lines = [sp.re(r) for g, _ in factors for r in sp.Poly(g, x).nroots(n=40, maxsteps=500) if abs(sp.im(r)) < 1e-15]
