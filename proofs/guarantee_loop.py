@@ -17,7 +17,7 @@ SHORT = Fraction(1, 10**20)
 SHORTEST = 32  # a layer takes at least the 32nd part of a step
 EVEN = [Fraction(i, 8) for i in range(9)]  # where a flow between two events is cut
 HALVES = [Fraction(i, 2) for i in range(3)]
-BENT = [Fraction(i, 128) for i in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)]  # after a step into a layer
+BENT = [Fraction(i, 128) for i in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)]  # before a lag or a layer
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 
 
@@ -111,7 +111,8 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
     inputs += [entry for entry, off in zip(told, law.noise, strict=True) if off]
     outputs = [unit(size)[0], unit(size)[1], push]
-    loop = Loop(flow, events, outputs, inputs, root, step, law.noise, start=starts_of(law, errors))
+    cuts = BENT if law.lag else EVEN
+    loop = Loop(flow, events, outputs, inputs, root, step, law.noise, cuts, start=starts_of(law, errors))
     loop = with_left_out(loop, law) if law.diffusion else loop
     return replace(loop, outputs=[*loop.outputs, unit(size)[law.valve]], asked=True) if law.path else loop
 

@@ -11,7 +11,9 @@ from quakedesign.loop.periodic import EVEN, Fading, PeriodicLoop, Segment
 
 MOST_PERIODS = 8
 SHORTEST = 32  # parts of a step: the modes of a faster layer are gone sooner than bounds can follow
-BENT = tuple(Fraction(v, 128) for v in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128))  # as modes of a layer do
+BENT = tuple(
+    Fraction(v, 128) for v in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)
+)  # as a lag and the modes of a layer do
 HALVES = tuple(Fraction(v, 2) for v in (0, 1, 2))
 
 
@@ -71,7 +73,7 @@ def held_loop(
     for k, name in enumerate(NOISES):
         if name in noisy:
             sampled[name] = tuple(row[k] - (i == k) for i, row in enumerate(jump))
-    ends, past_ends = (BENT, HALVES) if diffusion else (EVEN, EVEN)
+    ends, past_ends = (BENT, HALVES) if diffusion else (BENT if lag else EVEN, EVEN)
     maps = [(jump, path.part or step), *([(arrival, step - path.part)] if path.part else [])]
     left_out, fading = _left_out(path)
     push = _push(path)

@@ -24,16 +24,16 @@ def dot(row, values):
     return sum((a * b for a, b in zip(row, values, strict=True)), F(0))
 
 
-def by_hand(state, slip, rate):
-    """One sample: the states after it, and the pressure."""
+def by_hand(state, slip, rate, more=F(0)):
+    """One sample: the states after it, and the pressure that is asked for; so much more is applied."""
     predicted, level, *scaled = state
     pressures, constant = [q / GAIN for q in scaled], sum(MODEL.of_pressures) + MODEL.of_asked
     level += WEIGHT * (rate - predicted) / constant
     k1, k2, *others = GAINS
     asked = -k1 * slip - k2 * rate - dot(others, [q + level / GAIN for q in pressures]) - level / GAIN
     predicted = MODEL.of_slip * slip + MODEL.of_rate * rate + constant * level
-    predicted += GAIN * (dot(MODEL.of_pressures, pressures) + MODEL.of_asked * asked)
-    after = [dot(row, pressures) + (1 - sum(row)) * asked for row in MODEL.kept]
+    predicted += GAIN * (dot(MODEL.of_pressures, pressures) + MODEL.of_asked * (asked + more))
+    after = [dot(row, pressures) + (1 - sum(row)) * (asked + more) for row in MODEL.kept]
     return [predicted, level, *(GAIN * q for q in after)], asked
 
 
@@ -45,6 +45,8 @@ def test_a_sample_does_what_is_written():
         after, asked = by_hand(state, *seen)
         assert [dot(row, state) + dot(fed, seen) for row, fed in zip(law.update, law.measured, strict=True)] == after
         assert dot(law.output, state) + dot(law.feedback, seen) == asked
+        told = by_hand(state, *seen, more=F(7, 3))[0]
+        assert told == [v + F(7, 3) * gained for v, gained in zip(after, law.applied, strict=True)]
 
 
 def test_a_constant_pressure_against_a_disturbance_is_a_steady_state():

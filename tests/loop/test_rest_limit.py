@@ -248,6 +248,15 @@ def test_where_p_star_drifts_all_pressures_that_count_from_it_move(proved):
     assert limit.highest == pytest.approx([1.0])
 
 
+def test_the_search_with_stick_lets_the_limit_follow_every_step(proved, monkeypatch):
+    followed = []
+    monkeypatch.setattr(_Limit, "follow", lambda _, before, after: followed.append((before[0, 4], after[0, 4])))
+    _searched(proved, True)
+    drift = float(proved.task.drift * STEP) / 6
+    assert len(followed) > 1000
+    assert max(abs(after - before) for before, after in followed) == pytest.approx(drift, rel=1e-6)
+
+
 def test_the_adversary_is_held_by_the_limit_and_only_with_stick(proved, monkeypatch):
     """Where the pressure may never fall, however fast the fault goes, what pushes forward makes an earthquake."""
     before = [_searched(proved, sticks) for sticks in (False, True)]

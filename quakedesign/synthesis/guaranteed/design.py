@@ -76,8 +76,8 @@ def design_held(
     and the sizes of its process noise chosen in the same way.
 
     ``peak``: the smallest certified slip-rate error. ``tracking``: the smallest slip error under a disturbance that
-    drifts, among laws whose certified slip-rate error is at most `room` times the smallest. With a layer between well
-    and fault the law carries a model of the path.
+    drifts, among laws whose certified slip-rate error is at most `room` times the smallest. With a lag, or a layer
+    between well and fault, the law carries a model of the path.
 
     Parameters
     ----------

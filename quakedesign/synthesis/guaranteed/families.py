@@ -11,7 +11,7 @@ from scipy.linalg import expm, solve_discrete_are
 from quakedesign.certificates.guarantee import Task
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.loop import SHORTEST, ErrorPrediction, LinearLaw, Prediction, disturbance_estimate, slip_observer
-from quakedesign.synthesis.guaranteed.path_design import STARTS, path_laws, path_modes
+from quakedesign.synthesis.guaranteed.path_design import BEHIND_LAG, THROUGH_ROCK, path_laws, path_modes, slowest
 from quakedesign.synthesis.guaranteed.rounding import short
 
 MEASURED = ("slip-and-rate", "slip")
@@ -51,7 +51,7 @@ def why_no_law(step: Fraction, measured: str, around: Around) -> str:
 def family_of(task: Task, step: Fraction, measured: str, around: Around) -> Family:
     """Feedback with an estimate of the disturbance, from slip and slip rate or from the slip alone.
 
-    Through a layer it is a feedback of the pressures on their way as well, which the law simulates.
+    Through a lag or a layer it is a feedback of the pressures on their way as well, which the law simulates.
 
     Parameters
     ----------
@@ -64,12 +64,13 @@ def family_of(task: Task, step: Fraction, measured: str, around: Around) -> Fami
         Near the bound of whose noise of the slip an observer's search begins; `why_no_law` must have no reason.
     """
     delay = around.get("delay", Fraction(0))
-    if around.get("diffusion"):
+    known = around.get("lag") and path_modes(step, around) >= 0 and measured != "slip"
+    if around.get("diffusion") or known:
         return _through_path(task, step, around)
     if measured == "slip":
         return _observers(task, step, delay, around.get("slip_noise", Fraction(0)))
     scale, prediction = _Scale.of(task, step), _ahead(task, step, delay)
-    known = Prediction(
+    expected = Prediction(
         of_slip=prediction.of_errors[1][0],
         of_rate=prediction.of_errors[1][1],
         of_pushes=tuple(v[1] for v in prediction.of_pushes),
@@ -78,7 +79,7 @@ def family_of(task: Task, step: Fraction, measured: str, around: Around) -> Fami
     )
 
     def law(x: np.ndarray) -> LinearLaw:
-        return disturbance_estimate(scale.gains(x), short(float(x[2])), known, scale.gain)
+        return disturbance_estimate(scale.gains(x), short(float(x[2])), expected, scale.gain)
 
     return Family(law, _STARTS, lambda x: bool(0 < x[2] < 1), room=1.6, period=step)
 
@@ -87,7 +88,8 @@ def _through_path(task: Task, step: Fraction, around: Around) -> Family:
     def admits(x: np.ndarray) -> bool:
         return bool(0 < x[2] < 1 and np.abs(x[:2]).max() < _WIDEST)
 
-    return Family(path_laws(task.model, step, around), STARTS, admits, room=1.6, period=step + around["diffusion"])
+    starts = THROUGH_ROCK if around.get("diffusion") else BEHIND_LAG
+    return Family(path_laws(task.model, step, around), starts, admits, room=1.6, period=step + slowest(around))
 
 
 def _observers(task: Task, step: Fraction, delay: Fraction, noise: Fraction) -> Family:

@@ -1,4 +1,4 @@
-"""Laws for a fault behind a layer of rock: gains of a discrete Riccati equation on fault and path."""
+"""Laws for a fault behind a lag or a layer of rock: gains of a discrete Riccati equation on fault and path."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -12,22 +12,34 @@ from quakedesign.loop import Layer, LinearLaw, Model, PathModel, estimate_throug
 from quakedesign.loop.layer import MODES
 from quakedesign.synthesis.guaranteed.rounding import short
 
-STARTS = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # where good laws were seen
+THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # where good laws were seen
+BEHIND_LAG = ((-2.4, -6.0, 0.3), (-1.0, -4.0, 0.5))
 _MOST_STATES = 20  # of a loop
-_WITHOUT_PATH = 6 + MODES  # e1, e2, π, d, the valve, its last step and the modes of the layer
+_WITHOUT_PATH = 6  # e1, e2, π, d, the valve, its last step or the well, of a law that does not know the lag
 
 
 def path_modes(step: Fraction, around: Around) -> int:
-    """How many modes of a layer a law may know so that the loop keeps within the states of a file."""
+    """How many modes of a layer a law may know so that the loop keeps within the states of a file; 0 without one.
+
+    Below 0 there are too many states even so.
+    """
     ages = -int(-around.get("delay", Fraction(0)) // step)
-    return _MOST_STATES - _WITHOUT_PATH - bool(around.get("lag")) - 2 * ages
+    layer, behind = MODES if around.get("diffusion") else 0, bool(around.get("lag"))
+    free = _MOST_STATES - _WITHOUT_PATH - layer - behind - 2 * ages
+    return free if layer else min(free, 0)
+
+
+def slowest(around: Around) -> Fraction:
+    """L²/D, or the lag without a layer [s]."""
+    return around.get("diffusion") or around["lag"]
 
 
 def path_laws(model: Model, step: Fraction, around: Around) -> Callable[[np.ndarray], LinearLaw]:
     """Law of three numbers without units: weights of slip error and pressure, as logarithms, and a of the estimate.
 
     The weights are those of a linear quadratic regulator on the sampled fault with its path, the slip-rate error's
-    being 1, with time in L²/D. The law raises LinAlgError where their equation has no solution.
+    being 1, with time in L²/D or, without a layer, in what passes before a pressure acts. The law raises LinAlgError
+    where their equation has no solution.
     """
     gain = float(model.gain)
     flow, first = _sampled(model, step, around, path_modes(step, around))
@@ -39,7 +51,7 @@ def path_laws(model: Model, step: Fraction, around: Around) -> Callable[[np.ndar
         of_asked=short(first[1] / gain),
         kept=kept,
     )
-    unit = float(around["diffusion"])
+    unit = float(around.get("diffusion") or step + around.get("delay", 0) + around["lag"])
 
     def law(x: np.ndarray) -> LinearLaw:
         weights = np.zeros(flow.shape)
@@ -57,7 +69,7 @@ def _sampled(model: Model, step: Fraction, around: Around, modes: int) -> tuple[
     delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
     whole, late = int(delay // step), float(delay % step)
     ages = whole + (late > 0)
-    lagging, layer = int(lag > 0), Layer(time=around["diffusion"])
+    lagging, layer = int(lag > 0), Layer(time=slowest(around))
     size = 2 + lagging + modes
     shares = np.array([float(layer.share(i)) for i in range(modes)])
     rates = np.array([float(layer.rate(i)) for i in range(modes)])

@@ -1,8 +1,8 @@
 """A simulator of a held loop that knows numbers only, and courses made to hurt it. NumPy; nothing of the package.
 
 The plant e1′ = e2, e2′ = s·e1 − w·e2 + β·b·p + φ is integrated by RK4 in small steps, many courses at once. The law is
-p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later, spreading through a layer of rock where there is
-one; y = (e1, e2), or (e1, e2, w) with w by a rule, of the errors as they are measured.
+p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later, through a lag or spreading through a layer of rock
+where there is one; y = (e1, e2), or (e1, e2, w) with w by a rule, of the errors as they are measured.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ class Held:
     """Numbers of a loop: matrices of the law, b, ranges of s, w and β, T_s, delay, bounds of φ and noise, all in SI.
 
     For a friction of the slip alone: how much β changes per slip at most, and the reference's rate. The rock's L²/D, of
-    which so many modes are followed, is zero where the well is at the fault. The law's states begin at 0, or at first
-    times the errors that it is told then.
+    which so many modes are followed, is zero where the well is at the fault; a lag in its place has one. The law's
+    states begin at 0, or at first times the errors that it is told then.
     """
 
     F: np.ndarray
@@ -36,6 +36,7 @@ class Held:
     pace: float = 0.0
     rock: float = 0.0
     modes: int = 40
+    lag: float = 0.0
     first: object = None
 
 
@@ -59,6 +60,7 @@ def numbers(claim, force=None):
         slope=float(task.friction.weakening * task.area_per_mass[1] / task.authority),
         pace=float(task.reference_rates[0]),
         rock=float(held.diffusion),
+        lag=float(held.lag),
     )
 
 
@@ -89,7 +91,10 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None,
     late = round(held.delay / h)
     e = np.zeros((2, courses)) if start is None else np.array(start, dtype=float)
     z, v = np.zeros((size, courses)), np.zeros(courses)
-    rates, shares = spreading(held.rock, held.modes) if held.rock else (np.array([np.inf]), np.ones(1))
+    through = held.rock or held.lag
+    rates, shares = (
+        spreading(held.rock, held.modes) if held.rock else (np.array([1 / (held.lag or 1e-300)]), np.ones(1))
+    )
     fade, spread = np.exp(-rates * h / 2)[:, None], np.zeros((len(shares), courses))
     waiting, largest = [], np.abs(e)
     for k in range(periods * pieces):
@@ -105,7 +110,7 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None,
             e[1] += kick(k)
         halfway = v + (spread - v) * fade
         after = v + (halfway - v) * fade
-        first, second, third = (shares @ part for part in (spread if held.rock else halfway, halfway, after))
+        first, second, third = (shares @ part for part in (spread if through else halfway, halfway, after))
         spread = after
         s, w, beta, phi = choose(k, e, first)
 

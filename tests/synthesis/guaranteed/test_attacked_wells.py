@@ -1,4 +1,4 @@
-"""Guarantees through rock and of the class `rate` against ten thousand courses of a simulator of its own."""
+"""Guarantees through rock, behind a lag and of the class `rate` against ten thousand courses of its own simulator."""
 
 import importlib.util
 from dataclasses import replace
@@ -67,6 +67,45 @@ def test_no_course_of_ten_thousand_violates_a_guarantee_through_rock(rock):
     fine = worst(replace(held, modes=400), periods, 2 * pieces, *along(held, periods, 2 * pieces))
     assert np.all(fine <= (claim.claims.slip_error, claim.claims.slip_rate_error))
     assert fine[1] == pytest.approx(rate, rel=0.05)
+
+
+def test_a_lag_is_followed_as_its_closed_form():
+    """A pressure of 1 from the first sample on: v = 1 − e^{−t/lag}, seen as what the plant is pushed with."""
+    seen, nothing = [], np.zeros((1, 1))
+    held = attacker.Held(
+        nothing, np.zeros((1, 2)), np.ones(1), np.zeros(2), 1.0, (0, 0), (0, 0), (1, 1), 0.5, 0.0, 0.0, lag=0.3
+    )
+    held = replace(held, F=np.ones((1, 1)), first=np.array([[1.0, 0.0]]))
+    choose = lambda k, e, v: seen.append(float(v[0])) or (0, 0, 1.0, 0.0)  # noqa: E731
+    attacker.run(held, 4, 10, choose, 1, start=[[1.0], [0.0]])
+    assert seen == pytest.approx(1 - np.exp(-0.05 / 0.3 * np.arange(40)), rel=1e-12)
+
+
+LAGS = {("0.184", "0.2"): 2.3e-4, ("0.05", "0.2"): 6e-5, ("0.184", "0.001"): 1.8e-4}  # T_s, lag [s]: certified [m/s]
+
+
+@pytest.mark.parametrize("count", [500, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("times", LAGS)
+def test_no_course_violates_a_guarantee_behind_a_lag(times, count):
+    step, lag = map(F, times)
+    claim = design_held(task_of(REAL), step, lag=lag)
+    assert claim.check() is Verdict.PROVED
+    assert claim.claims.slip_rate_error <= LAGS[times]
+    held, periods, pieces = attacker.numbers(claim), 60, 6
+    random = attacker.switching(held, count, periods * pieces, seed=3)
+    slowed = (lambda choose: attacker.slowly(held, pieces, choose)) if claim.slow_gain else lambda choose: choose
+    ends = attacker.responses(held, periods, pieces)
+    aligned = [(slowed(attacker.aligned(held, response)), 4) for response in ends]
+    slip, rate = worst(held, periods, pieces, (slowed(random), count), *aligned)
+    assert slip <= claim.claims.slip_error
+    assert rate <= claim.claims.slip_rate_error <= 2 * rate
+
+
+def test_behind_a_short_lag_a_design_holds_as_well_as_behind_none():
+    task, step = task_of(REAL), F("0.184")
+    short, none = design_held(task, step, lag=F("0.001")), design_held(task, step)
+    for name in ("slip_error", "slip_rate_error"):
+        assert getattr(short.claims, name) == pytest.approx(getattr(none.claims, name), rel=0.1)
 
 
 @pytest.mark.slow
