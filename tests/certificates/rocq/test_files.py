@@ -1,5 +1,6 @@
 """Files for a proof assistant: what coqc accepts, and that it refuses every change."""
 
+import importlib.util
 import json
 import os
 import re
@@ -317,6 +318,28 @@ def test_coqc_accepts_what_holds_and_no_changed_digit(tmp_path):
     assert axioms_of(loop) == ANALYSIS
     assert [axioms_of(other) for other in others] == [REALS] * 5
     assert len(changed) > 250
+
+
+def by_hand(name):
+    """A file that is made by hand for the standalone checker."""
+    path = Path(__file__).parents[2] / "proofs" / "test_check.py"
+    specification = importlib.util.spec_from_file_location("rocq_by_hand", path)
+    made = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(made)
+    return getattr(made, name)()
+
+
+@needs_coqc
+@pytest.mark.slow
+def test_coqc_accepts_a_root_in_a_sign_and_no_changed_digit(tmp_path):
+    text = statement_text(by_hand("nested_root_sign"))
+    same = "Column 1 false; Column 1 false; Column 2 false]"  # the last is known by its sign alone, whatever its weight
+    changed = [goal_fails(other) for other in changed_digits(text) if same not in other]
+    modules = [module(f"Changed{i}", other) for i, other in enumerate(changed)]
+    code, out, err = compiled("\n".join([*library(), module("Rooted", text), *modules]), tmp_path)
+    assert (code, err) == (0, "")
+    assert axioms_of(out) == ANALYSIS
+    assert len(changed) > 300
 
 
 @needs_coqc
