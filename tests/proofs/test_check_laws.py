@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import quakedesign as qd
-from quakedesign.certificates import certificate_text
+from quakedesign.certificates import certificate_text, load_certificate
 from quakedesign.synthesis.lyapunov.balancing import balance
 from quakedesign.synthesis.lyapunov.certify_exactly import with_largest_decay
 
@@ -35,7 +35,13 @@ def irrational_root():
     return qd.certify("dia", (2, 5, "1.44e-4", 0), lipschitz="1.3968e-4")[1]
 
 
-MAKERS = {"settling": settling, "two lifts": two_lifts, "irrational root": irrational_root}
+def root_in_a_sign():
+    return load_certificate(PATH.parent / "certificates" / "dia_2_5_1_0.1.json")
+
+
+MAKERS = {
+    "settling": settling, "two lifts": two_lifts, "irrational root": irrational_root, "root in a sign": root_in_a_sign,
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module", params=MAKERS)
