@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.certificates import Verdict, parse_certificate
+from quakedesign.controllers.dia import DiscontinuousIntegral
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.analysis import gain_map as maps
 from quakedesign.synthesis.analysis.certify import closed_loop
@@ -140,12 +141,17 @@ def test_axes_are_exact_and_divided_in_equal_ratios_where_positive():
 
 
 def test_points_that_cannot_be_expressed_are_not_found():
-    # kI4 brings the root of kI1 into a sign's argument, so that it must be rational
+    # with e1 for a state the root of kI1 stands under a cube root, so that it must be rational
+    dia = DiscontinuousIntegral.loop_field()
+    ((root, gain),) = dia.roots.items()
+    f1, e2, _ = dia.states
+    field = {state: rate.subs(f1, f1 * gain * root) for state, rate in dia.field.items()} | {f1: e2}
+    subject = replace(dia, field=field, units={})
     sheet = maps._sheet(
-        "dia", ("4", "20", "1", "0.1"), ("kI1", "kI4"), (("4", "5"), (0, "0.1")), 2, ("0.3",), (1, 1), 5
+        subject, ("4", "20", "1", "0.1"), ("kI1", "kI4"), (("4", "5"), (0, "0.1")), 2, ("0.3",), (1, 1), 5
     )
     screener = Screener(replace(sheet, degree=5))
-    assert not screener._found((1, 1), 1)
+    assert [screener._found(place, 1) for place in ((0, 1), (1, 0), (1, 1))] == [True, False, False]
     assert sheet.rows == [[(0, 0), (0, 1)], [(1, 0), (1, 1)]]
 
 
