@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.implicit_root import Power as Power
     from quakedesign.loop.internal_model import PathModel as PathModel
     from quakedesign.loop.internal_model import estimate_through_path as estimate_through_path
+    from quakedesign.loop.internal_model import observer_through_path as observer_through_path
     from quakedesign.loop.known_area import with_known_area as with_known_area
     from quakedesign.loop.laws import NOISES as NOISES
     from quakedesign.loop.laws import LinearLaw as LinearLaw

@@ -10,9 +10,18 @@ from scipy.linalg import expm, solve_discrete_are
 
 from quakedesign.certificates.guarantee import Task
 from quakedesign.certificates.guarantee.statement import Around
-from quakedesign.loop import SHORTEST, ErrorPrediction, LinearLaw, Prediction, disturbance_estimate, slip_observer
-from quakedesign.synthesis.guaranteed.path_design import BEHIND_LAG, THROUGH_ROCK, path_laws, path_modes, slowest
-from quakedesign.synthesis.guaranteed.rounding import short
+from quakedesign.loop import (
+    SHORTEST,
+    ErrorPrediction,
+    LinearLaw,
+    Prediction,
+    disturbance_estimate,
+    estimate_through_path,
+    observer_through_path,
+    slip_observer,
+)
+from quakedesign.synthesis.guaranteed.path_design import BEHIND_LAG, THROUGH_ROCK, PathFeedback, path_modes, slowest
+from quakedesign.synthesis.guaranteed.rounding import rounded, short
 
 MEASURED = ("slip-and-rate", "slip")
 _STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
@@ -43,9 +52,8 @@ def why_no_law(step: Fraction, measured: str, around: Around) -> str:
         return ""
     if SHORTEST * around["diffusion"] < step:
         return f"a layer of L^2/D = {float(around['diffusion']):.4g} s is faster than T_s/{SHORTEST}; leave it out"
-    if measured == "slip":
-        return "no law of the slip alone knows a layer between well and fault; measure the slip rate as well"
-    return "" if path_modes(step, around) >= _FEWEST_MODES else "a law that knows delay and layer has too many states"
+    known = path_modes(step, around, observed=measured == "slip") >= _FEWEST_MODES
+    return "" if known else "a law that knows delay and layer has too many states"
 
 
 def family_of(task: Task, step: Fraction, measured: str, around: Around) -> Family:
@@ -64,11 +72,11 @@ def family_of(task: Task, step: Fraction, measured: str, around: Around) -> Fami
         Near the bound of whose noise of the slip an observer's search begins; `why_no_law` must have no reason.
     """
     delay = around.get("delay", Fraction(0))
-    known = around.get("lag") and path_modes(step, around) >= 0 and measured != "slip"
-    if around.get("diffusion") or known:
-        return _through_path(task, step, around)
-    if measured == "slip":
-        return _observers(task, step, delay, around.get("slip_noise", Fraction(0)))
+    observed, noise = measured == "slip", around.get("slip_noise", Fraction(0))
+    if around.get("diffusion") or (around.get("lag") and path_modes(step, around, observed=observed) >= 0):
+        return (_observers_through_path if observed else _through_path)(task, step, around)
+    if observed:
+        return _observers(task, step, delay, noise)
     scale, prediction = _Scale.of(task, step), _ahead(task, step, delay)
     expected = Prediction(
         of_slip=prediction.of_errors[1][0],
@@ -85,36 +93,77 @@ def family_of(task: Task, step: Fraction, measured: str, around: Around) -> Fami
 
 
 def _through_path(task: Task, step: Fraction, around: Around) -> Family:
+    feedback = PathFeedback.of(task.model, step, around)
+
+    def law(x: np.ndarray) -> LinearLaw:
+        slip, pressure, weight = map(float, x)
+        return estimate_through_path(feedback.gains(slip, pressure), short(weight), feedback.model, feedback.gain)
+
     def admits(x: np.ndarray) -> bool:
         return bool(0 < x[2] < 1 and np.abs(x[:2]).max() < _WIDEST)
 
-    starts = THROUGH_ROCK if around.get("diffusion") else BEHIND_LAG
-    return Family(path_laws(task.model, step, around), starts, admits, room=1.6, period=step + slowest(around))
+    return Family(law, _path_starts(around), admits, room=1.6, period=step + slowest(around))
+
+
+def _observers_through_path(task: Task, step: Fraction, around: Around) -> Family:
+    feedback, kalman = PathFeedback.of(task.model, step, around, observed=True), _Kalman.of(task, step)
+    decades = kalman.decades(task, around.get("slip_noise", Fraction(0)))
+
+    def law(x: np.ndarray) -> LinearLaw:
+        gains, corrections = feedback.gains(float(x[0]), float(x[1])), kalman.corrections(float(x[2]), float(x[3]))
+        return observer_through_path(gains, corrections, feedback.model, feedback.gain)
+
+    noisy = [(decades + acceleration, decades + level) for *_, acceleration, level in _OBSERVERS]
+    starts = tuple((*path[:2], *above) for path, above in zip(_path_starts(around), noisy, strict=False))
+    return Family(law, starts, _solvable, room=1.4, period=step + slowest(around))
+
+
+def _path_starts(around: Around) -> tuple[tuple[float, float, float], ...]:
+    return THROUGH_ROCK if around.get("diffusion") else BEHIND_LAG
+
+
+def _solvable(x: np.ndarray) -> bool:
+    return bool(np.abs(x).max() < _WIDEST)
 
 
 def _observers(task: Task, step: Fraction, delay: Fraction, noise: Fraction) -> Family:
     """Steady-state Kalman observers: two gains, decades of the variances of accelerations and of the level's steps."""
-    scale, prediction, period = _Scale.of(task, step), _ahead(task, step, delay), float(step)
-    units = np.diag([1, 1 / period, 1 / period**2])
-    follows = np.linalg.inv(units) @ expm(_flow(task) * period) @ units
+    scale, prediction, kalman = _Scale.of(task, step), _ahead(task, step, delay), _Kalman.of(task, step)
 
     def law(x: np.ndarray) -> LinearLaw:
-        corrections = units @ _kalman(follows, float(x[2]), float(x[3]))
-        first, second, third = (short(float(v)) for v in corrections)
-        return slip_observer(scale.gains(x), (first, second, third), prediction, scale.gain)
+        return slip_observer(scale.gains(x), kalman.corrections(float(x[2]), float(x[3])), prediction, scale.gain)
 
-    moved = float(task.amplitude) * period**2
-    decades = _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
+    decades = kalman.decades(task, noise)
     starts = tuple((k1, k2, decades + a, decades + b) for k1, k2, a, b in _OBSERVERS)
-    return Family(law, starts, lambda x: bool(np.abs(x[2:]).max() < _WIDEST), room=1.4, period=step)
+    return Family(law, starts, lambda x: _solvable(x[2:]), room=1.4, period=step)
 
 
-def _kalman(follows: np.ndarray, acceleration: float, level: float) -> np.ndarray:
-    """Corrections per innovation of the slip, whose noise has the variance 1, by the Riccati equation of the filter."""
-    pushed = follows[:, 2] * [1, 1, 0]
-    process = 10**acceleration * np.outer(pushed, pushed) + np.diag([0, 0, 10**level]) + _FAINT * np.eye(3)
-    covariance = solve_discrete_are(follows.T, np.eye(3)[:, :1], process, np.eye(1))
-    return np.asarray(covariance[:, 0] / (covariance[0, 0] + 1))
+@dataclass(frozen=True, slots=True)
+class _Kalman:
+    """Filters of slip error, slip-rate error and a level of all accelerations, from the slip: of one T_s [s]."""
+
+    follows: np.ndarray
+    units: np.ndarray
+    step: float
+
+    @classmethod
+    def of(cls, task: Task, step: Fraction) -> "_Kalman":
+        period = float(step)
+        units = np.diag([1, 1 / period, 1 / period**2])
+        return cls(np.linalg.inv(units) @ expm(_flow(task) * period) @ units, units, period)
+
+    def decades(self, task: Task, noise: Fraction) -> float:
+        """Where a search begins: of what the disturbance moves within T_s, over the noise [m]."""
+        moved = float(task.amplitude) * self.step**2
+        return _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
+
+    def corrections(self, acceleration: float, level: float) -> tuple[Fraction, Fraction, Fraction]:
+        """Per innovation of the slip, whose noise has the variance 1, by the Riccati equation of the filter."""
+        pushed = self.follows[:, 2] * [1, 1, 0]
+        process = 10**acceleration * np.outer(pushed, pushed) + np.diag([0, 0, 10**level]) + _FAINT * np.eye(3)
+        covariance = solve_discrete_are(self.follows.T, np.eye(3)[:, :1], process, np.eye(1))
+        first, second, third = self.units @ covariance[:, 0] / (covariance[0, 0] + 1)
+        return short(float(first)), short(float(second)), short(float(third))
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,12 +205,8 @@ def _ahead(task: Task, step: Fraction, delay: Fraction) -> ErrorPrediction:
         pushes[whole + 1] = pushed(period) - pushes[whole]
     arriving = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in range(1, ages + 1)]
     return ErrorPrediction(
-        of_errors=_rounded(expm(flow * period)[:2, :2]),
-        of_pushes=_rounded(pushes),
-        ahead=_rounded(expm(flow * late)[:2, :2]),
-        ahead_of_pushes=_rounded(arriving),
+        of_errors=rounded(expm(flow * period)[:2, :2]),
+        of_pushes=rounded(pushes),
+        ahead=rounded(expm(flow * late)[:2, :2]),
+        ahead_of_pushes=rounded(arriving),
     )
-
-
-def _rounded(rows: "np.ndarray | list[np.ndarray]") -> tuple[tuple[Fraction, ...], ...]:
-    return tuple(tuple(short(float(v)) for v in row) for row in rows)

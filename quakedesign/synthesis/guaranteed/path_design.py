@@ -1,6 +1,6 @@
 """Laws for a fault behind a lag or a layer of rock: gains of a discrete Riccati equation on fault and path."""
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
 from math import exp
 
@@ -8,24 +8,25 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from quakedesign.certificates.guarantee.statement import Around
-from quakedesign.loop import Layer, LinearLaw, Model, PathModel, estimate_through_path
+from quakedesign.loop import Layer, Model, PathModel
+from quakedesign.loop.laws import Row
 from quakedesign.loop.layer import MODES
-from quakedesign.synthesis.guaranteed.rounding import short
+from quakedesign.synthesis.guaranteed.rounding import rounded, short
 
 THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # where good laws were seen
 BEHIND_LAG = ((-2.4, -6.0, 0.3), (-1.0, -4.0, 0.5))
 _MOST_STATES = 20  # of a loop
-_WITHOUT_PATH = 6  # e1, e2, π, d, the valve, its last step or the well, of a law that does not know the lag
+_WITHOUT_PATH = 6  # e1, e2, π2, d, the valve, its last step or the well, of a law that does not know the lag
 
 
-def path_modes(step: Fraction, around: Around) -> int:
+def path_modes(step: Fraction, around: Around, *, observed: bool = False) -> int:
     """How many modes of a layer a law may know so that the loop keeps within the states of a file; 0 without one.
 
-    Below 0 there are too many states even so.
+    Below 0 there are too many states even so. A law of the slip alone has one state more.
     """
     ages = -int(-around.get("delay", Fraction(0)) // step)
     layer, behind = MODES if around.get("diffusion") else 0, bool(around.get("lag"))
-    free = _MOST_STATES - _WITHOUT_PATH - layer - behind - 2 * ages
+    free = _MOST_STATES - _WITHOUT_PATH - layer - behind - 2 * ages - observed
     return free if layer else min(free, 0)
 
 
@@ -34,34 +35,47 @@ def slowest(around: Around) -> Fraction:
     return around.get("diffusion") or around["lag"]
 
 
-def path_laws(model: Model, step: Fraction, around: Around) -> Callable[[np.ndarray], LinearLaw]:
-    """Law of three numbers without units: weights of slip error and pressure, as logarithms, and a of the estimate.
+@dataclass(frozen=True, slots=True)
+class PathFeedback:
+    """A model of fault and path, and the feedback of both by a linear quadratic regulator on the sampled pair."""
 
-    The weights are those of a linear quadratic regulator on the sampled fault with its path, the slip-rate error's
-    being 1, with time in L²/D or, without a layer, in what passes before a pressure acts. The law raises LinAlgError
-    where their equation has no solution.
-    """
-    gain = float(model.gain)
-    flow, first = _sampled(model, step, around, path_modes(step, around))
-    kept = tuple(tuple(short(v) for v in row) for row in flow[2:, 2:])
-    path = PathModel(
-        of_slip=short(flow[1, 0]),
-        of_rate=short(flow[1, 1]),
-        of_pressures=tuple(short(v / gain) for v in flow[1, 2:]),
-        of_asked=short(first[1] / gain),
-        kept=kept,
-    )
-    unit = float(around.get("diffusion") or step + around.get("delay", 0) + around["lag"])
+    model: PathModel
+    gain: Fraction
+    flow: np.ndarray
+    first: np.ndarray
+    unit: float
+    push: float
 
-    def law(x: np.ndarray) -> LinearLaw:
-        weights = np.zeros(flow.shape)
-        weights[0, 0], weights[1, 1] = exp(float(x[0])) / unit**2, 1
-        cost = exp(float(x[1])) * unit**2 * gain**2
-        riccati = solve_discrete_are(flow, first[:, None], weights, np.array([[cost]]))
-        gains = first @ riccati @ flow / (cost + first @ riccati @ first)
-        return estimate_through_path(tuple(short(float(v)) for v in gains), short(float(x[2])), path, short(gain))
+    @classmethod
+    def of(cls, model: Model, step: Fraction, around: Around, *, observed: bool = False) -> "PathFeedback":
+        """With as many modes of a layer as a law may know, of the slip alone if `observed`."""
+        gain = float(model.gain)
+        flow, first = _sampled(model, step, around, path_modes(step, around, observed=observed))
+        path = PathModel(
+            of_errors=rounded(flow[:2, :2]),
+            of_pressures=rounded(flow[:2, 2:] / gain),
+            of_asked=rounded([first[:2] / gain])[0],
+            kept=rounded(flow[2:, 2:]),
+        )
+        unit = float(around.get("diffusion") or step + around.get("delay", 0) + around["lag"])
+        return cls(path, short(gain), flow, first, unit, unit * gain)
 
-    return law
+    def gains(self, slip: float, pressure: float) -> Row:
+        """For logarithms of the weights of slip error and pressure, that of the slip-rate error being 1.
+
+        Time is in L²/D or, without a layer, in what passes before a pressure acts.
+
+        Raises
+        ------
+        LinAlgError
+            Where the Riccati equation has no solution.
+        """
+        weights = np.zeros(self.flow.shape)
+        weights[0, 0], weights[1, 1] = exp(slip) / self.unit**2, 1
+        cost = exp(pressure) * self.push**2
+        riccati = solve_discrete_are(self.flow, self.first[:, None], weights, np.array([[cost]]))
+        found = self.first @ riccati @ self.flow / (cost + self.first @ riccati @ self.first)
+        return tuple(short(float(v)) for v in found)
 
 
 def _sampled(model: Model, step: Fraction, around: Around, modes: int) -> tuple[np.ndarray, np.ndarray]:

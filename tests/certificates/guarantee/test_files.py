@@ -31,7 +31,7 @@ from quakedesign.loop import (
     slip_observer,
     summed_integrals,
 )
-from quakedesign.synthesis.guaranteed.path_design import path_laws
+from quakedesign.synthesis.guaranteed.families import family_of
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("guarantee_check", PATH)
@@ -86,7 +86,7 @@ PATHS_OF = {
     "late rock": {"diffusion": F("0.5"), "delay": F("0.02")},
 }
 for name, path in PATHS_OF.items():
-    through = path_laws(task_of(load_fault("real-fault")).model, STEP, path)
+    through = family_of(task_of(load_fault("real-fault")), STEP, "slip-and-rate", path).law
     LOOPS[name] = Held(law=through(np.array([0.94, -8.28, 0.1237])), step=STEP, **path)
 CONTINUOUS_GAINS = tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5")))
 CONTINUOUS = exact_integrals(CONTINUOUS_GAINS)

@@ -21,7 +21,8 @@ from quakedesign.certificates.guarantee.free_response import free_peaks
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.loop import ImplicitRoot, PeriodicLoop, Power, Segment, compensated
-from quakedesign.synthesis.guaranteed.path_design import THROUGH_ROCK, path_laws
+from quakedesign.synthesis.guaranteed.families import family_of
+from quakedesign.synthesis.guaranteed.path_design import THROUGH_ROCK
 
 PROOFS = Path(__file__).parents[3] / "proofs" / "certificates"
 
@@ -305,7 +306,7 @@ def followed(loop, periods):
 @pytest.mark.parametrize("around", [{"lag": F("0.1")}, {"delay": F("0.02")}])
 def test_through_rock_and_late_both_bound_what_is_seen_of_the_free_response(around):
     task, step, around = stored().task, F("0.05"), {"diffusion": F(1), **around}
-    law = path_laws(task.model, step, around)(np.array(THROUGH_ROCK[0]))
+    law = family_of(task, step, "slip-and-rate", around).law(np.array(THROUGH_ROCK[0]))
     held = Held(law=law, step=step, initial_slip=F("1e-5"), initial_slip_rate=F("4e-5"), **around)
     loop = held.loop(task)
     raw = json.loads(guarantee_text(Guarantee(task=task, held=held, claims=stored().claims)))

@@ -101,6 +101,32 @@ def test_no_course_violates_a_guarantee_behind_a_lag(times, count):
     assert rate <= claim.claims.slip_rate_error <= 2 * rate
 
 
+SLIP_ALONE = {
+    "lag": ({"lag": F("0.05")}, F("0.184"), 2.6e-4, 400),
+    "rock": ({"diffusion": F(1)}, STEP, 2.5e-4, 5000),
+}
+
+
+@pytest.mark.parametrize("behind", ["lag", pytest.param("rock", marks=pytest.mark.slow)])
+def test_no_course_with_noise_violates_a_guarantee_of_the_slip_alone(behind):
+    around, step, most, count = SLIP_ALONE[behind]
+    claim = design_held(task_of(REAL), step, measured="slip", slip_noise=F(1, 10**6), **around)
+    assert claim.held.law.of_slip_alone
+    assert claim.check() is Verdict.PROVED
+    assert claim.claims.slip_rate_error <= most
+    held, periods, pieces = attacker.numbers(claim), 60, 6
+    slowed = (lambda choose: attacker.slowly(held, pieces, choose)) if claim.slow_gain else lambda choose: choose
+    hear = attacker.noisy(held, count, periods * pieces, seed=5)
+    random = slowed(attacker.switching(held, count, periods * pieces, seed=3))
+    seen = [attacker.run(held, periods, pieces, random, count, hear=hear)[0].max(axis=1)]
+    for response in attacker.responses(held, periods, pieces):
+        chosen = slowed(attacker.aligned(held, response))
+        seen.append(attacker.run(held, periods, pieces, chosen, 4, hear=lambda k: hear(k)[:, :4])[0].max(axis=1))
+    slip, rate = np.max(seen, axis=0)
+    assert slip <= claim.claims.slip_error
+    assert rate <= claim.claims.slip_rate_error <= 2.5 * rate
+
+
 def test_behind_a_short_lag_a_design_holds_as_well_as_behind_none():
     task, step = task_of(REAL), F("0.184")
     short, none = design_held(task, step, lag=F("0.001")), design_held(task, step)
