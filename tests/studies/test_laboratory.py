@@ -152,7 +152,9 @@ def test_stick_and_a_quick_differentiator_explain_it_together_and_not_alone():
 def test_the_guaranteed_law_slips_as_slowly_as_proved_where_it_is_proved():
     """The proof is about a plant that does not stick: this is seen, not proved."""
     found = guarantees()
-    assert not found["2 ms late, lag 1 ms, readings off by 500 nm, rate"].proved
+    longest = found["2 ms late, lag 1 ms, readings off by 500 nm, rate"]
+    assert longest.proved
+    assert longest.found.claims.peak_slip_rate < 6e-3
     proof = found["1 ms late, lag 1 ms, readings off by 500 nm, amplitude"].found
     inside = as_proved(KNOWN, proof)
     assert (inside.delay, inside.jitter, inside.lag) == (1, 0, 1e-3)
@@ -160,7 +162,7 @@ def test_the_guaranteed_law_slips_as_slowly_as_proved_where_it_is_proved():
     assert run.harmless == 4
     assert run.slip_error[2] <= proof.claims.slip_error
     assert run.peak_slip_rate[2] <= proof.claims.peak_slip_rate
-    for delay in (1, 2):  # without a lag; with limits, and 2 ms late with a law that settles by itself
+    for delay in (1, 2):  # without a lag, 2 ms late with a law that settles by itself
         proof = found[f"{delay} ms late, lag 0 ms, readings off by 500 nm, amplitude"].found
         run = guaranteed_in(as_proved(KNOWN, proof), proof, specimens=4, duration=60.0)
         assert run.harmless == 4

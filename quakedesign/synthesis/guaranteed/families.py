@@ -20,7 +20,7 @@ from quakedesign.loop import (
     observer_through_path,
     slip_observer,
 )
-from quakedesign.synthesis.guaranteed.path_design import BEHIND_LAG, THROUGH_ROCK, PathFeedback, path_modes, slowest
+from quakedesign.synthesis.guaranteed.path_design import BEHIND_LAG, THROUGH_ROCK, PathFeedback, path_modes
 from quakedesign.synthesis.guaranteed.rounding import rounded, short
 
 MEASURED = ("slip-and-rate", "slip")
@@ -102,7 +102,7 @@ def _through_path(task: Task, step: Fraction, around: Around) -> Family:
     def admits(x: np.ndarray) -> bool:
         return bool(0 < x[2] < 1 and np.abs(x[:2]).max() < _WIDEST)
 
-    return Family(law, _path_starts(around), admits, room=1.6, period=step + slowest(around))
+    return Family(law, _path_starts(around), admits, room=1.6, period=step + around.get("diffusion", 0))
 
 
 def _observers_through_path(task: Task, step: Fraction, around: Around) -> Family:
@@ -115,7 +115,7 @@ def _observers_through_path(task: Task, step: Fraction, around: Around) -> Famil
 
     noisy = [(decades + acceleration, decades + level) for *_, acceleration, level in _OBSERVERS]
     starts = tuple((*path[:2], *above) for path, above in zip(_path_starts(around), noisy, strict=False))
-    return Family(law, starts, _solvable, room=1.4, period=step + slowest(around))
+    return Family(law, starts, _solvable, room=1.4, period=step + around.get("diffusion", 0))
 
 
 def _path_starts(around: Around) -> tuple[tuple[float, float, float], ...]:

@@ -30,11 +30,6 @@ def path_modes(step: Fraction, around: Around, *, observed: bool = False) -> int
     return free if layer else min(free, 0)
 
 
-def slowest(around: Around) -> Fraction:
-    """L²/D, or the lag without a layer [s]."""
-    return around.get("diffusion") or around["lag"]
-
-
 @dataclass(frozen=True, slots=True)
 class PathFeedback:
     """A model of fault and path, and the feedback of both by a linear quadratic regulator on the sampled pair."""
@@ -83,7 +78,7 @@ def _sampled(model: Model, step: Fraction, around: Around, modes: int) -> tuple[
     delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
     whole, late = int(delay // step), float(delay % step)
     ages = whole + (late > 0)
-    lagging, layer = int(lag > 0), Layer(time=slowest(around))
+    lagging, layer = int(lag > 0), Layer(time=around.get("diffusion") or lag)
     size = 2 + lagging + modes
     shares = np.array([float(layer.share(i)) for i in range(modes)])
     rates = np.array([float(layer.rate(i)) for i in range(modes)])
