@@ -35,7 +35,8 @@ class Surroundings:
     delay
         From the measurement to the pressure at the valve.
     lag
-        Time constant between the valve and the fault, or the well where there is a diffusion.
+        Time constant between the valve and the fault, or the well where there is a diffusion; the designed e-LQR knows
+        it.
     diffusion
         L²/D of the rock between well and fault; the designed e-LQR carries a model of it.
     slip_noise
