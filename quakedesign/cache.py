@@ -25,6 +25,7 @@ from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 PLACE = "QUAKEDESIGN_CACHE"
@@ -109,6 +110,8 @@ class _Statement(pickle.Pickler):
     """A value by its fields alone: what was computed of it on the way and is kept beside them says nothing more."""
 
     def reducer_override(self, value: Any) -> Any:
+        if isinstance(value, MappingProxyType):
+            return dict, (tuple(value.items()),)
         if not is_dataclass(value) or isinstance(value, type):
             return NotImplemented
         return type(value), tuple(getattr(value, field.name) for field in fields(value))

