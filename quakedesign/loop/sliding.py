@@ -104,7 +104,7 @@ def sliding_loop(
             "ageing": ageing,
             "strength": tuple(model.direct * a + model.evolution * b for a, b in zip(y, z, strict=True)),
             "push": push,
-            "asked": loop.outputs["asked"],
+            "asked": loop.outputs.get("asked", push),
             **left_out,
         },
         fading={name: replace(fading, entry=by_pressure) for name, fading in loop.fading.items()},

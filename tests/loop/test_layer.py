@@ -212,7 +212,7 @@ def test_matrices_say_what_moves_where(delay, lag, jumps):
         "acceleration": {"e2": 1},
         "drift": {"xi2": 5, **dict.fromkeys([*waiting, "valve"], -1)},
     }
-    outputs = {"slip_error": {"e1": 1}, "slip_rate_error": {"e2": 1}, "push": push}
+    outputs = {"slip_error": {"e1": 1}, "slip_rate_error": {"e2": 1}, "push": push, "asked": {"valve": 1}}
     if lag:
         left, fading = {"behind": (SHARES[8] / RATES[8] + SHORT * TIME) / lag}, {}
     else:

@@ -386,7 +386,7 @@ CHANGES = {
     "less normal stress": (("fault", "normal_stress", 0), "40000000"),
     "farther": (("reference", "distance"), "1"),
     "faster": (("reference", "rate"), "3/1000000"),
-    "another plan": (("reference", "ramp"), "100"),
+    "another plan": (("reference", "ramp"), "1000"),
     "heavier": (("fault", "density"), "2700000000"),
     "viscous": (("fault", "damping"), "500000000000000000000000"),
     "noise": (("loop", "slip_noise"), "1/1000"),
