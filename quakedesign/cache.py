@@ -1,4 +1,4 @@
-"""Kept on the disk of one user from one command to the next: compiled code, runs, and what searches found. No verdict.
+"""Kept on the disk of one user for the next command: compiled code, runs, figures, what searches found. No verdict.
 
 What is kept is found by its content alone: the question, the sources of this package, the versions of Python and of the
 libraries, and the machine. So nothing is ever out of date. A search only proposes, here as elsewhere: what it proposed
@@ -30,7 +30,10 @@ from typing import Any
 
 PLACE = "QUAKEDESIGN_CACHE"
 MOST_BYTES = 200_000_000
-_LIBRARIES = ("casadi", "clarabel", "control", "cvxpy", "numpy", "python-flint", "scipy", "sympy")
+_LIBRARIES = (
+    *("casadi", "clarabel", "control", "cvxpy", "numpy", "python-flint", "scipy", "sympy"),
+    *("contourpy", "kiwisolver", "matplotlib", "pillow", "pyparsing"),  # of figures
+)
 _KERNEL = "OPENBLAS_CORETYPE"  # of linear algebra; its last digits depend on that
 _DIGEST = sha256().digest_size
 _PROCESSOR = Path("/proc/cpuinfo")

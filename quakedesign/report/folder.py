@@ -15,11 +15,11 @@ from quakedesign.output import require_room, whole_folder, write_whole
 from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.comparison import Comparison
 from quakedesign.report.figure_files import DEFAULT, figure_bytes, write_results
+from quakedesign.report.kept_figures import drawn_once
 from quakedesign.report.numbers import csv_text
 from quakedesign.report.page import page_html
 from quakedesign.report.paper_figures import PAPER
 from quakedesign.report.reproduction import reproduction, versions
-from quakedesign.report.vector import inline_svg
 from quakedesign.studies.facts import fault_dict
 from quakedesign.studies.paper_numbers import printed, table
 
@@ -163,9 +163,8 @@ def _write_figures(
     inside = {}
     for i, (name, drawing) in enumerate(drawn.items()):
         tell(f"figure {name}", i / len(drawn))
-        vector = figure_bytes(drawing, "svg", name)
+        vector, inside[name] = drawn_once(drawing, name, CAPTIONS[name])
         for kind in formats:
             data = vector if kind == "svg" else figure_bytes(drawing, kind, name)
             (folder / "figures" / f"{name}.{kind}").write_bytes(data)
-        inside[name] = inline_svg(vector.decode(), drawing, name, CAPTIONS[name])
     return inside
