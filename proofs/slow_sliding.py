@@ -42,6 +42,8 @@ class Fault:
     ramp: Fraction
     stress: Fraction
     box: dict[str, Range]
+    slips: bool
+    regularised: bool
 
     def load(self) -> Fraction:
         """Rate of the shear stress that the reference takes off."""
@@ -71,7 +73,11 @@ class Path:
 
 def read_fault(document: dict[str, Any]) -> Fault:
     """Read fault, reference and stress."""
-    given = keys(document["fault"], "fault", "name", *ROCK, *CONSTANTS)
+    raw = document["fault"]
+    told = [name for name in ("state_law", "regularised") if type(raw) is dict and name in raw]
+    given = keys(raw, "fault", "name", *ROCK, *CONSTANTS, *told)
+    need(given.get("state_law", "slip") == "slip", "state_law must be slip where it is told")
+    need(given.get("regularised", True) is True, "regularised must be true where it is told")
     need(type(given["name"]) is str and FAULT.fullmatch(given["name"]) is not None, "fault.name must be a short text")
     rho, modulus, size, eta = (number(given[name], name) for name in ROCK)
     box = {}
@@ -83,7 +89,8 @@ def read_fault(document: dict[str, Any]) -> Fault:
     stress = number(document["stress"], "stress")
     need(min(rho, modulus, size, rate) > 0, "density, modulus, length and rate must be > 0")
     need(min(eta, distance, ramp, stress) >= 0, "damping, distance, ramp and stress must be >= 0")
-    return Fault(given["name"], rho * size, modulus / size, eta / size**2, rate, distance, ramp, stress, box)
+    kind = "state_law" in told, "regularised" in told
+    return Fault(given["name"], rho * size, modulus / size, eta / size**2, rate, distance, ramp, stress, box, *kind)
 
 
 def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
@@ -177,6 +184,10 @@ class Cell:
         self.ageing = self.fault.rate / slips[1], self.fault.rate / slips[0]
         self.rates, self.states = sector(self.claims["log_rate"]), sector(self.claims["log_state"])
         self.grown, self.aged = power_of_e(self.claims["log_rate"]), power_of_e(self.claims["log_state"])
+        self.off = half(self.ageing) / middle(self.ageing)
+        if self.fault.slips:
+            self.states = (1 - self.off) / self.grown, (1 + self.off) * self.grown
+        self.evolving = middle(self.states if self.fault.slips else self.rates), middle(self.states)
         self.viscous = self.fault.radiation * self.fault.rate
         self.strength = middle(self.normal) * middle(self.a) + self.viscous * middle(self.rates)
         self.weakening = middle(self.normal) * middle(self.b)
@@ -190,7 +201,17 @@ class Cell:
 
     def fastest_state(self) -> Fraction:
         """Bound of |z'|."""
+        if self.fault.slips:
+            return self.ageing[1] * self.grown * (self.claims["log_rate"] + self.claims["log_state"])
         return self.ageing[1] * max(self.grown - 1 / self.aged, self.aged - 1 / self.grown)
+
+    def rounding(self) -> Fraction:
+        """By how much regularised friction may differ from its logarithm, as a stress."""
+        if not self.fault.regularised:
+            return Fraction(0)
+        least = self.mu[0] - self.a[1] * self.claims["log_rate"] - self.b[1] * self.claims["log_state"]
+        need(2 * least >= self.a[1], "regularised friction must stay above half its direct effect")
+        return self.normal[1] * 4 * self.a[1] / partial(2 * least / self.a[1])
 
     def stress(self) -> Fraction:
         """Stress with all that the mass may add."""
@@ -198,7 +219,11 @@ class Cell:
         bent = self.a[1] * claims["log_rate"] + self.b[1] * claims["log_state"]
         moved = (fault.load() / self.mu[0] + push) * bent + self.normal[1] * self.b[1] * self.fastest_state()
         moved += fault.load() * (self.grown - 1) + self.mu[1] * push
-        return fault.stress + moved * fault.inertia * fault.rate * self.grown / (self.normal[0] * self.a[0])
+        return (
+            fault.stress
+            + self.rounding()
+            + moved * fault.inertia * fault.rate * self.grown / (self.normal[0] * self.a[0])
+        )
 
     def soon(self, time: Fraction) -> Row:
         """How far y, cy + c_z z and ay + bz may move within this time, the stress aside."""
@@ -208,7 +233,7 @@ class Cell:
         y, z = change * time / self.strength, state * time
         return [
             y,
-            middle(self.rates) * y + middle(self.states) * z,
+            self.evolving[0] * y + self.evolving[1] * z,
             middle(self.a) * y + middle(self.b) * z,
         ]
 
@@ -220,17 +245,17 @@ def around(loop: Loop, cell: Cell, valve: int) -> Loop:
     y = [middle(cell.mu) * v / cell.strength for v in push]
     y[0] -= fault.stiffness / cell.strength
     y[1] -= cell.weakening / cell.strength
-    c, cz, speed = middle(cell.rates), middle(cell.states), middle(cell.ageing)
+    c, (cy, cz), speed = middle(cell.rates), cell.evolving, middle(cell.ageing)
     z = unit_rows[1]
-    ageing = [c * a + cz * b for a, b in zip(y, z, strict=True)]
+    ageing = [cy * a + cz * b for a, b in zip(y, z, strict=True)]
     strong = [middle(cell.a) * a + middle(cell.b) * b for a, b in zip(y, z, strict=True)]
     flow = [[fault.rate * c * v for v in y], [-speed * v for v in ageing], *loop.flow[2:]]
 
     def entry(slip: Fraction, state: Fraction) -> Row:
         return [slip, state, *[Fraction(0)] * (size - 2)]
 
-    stress = entry(fault.rate * c / cell.strength, -speed * c / cell.strength)
-    inputs = [stress, entry(fault.rate, -speed), entry(Fraction(0), -speed)]
+    stress = entry(fault.rate * c / cell.strength, -speed * cy / cell.strength)
+    inputs = [stress, entry(fault.rate, Fraction(0) if fault.slips else -speed), entry(Fraction(0), -speed)]
     inputs += [loop.inputs[1]] if fault.drift() else []
     inputs += [loop.inputs[2]] if cell.path.noise else []
     inputs += [[middle(cell.mu) * v for v in stress]] if loop.fade else []
@@ -256,7 +281,7 @@ def found_gains(loop: Loop, cell: Cell, times: Row, late: Fraction) -> list[list
     noisy = len(loop.inputs) - 1 - bool(loop.fade) if cell.path.noise else None
     fades = len(loop.inputs) - 1 if loop.fade else None
     last = times.index(max(times))
-    once = [1 / cell.strength, middle(cell.rates) / cell.strength, middle(cell.a) / cell.strength]
+    once = [1 / cell.strength, cell.evolving[0] / cell.strength, middle(cell.a) / cell.strength]
     found = []
     for place, entry in enumerate(loop.inputs):
         lines = gains(loop, entry, place == noisy, *[loop.fade] * (place == fades))
@@ -275,11 +300,13 @@ def shares_of(loop: Loop, cell: Cell) -> tuple[Row, list[Row]]:
     """Own bound and shares of the outputs for every input."""
     zero, high = Fraction(0), cell.normal[1]
     many = len(loop.outputs)
-    off = (cell.ageing[1] - cell.ageing[0]) / (cell.ageing[1] + cell.ageing[0])
+    off = cell.off
     bent, layer = half(cell.rates), many - 7
     stress = [high * half(cell.a) + cell.viscous * bent, zero, half(cell.normal), high * half(cell.b), zero]
     stress += [half(cell.mu), zero, *[half(cell.mu) if loop.fade else cell.mu[1]] * layer]
     state = [off * bent, off, zero, (1 + off) * half(cell.states), *[zero] * (many - 4)]
+    if cell.fault.slips:
+        state = [zero, half(cell.states) / middle(cell.states), *[zero] * (many - 2)]
     own, shares = [cell.stress(), zero, zero], [stress, [bent, *[zero] * (many - 1)], state]
     drift, noise = cell.fault.drift(), cell.path.noise
     for size in [v for v in (drift, noise) if v]:
@@ -346,8 +373,10 @@ def statement(
     peak = fault.rate * power_of_e(claims["log_rate"])
     highest = fault.stiffness * fault.distance / fault.box["coefficient"][0] + claims["push"]
     return [
-        f"fault {ascii(fault.name)[1:-1]} (a name; the data in the file are what counts), rate-and-state friction with "
-        f"the ageing law, with inertia, every constant {', '.join(ranges)}; {cells} cells",
+        f"fault {ascii(fault.name)[1:-1]} (a name; the data in the file are what counts), "
+        f"{'regularised ' * fault.regularised}rate-and-state friction with "
+        f"the {'slip' if fault.slips else 'ageing'} law, "
+        f"with inertia, every constant {', '.join(ranges)}; {cells} cells",
         f"law with {len(loop['states'])} states of the slip alone, {when}{off}",
         f"disturbance: any shear stress of at most {lower(fault.stress)} Pa; from steady sliding at "
         f"{exact(fault.rate)} m/s over {lower(fault.distance)} m; small gain {upper(small)}",

@@ -22,7 +22,6 @@ from quakedesign.output import write_whole
 from quakedesign.rationals import rational
 
 _DIGITS = 6
-_PROVABLE = "rate-and-state-aging"  # a test compares with what designs take
 _WEAKENING = {"residual", "drop", "critical_slip"}
 _RATE_AND_STATE = ("direct_effect", "evolution_effect", "critical_slip")
 
@@ -176,8 +175,6 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
 
 
 def _ranges(identification: Identification) -> str:
-    if identification.law.name != _PROVABLE:
-        return f"design and guarantee are for {_PROVABLE} alone"
     return f"--spread {_spread(identification)} of design and guarantee holds those of a, b and D_c"
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.rest_limit import RestLimit as RestLimit
     from quakedesign.loop.running import SampledController as SampledController
     from quakedesign.loop.sliding import SlidingModel as SlidingModel
+    from quakedesign.loop.sliding import StateLaw as StateLaw
     from quakedesign.loop.sliding import at_once as at_once
     from quakedesign.loop.sliding import sliding_loop as sliding_loop
 

@@ -14,6 +14,8 @@ from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.certificates.slow_sliding import WHOLE, SlidingClaims, SlidingGuarantee
 from quakedesign.cli import main
 from quakedesign.fault import load_fault
+from quakedesign.fault.friction import friction_law
+from quakedesign.fault.template import fault_toml
 from quakedesign.loop import LinearLaw
 from quakedesign.synthesis.guaranteed import sliding_answer
 from quakedesign.synthesis.guaranteed.slow_sliding import proved_sliding
@@ -55,12 +57,12 @@ def test_a_step_that_is_too_short_is_said_to_be(capsys):
 def test_an_estimate_of_the_largest_stress_that_is_too_large_is_lowered_until_it_is_proved(monkeypatch):
     tried = []
 
-    def proved(task, design):
+    def proved(task, design, *, log_rate):
         tried.append(task.stress)
         return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
 
     monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
-    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design: Fraction(41_000))
+    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
     monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
     found = sliding_answer.answer_sliding(load_fault("crustal-patch"), diffusion=Fraction(800))
     assert found.proved
@@ -92,3 +94,20 @@ def test_what_does_not_apply_is_one_line(arguments, said, capsys):
     assert code == 2
     assert not out
     assert said in " ".join(err.split())
+
+
+@pytest.mark.slow
+def test_the_slip_law_is_proved_with_a_smaller_bound_of_the_slip_rate_than_is_tried_first(capsys, tmp_path):
+    """`crustal-patch` with it; its own ageing law is proved under 40 kPa."""
+    patch, path = load_fault("crustal-patch"), tmp_path / "slip.toml"
+    law = {name: getattr(patch.friction, name) for name in patch.friction.quantities()}
+    path.write_text(fault_toml(replace(patch, name="slip-patch", friction=friction_law("rate-and-state-slip")(**law))))
+    code, out, _ = run(capsys, "guarantee", str(path), "--diffusion", "3600 s", "--json", "--out", str(tmp_path / "g"))
+    answer = json.loads(out)
+    assert (code, answer["verdict"]) == (0, "proved")
+    assert Fraction(answer["stress"]) >= 14_000
+    assert 0.05 < answer["worst_found"]["log_rate"] < float(Fraction(answer["log_rate"])) < 0.15
+    assert "state by the slip law" in answer["guarantee"]
+    found = parse_guarantee((tmp_path / "g").read_text())
+    assert found.task.state_law == "slip"
+    assert found.check() is Verdict.PROVED

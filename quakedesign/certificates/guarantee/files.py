@@ -122,6 +122,8 @@ def _of_sliding(claim: SlidingGuarantee) -> dict[str, Any]:
             "name": task.name,
             **_exactly(task, _ROCK),
             **{name: texts(task.ranges[name]) for name in AXES},
+            **({"state_law": task.state_law} if task.state_law != "ageing" else {}),
+            **({"regularised": True} if task.regularised else {}),
         },
         "reference": _exactly(task, _SLIDING_REFERENCE),
         "stress": str(task.stress),
@@ -233,14 +235,14 @@ def _task(raw: dict[str, Any]) -> Task:
 
 
 def _sliding_task(raw: dict[str, Any]) -> SlidingTask:
-    fault = with_keys(raw["fault"], {"name", *_ROCK, *AXES})
-    return SlidingTask(
-        name=_name(fault),
-        **{name: read_rational(fault[name]) for name in _ROCK},
-        ranges={name: read_ends(fault[name], name) for name in AXES},
-        **read_exactly(raw["reference"], _SLIDING_REFERENCE),
-        stress=read_rational(raw["stress"]),
-    )
+    told = {"state_law": "slip", "regularised": True}
+    more: Any = {name: raw["fault"][name] for name in told if isinstance(raw["fault"], dict) and name in raw["fault"]}
+    fault = with_keys(raw["fault"], {"name", *_ROCK, *AXES, *more})
+    for name, value in more.items():
+        need(json.dumps(value) == json.dumps(told[name]), f"{name} must be {json.dumps(told[name])} where told")
+    more |= {name: read_rational(fault[name]) for name in _ROCK} | read_exactly(raw["reference"], _SLIDING_REFERENCE)
+    ranges = {name: read_ends(fault[name], name) for name in AXES}
+    return SlidingTask(name=_name(fault), ranges=ranges, stress=read_rational(raw["stress"]), **more)
 
 
 def _slow_gain(raw: Any, task: Task) -> SlowGain:

@@ -7,9 +7,15 @@ import sympy as sp
 from quakedesign.certificates.slow_sliding.task import AXES, SlidingTask
 from quakedesign.errors import UnsupportedError
 from quakedesign.fault import Fault
+from quakedesign.loop import StateLaw
 from quakedesign.rationals import fraction_of, rational
 
-_AGEING = "rate-and-state-aging"
+_LAWS: dict[str, tuple[StateLaw, bool]] = {
+    "rate-and-state-aging": ("ageing", False),
+    "rate-and-state-slip": ("slip", False),
+    "regularised-rate-and-state": ("ageing", True),
+}
+"""Law of the state, unless the friction tells one itself, and whether friction is regularised."""
 _DIGITS = 12
 
 
@@ -21,13 +27,18 @@ def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0))
     Raises
     ------
     UnsupportedError
-        For friction other than of the ageing law, or whose state feels the normal stress.
+        For friction without a state, or whose state feels the normal stress.
     """
-    if fault.friction.name != _AGEING or fault.friction.stress_sensitivity:  # type: ignore[attr-defined]
+    if fault.friction.name not in _LAWS or fault.friction.stress_sensitivity:  # type: ignore[attr-defined]
+        sensitivity = getattr(fault.friction, "stress_sensitivity", 0)
         raise UnsupportedError(
-            f"a guarantee of slow sliding needs friction of the law {_AGEING}, its state deaf to the normal stress. "
-            f"Received {fault.friction.name}. Simulate it."
+            f"a guarantee of slow sliding needs friction of a law {', '.join(_LAWS)}, its state deaf to the normal "
+            f"stress. Received {fault.friction.name}{f', stress_sensitivity {sensitivity:g}' * bool(sensitivity)}. "
+            "Simulate it."
         )
+    state_law, regularised = _LAWS[fault.friction.name]
+    if getattr(fault.friction, "evolution", "") == "slip":
+        state_law = "slip"
     law = fault.friction.exact()
     rate = rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
     named = {axis: rational(getattr(fault.friction, axis)) for axis in AXES[:3]}
@@ -50,6 +61,8 @@ def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0))
         distance=rational(fault.reference.target_slip),
         ramp=stiffness * rate / middle,
         stress=stress,
+        state_law=state_law,
+        regularised=regularised,
     )
 
 

@@ -93,7 +93,7 @@ class SlidingGuarantee:
             f"of at most {LowerBound(task.stress).quantity('Pa')}, {_box(task)}: the slip rate never exceeds "
             f"{ratio:.4g} V = {self.peak_slip_rate:.3g} m/s while the reference goes {float(task.distance):.4g} m, the "
             f"slip stays within {claims.slip_error:.3g} m of it, the pressure in the fault between "
-            f"{low.quantity('Pa')} and {high.quantity('Pa')} (with inertia)"
+            f"{low.quantity('Pa')} and {high.quantity('Pa')} ({', '.join(['with inertia', *_friction(task)])})"
         )
 
 
@@ -104,6 +104,12 @@ def _path(held: Held) -> str:
     said += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
     noise = LowerBound(held.slip_noise)
     return said + (f", with any noise of at most {noise:.6g} m in the measured slip" if held.slip_noise else "")
+
+
+def _friction(task: SlidingTask) -> list[str]:
+    """What a reader would not expect, who expects ageing."""
+    said = ["friction regularised"] if task.regularised else []
+    return said + (["state by the slip law"] if task.state_law == "slip" else [])
 
 
 def _box(task: SlidingTask) -> str:

@@ -1,15 +1,18 @@
 """What a guarantee of slow sliding uses of a fault with rate-and-state friction, in rationals.
 
 Per unit of area: mass m = ρL, stiffness K = G/L, damping H = η/L². The friction coefficient is that of sliding at V,
-μ*, plus a·ln(v/V) + b·ln(θV/D); the state follows the ageing law, θ′ = 1 − vθ/D. The fault slides at V at first,
+μ*, plus a·ln(v/V) + b·ln(θV/D), or its regularised form, a·arsinh(sinh(μ*/a)·exp((a·ln(v/V) + b·ln(θV/D))/a)); the
+state follows the ageing law, θ′ = 1 − vθ/D, or the slip law, θ′ = −(vθ/D)·ln(vθ/D). The fault slides at V at first,
 without pressure, its far end at rest. Along r = Vt it then needs p* = KVt/μ*, of which the plan brings ``ramp``·t.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import get_args
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.loop import StateLaw
 
 Range = tuple[Fraction, Fraction]
 AXES = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")
@@ -31,6 +34,10 @@ class SlidingTask:
         V [m/s], how far the reference goes [m], and how fast the planned pressure rises [Pa/s].
     stress : Fraction
         Bound of the shear stress disturbance [Pa].
+    state_law : str
+        ``"ageing"`` or ``"slip"``.
+    regularised : bool
+        Whether friction is of the form that stays finite at rest.
 
     Raises
     ------
@@ -47,6 +54,8 @@ class SlidingTask:
     distance: Fraction
     ramp: Fraction
     stress: Fraction
+    state_law: StateLaw = "ageing"
+    regularised: bool = False
 
     def __post_init__(self) -> None:
         ends = [self.ranges[axis] for axis in AXES] if set(self.ranges) == set(AXES) else []
@@ -57,6 +66,7 @@ class SlidingTask:
                 f"slow sliding needs ordered ranges of {', '.join(AXES)} above 0, density, modulus, length and rate "
                 f"above 0, damping, distance, ramp and stress not below. Received others for {self.name}."
             )
+        require_known(self.state_law, get_args(StateLaw), "state_law")
 
     @property
     def stiffness(self) -> Fraction:

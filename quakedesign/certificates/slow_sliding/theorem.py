@@ -6,16 +6,22 @@ p,
     mVe^y·y′ = s − ŝ,    ŝ = N(ay + bz) + HV(e^y − 1) + Kx − μ*q,    x′ = V·f,    z′ = −ρ(f + g),
 
 f = e^y − 1, g = 1 − e^{−z}, ρ = V/D: the balance of forces, of which the steady one, with Nμ* + HV + KVt, is taken
-off, and the ageing law. Everything is 0 at first; a, b, D, μ* and σ′ are constants.
+off, and the ageing law. The slip law has z′ = −ρe^y(y + z) in its place. Everything is 0 at first; a, b, D, μ* and σ′
+are constants.
+
+**Regularised friction** is larger than a·ln(2s), 2s = 2sinh(μ*/a)·e^{y + bz/a}, by at most a/(4s²), as arsinh s =
+ln(2s) + ln((1 + √(1 + 1/s²))/2). With m = μ* − aY − bZ, 2m/a ≥ 1, this is below 4a·e^{−2m/a} =: ε, for (1 −
+e^{−2μ*/a})^{−2} < 4. So it is the logarithmic one under a shear stress that is larger by N_max·ε, far below 1 Pa.
 
 **Inertia.** Let |y| ≤ Y, |z| ≤ Z, |q| ≤ Q so far. Then ŝ′ = λ(s − ŝ) + r with λ = (Na + HVe^y)/(mVe^y) ≥ λ₀ =
 N_min·a/(mVe^Y) and r = N′(ay + bz) + Nbz′ + Kx′ − μ*q′. Where |ŝ| > S + sup|r|/λ₀ it falls, so |ŝ| ≤ S + sup|r|/λ₀:
 the fault with its mass is one without it (ŝ in place of s) under a stress that is larger by sup|r|/λ₀, some Pa. Its r
-has |N′| ≤ KV/μ* + |q′|, |z′| ≤ ζ, ζ the larger of ρ(e^Y − e^{−Z}) and ρ(e^Z − e^{−Y}), and |x′| ≤ V(e^Y − 1). The
-pressure in the fault is that of the well, u beside the plan, through filters 1/(1 + s/λ_n), of which one has the rate
-λ: so q′ = λ(h − w) − δ′, w what comes out, h what goes into it, δ = p* − plan, |δ′| ≤ d. Filters are means over the
-past, E late in all, so with |u − δ| ≤ U also |h − δ| ≤ U + dE, and |w − δ| = |q| ≤ Q: |q′| ≤ λ(U + dE + Q) + d. For
-rock λ = π²/(4τ) < 5/(2τ) and E = τ/2, with the lag ℓ before it E = τ/2 + ℓ; for a lag alone λ = 1/ℓ, E = ℓ.
+has |N′| ≤ KV/μ* + |q′|, |z′| ≤ ζ, ζ the larger of ρ(e^Y − e^{−Z}) and ρ(e^Z − e^{−Y}), of the slip law ρe^Y(Y + Z),
+and |x′| ≤ V(e^Y − 1). The pressure in the fault is that of the well, u beside the plan, through filters 1/(1 +
+s/λ_n), of which one has the rate λ: so q′ = λ(h − w) − δ′, w what comes out, h what goes into it, δ = p* − plan, |δ′|
+≤ d. Filters are means over the past, E late in all, so with |u − δ| ≤ U also |h − δ| ≤ U + dE, and |w − δ| = |q| ≤ Q:
+|q′| ≤ λ(U + dE + Q) + d. For rock λ = π²/(4τ) < 5/(2τ) and E = τ/2, with the lag ℓ before it E = τ/2 + ℓ; for a lag
+alone λ = 1/ℓ, E = ℓ.
 
 **Sectors.** On |y| ≤ Y f/y lies between (1 − e^{−Y})/Y and (e^Y − 1)/Y, c its middle and δ half the range, and on |z|
 ≤ Z g/z between the same of Z, c_z and δ_z. With middles N₀, a₀, b₀, μ₀, ρ₀ of the ranges of a cell the loop of
@@ -25,19 +31,21 @@ rock λ = π²/(4τ) < 5/(2τ) and E = τ/2, with the lag ℓ before it E = τ/2
     h = (ρ/ρ₀ − 1)(cy + c_z·z + φ) + (ρ/ρ₀)(g − c_z·z),
 
 so |e| ≤ sup|ŝ| + δN|a₀y + b₀z| + N_max(δa|y| + δb|z|) + HVδ|y| + δμ|q|, |φ| ≤ δ|y| and, with r = sup|ρ/ρ₀ − 1|, |h| ≤
-r|cy + c_z·z| + rδ|y| + (1 + r)δ_z|z|. Noise of the measured slip, the drift of p* from the plan and what the modes of
-a layer leave out, R, are inputs as in `guarantee.theorem`: q has R more than the loop's, and y and what is made of it
-what e and μ₀R add to them at the same instant, R no more than its weight at the beginning of a part of the period.
+r|cy + c_z·z| + rδ|y| + (1 + r)δ_z|z|. Of the slip law (ρ/ρ₀)e^y lies between (1 − r)e^{−Y} and (1 + r)e^Y, c_z its
+middle and δ_z half the range, and with z′ = −ρ₀c_z(y + z) − ρ₀h, into which φ does not come, |h| ≤ δ_z|y + z|. Noise
+of the measured slip, the drift of p* from the plan and what the modes of a layer leave out, R, are inputs as in
+`guarantee.theorem`: q has R more than the loop's, and y and what is made of it what e and μ₀R add to them at the same
+instant, R no more than its weight at the beginning of a part of the period.
 
-**After a step.** R is largest at once, where the fault has not felt the step yet. With the middle N₀a₀ + HVc = B, By =
-X + e and |X′| ≤ KV(e^Y − 1) + N₀b₀ζ + μ₀q̇, |z′| ≤ ζ, |q′| ≤ q̇ as above. So as long as θ after a step αy + βz is at
-most what it was before, with what e adds now, and θ(α|X′|/B + βζ): in the parts of the period that begin before R has
-faded to a sixteenth y, ay + bz and cy + c_z·z have the gains of the part that ends with the step, and that constant of
-the first instant of the others more.
+**After a step.** R is largest at once, where the fault has not felt the step yet. With the middle N₀a₀ + HVc = B, By
+= X + e and |X′| ≤ KV(e^Y − 1) + N₀b₀ζ + μ₀q̇, |z′| ≤ ζ, |q′| ≤ q̇ as above. So as long as θ after a step αy + βz is
+at most what it was before, with what e adds now, and θ(α|X′|/B + βζ): in the parts of the period that begin before R
+has faded to a sixteenth y, ay + bz and cy + c_z·z have the gains of the part that ends with the step, and that
+constant of the first instant of the others more.
 
 **Conclusion.** Let the bounds that follow for |y|, |z|, |q| and |u − δ| lie below Y, Z, Q and U. y, z and q are
-continuous and 0 at first, and u is decided by samples before it acts, so none of them ever reaches its bound: it would
-have had to obey the smaller one until then. So the slip rate never exceeds Ve^Y, on every cell. ∎
+continuous and 0 at first, and u is decided by samples before it acts, so none of them ever reaches its bound: it
+would have had to obey the smaller one until then. So the slip rate never exceeds Ve^Y, on every cell. ∎
 """
 
 from collections.abc import Mapping, Sequence
@@ -107,7 +115,7 @@ def cell_bounds(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[st
     """
     model = model_of(task, claims)
     if model is None:
-        return NoGuarantee(reason="the pressure may open the fault", small_gain=None)
+        return NoGuarantee(reason=_left(task, claims), small_gain=None)
     loop = loop_of(held, model, task)
     try:
         gains = norms(loop)
@@ -130,7 +138,7 @@ def bounds_from(
     """
     model = model_of(task, claims)
     if model is None:
-        return NoGuarantee(reason="the pressure may open the fault", small_gain=None)
+        return NoGuarantee(reason=_left(task, claims), small_gain=None)
     late = settled(loop)
     more = _moved(task, held, claims, model, late)
     gains = _once_settled(_with_what_adds_at_once(loop, model, gains, phases), phases, late)
@@ -178,12 +186,12 @@ def loop_of(held: Held, model: SlidingModel, task: SlidingTask) -> PeriodicLoop:
 
 
 def model_of(task: SlidingTask, claims: SlidingClaims) -> SlidingModel | None:
-    """Middle of all that may be; None where the normal stress may vanish."""
+    """Middle of all that may be; None where the normal stress, or regularised friction, may come near 0."""
     low, high = task.normal_stress(claims.push)
-    if low <= 0:
+    if low <= 0 or (task.regularised and _least_exponent(task, claims) < 1):
         return None
     a, b, mu = (_middle(task.ranges[name]) for name in ("direct_effect", "evolution_effect", "coefficient"))
-    slope, state_slope = _middle(chords(claims.log_rate)), _middle(chords(claims.log_state))
+    slope, state_slope = _middle(chords(claims.log_rate)), _middle(_state_slopes(task, claims))
     return SlidingModel(
         rate=task.rate,
         state_rate=_middle(_ageing(task)),
@@ -195,15 +203,22 @@ def model_of(task: SlidingTask, claims: SlidingClaims) -> SlidingModel | None:
         evolution=b,
         stiffness=task.stiffness,
         coefficient=mu,
+        state_law=task.state_law,
     )
+
+
+def _left(task: SlidingTask, claims: SlidingClaims) -> str:
+    """Why there is no model."""
+    if task.normal_stress(claims.push)[0] <= 0:
+        return "the pressure may open the fault"
+    return "regularised friction may come near 0"
 
 
 def channels_of(task: SlidingTask, held: Held, claims: SlidingClaims, loop: PeriodicLoop) -> tuple[Channel, ...]:
     """Inputs of the loop and what bounds them."""
     low, high = task.normal_stress(claims.push)
-    rates, states = chords(claims.log_rate), chords(claims.log_state)
-    slow, fast = _ageing(task)
-    off, bent = (fast - slow) / (fast + slow), _half(rates)
+    rates, states = chords(claims.log_rate), _state_slopes(task, claims)
+    off, bent = _off(task), _half(rates)
     stress = {
         "strength": _half((low, high)),
         "log_rate": high * _half(task.ranges["direct_effect"]) + task.radiation * task.rate * bent,
@@ -214,8 +229,11 @@ def channels_of(task: SlidingTask, held: Held, claims: SlidingClaims, loop: Peri
     if left_out and not loop.fading:
         left_out["left_out"] += _middle(task.ranges["coefficient"])
     state = {"ageing": off, "log_rate": off * bent, "log_state": (1 + off) * _half(states)}
+    if task.state_law == "slip":
+        state = {"ageing": _half(states) / _middle(states)}
+    own = task.stress + inertia(task, held, claims) + regularisation(task, claims)
     channels = [
-        Channel(name="stress", own=task.stress + inertia(task, held, claims), shares={**stress, **left_out}),
+        Channel(name="stress", own=own, shares={**stress, **left_out}),
         Channel(name="rate", own=_ZERO, shares={"log_rate": bent}),
         Channel(name="state", own=_ZERO, shares=state),
     ]
@@ -237,6 +255,20 @@ def inertia(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fraction:
     return rest * task.inertia * task.rate * grown / (low * a_low)
 
 
+def regularisation(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+    """By how much regularised friction makes the stress larger, N_max·ε [Pa]."""
+    if not task.regularised:
+        return _ZERO
+    a = task.ranges["direct_effect"][1]
+    return task.normal_stress(claims.push)[1] * 4 * a / _partial(_least_exponent(task, claims))
+
+
+def _least_exponent(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+    """2m/a of the least friction coefficient m that may be, without regularisation."""
+    (_, a), (_, b), (mu, _) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
+    return 2 * (mu - a * claims.log_rate - b * claims.log_state) / a
+
+
 def _fastest_push(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fraction:
     """Bound of |q′| [Pa/s]."""
     late = held.diffusion / 2 + held.lag
@@ -247,6 +279,8 @@ def _fastest_push(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fract
 def _fastest_state(task: SlidingTask, claims: SlidingClaims) -> Fraction:
     """Bound ζ of |z′| [1/s]."""
     grown, aged = exponential(claims.log_rate), exponential(claims.log_state)
+    if task.state_law == "slip":
+        return _ageing(task)[1] * grown * (claims.log_rate + claims.log_state)
     return _ageing(task)[1] * max(grown - 1 / aged, aged - 1 / grown)
 
 
@@ -260,7 +294,7 @@ def _moved(
     y, z = change / model.strength * time, of_state * time
     return {
         "log_rate": y,
-        "ageing": model.slope * y + model.state_slope * z,
+        "ageing": model.evolution_slope * y + model.state_slope * z,
         "strength": model.direct * y + model.evolution * z,
     }
 
@@ -269,6 +303,14 @@ def chords(size: Fraction) -> Range:
     """(1 − e^{−Y})/Y from below and (e^Y − 1)/Y from above."""
     grown = exponential(size)
     return (1 - 1 / _partial(size)) / size, (grown - 1) / size
+
+
+def _state_slopes(task: SlidingTask, claims: SlidingClaims) -> Range:
+    """What c_z stands in place of: of ageing (1 − e^{−z})/z, of the slip law (ρ/ρ₀)e^y."""
+    if task.state_law == "ageing":
+        return chords(claims.log_state)
+    grown, off = exponential(claims.log_rate), _off(task)
+    return (1 - off) / grown, (1 + off) * grown
 
 
 def exponential(size: Fraction) -> Fraction:
@@ -292,6 +334,12 @@ def _ageing(task: SlidingTask) -> Range:
     """ρ = V/D [1/s]."""
     low, high = task.ranges["critical_slip"]
     return task.rate / high, task.rate / low
+
+
+def _off(task: SlidingTask) -> Fraction:
+    """r, how far ρ may be from the middle of its range, over that."""
+    slow, fast = _ageing(task)
+    return (fast - slow) / (fast + slow)
 
 
 def _middle(ends: Range) -> Fraction:

@@ -148,7 +148,8 @@ class SlidingPieces:
 
     def _rates(self, now: Any, pressure: Any, stress: Any) -> Any:
         y = self.log_rate(now, pressure, stress)
-        aged = self._ageing * (np.expm1(-now[1]) - np.expm1(y))
+        slips = self._corner.state_law == "slip"
+        aged = self._ageing * (-np.exp(y) * (y + now[1]) if slips else np.expm1(-now[1]) - np.expm1(y))
         return np.array([self._rate * np.expm1(y), aged])
 
     def log_rate(self, now: Any, pressure: Any, stress: Any) -> Any:

@@ -14,6 +14,7 @@ from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed.sliding_adversary import WorstSliding, worst_sliding
 from quakedesign.synthesis.guaranteed.slow_sliding import (
+    LOG_RATES,
     designed_sliding,
     largest_stress,
     proved_sliding,
@@ -123,19 +124,30 @@ def answer_sliding(
         )
     held_over = rational(fault.sampling_time) if step is None else step
     task = sliding_task(fault, stress or Fraction(1), spread)
-    design = designed_sliding(task, held_over, **around)
+    answers = []
+    for log_rate in LOG_RATES:
+        answers.append(_answer(task, held_over, log_rate, around, given=stress is not None))
+        if answers[-1].proved:
+            return answers[-1]
+    return answers[0]
+
+
+def _answer(task: SlidingTask, step: Fraction, log_rate: Fraction, around: Around, *, given: bool) -> SlidingAnswer:
+    """With |ln(v/V)| at most `log_rate`, under the task's stress if that is given."""
+    design = designed_sliding(task, step, log_rate=log_rate, **around)
     if isinstance(design, NoGuarantee):
         return SlidingAnswer(found=design, task=task, held=None)
-    proved = proved_sliding(task, design) if stress is not None else _with_the_largest_stress(task, design)
+    prove = proved_sliding if given else _with_the_largest_stress
+    proved = prove(task, design, log_rate=log_rate)
     return SlidingAnswer(found=proved, task=proved.task if isinstance(proved, SlidingGuarantee) else task, held=design)
 
 
-def _with_the_largest_stress(task: SlidingTask, design: Held) -> SlidingGuarantee | NoGuarantee:
+def _with_the_largest_stress(task: SlidingTask, design: Held, *, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
     """A guarantee under about the largest stress that has one: what is estimated of it, or somewhat less."""
-    most = largest_stress(task, design) or Fraction(1)
+    most = largest_stress(task, design, log_rate=log_rate) or Fraction(1)
     found: SlidingGuarantee | NoGuarantee
     for share in _SHARES:
-        found = proved_sliding(replace(task, stress=two_digits(share * most)), design)
+        found = proved_sliding(replace(task, stress=two_digits(share * most)), design, log_rate=log_rate)
         if isinstance(found, SlidingGuarantee):
             break
     return found

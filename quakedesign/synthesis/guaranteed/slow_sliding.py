@@ -31,7 +31,8 @@ from quakedesign.synthesis.guaranteed.poles import spectral_radius
 from quakedesign.synthesis.guaranteed.rounding import short
 from quakedesign.synthesis.linear.sampled.slow_sliding import Weights, sliding_law
 
-LOG_RATE = Fraction(1, 2)
+LOG_RATES = (Fraction(1, 2), Fraction(1, 4), Fraction(1, 8))
+"""Bounds of |ln(v/V)| in the order in which they are tried: the sectors of a smaller one are narrower."""
 _STARTS = (
     (-1.02, -1.74, 6.76, 0.97, -5.19, 3.11, -0.06, 0.39, -0.12),
     (-6.0, -0.9, 4.6, 1.2, -5.9, 2.3, -0.17, 0.52, -0.05),
@@ -53,11 +54,13 @@ _DIGITS, _SHORT = 6, 3
 _AXES = ("direct_effect", "evolution_effect", "critical_slip")
 
 
-def proved_sliding(task: SlidingTask, held: Held) -> SlidingGuarantee | NoGuarantee:
-    """Cells and claims for a law, or why there are none."""
-    claims = _claims(worst_corner(task), held)
+def proved_sliding(
+    task: SlidingTask, held: Held, *, log_rate: Fraction = LOG_RATES[0]
+) -> SlidingGuarantee | NoGuarantee:
+    """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or why there are none."""
+    claims = _claims(worst_corner(task), held, log_rate)
     if claims is None:
-        return NoGuarantee(reason=_too_much(task), small_gain=None)
+        return NoGuarantee(reason=_too_much(task, log_rate), small_gain=None)
     try:
         by_estimate = SlidingGuarantee(task=task, held=held, cuts=_cut(task, held, claims, [MOST_CELLS]), claims=claims)
         smaller = replace(by_estimate, claims=_smallest_claims(by_estimate))
@@ -65,7 +68,7 @@ def proved_sliding(task: SlidingTask, held: Held) -> SlidingGuarantee | NoGuaran
             return smaller
         return replace(by_estimate, cuts=_cut(task, held, claims, [MOST_CELLS], exactly=True))
     except ParameterError:
-        return NoGuarantee(reason=f"{_too_much(task)} in {MOST_CELLS} cells of the box", small_gain=None)
+        return NoGuarantee(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box", small_gain=None)
 
 
 def _smallest_claims(found: SlidingGuarantee) -> SlidingClaims:
@@ -100,13 +103,13 @@ def _followed(found: SlidingGuarantee, claims: SlidingClaims, room: Mapping[str,
     return claims
 
 
-def largest_stress(task: SlidingTask, held: Held) -> Fraction:
+def largest_stress(task: SlidingTask, held: Held, *, log_rate: Fraction = LOG_RATES[0]) -> Fraction:
     """About the largest stress [Pa] for which `proved_sliding` may succeed, with two digits; 0 for none."""
     corner = worst_corner(task)
-    claims, some = _guess(corner), _SMALL * corner.ranges["normal_stress"][0]
+    claims, some = _guess(corner, log_rate), _SMALL * corner.ranges["normal_stress"][0]
     found = [_estimate(replace(corner, stress=stress), held, claims) for stress in (Fraction(0), some)]
     rest, more = (0.0 if one is None else float(one["log_rate"]) for one in found)
-    room = (1 if corner == task else _NEAR) * _NEAR * float(LOG_RATE) - rest
+    room = (1 if corner == task else _NEAR) * _NEAR * float(log_rate) - rest
     if None in found or room <= 0:
         return Fraction(0)
     return two_digits(Fraction(float(some) * room / (more - rest)))
@@ -118,10 +121,12 @@ def two_digits(value: Fraction) -> Fraction:
     return floor(value / scale) * scale
 
 
-def designed_sliding(task: SlidingTask, step: Fraction, **around: Unpack[Around]) -> Held | NoGuarantee:
-    """The law whose estimated bounds are smallest at the most unstable corner of the box."""
+def designed_sliding(
+    task: SlidingTask, step: Fraction, *, log_rate: Fraction = LOG_RATES[0], **around: Unpack[Around]
+) -> Held | NoGuarantee:
+    """The law with the smallest estimated bounds at the least stable corner of the box, |ln(v/V)| up to `log_rate`."""
     corner = worst_corner(task)
-    claims = _guess(corner)
+    claims = _guess(corner, log_rate)
 
     def held(x: np.ndarray) -> Held | None:
         law = _law(corner, task, step, around, x)
@@ -136,7 +141,7 @@ def designed_sliding(task: SlidingTask, step: Fraction, **around: Unpack[Around]
         if radius > _FORGETTING:
             return _FAILED + radius
         found = _estimate(corner, tried, claims)
-        return _FAILED / 2 if found is None else float(found["log_rate"] / LOG_RATE)
+        return _FAILED / 2 if found is None else float(found["log_rate"] / log_rate)
 
     best = min((np.array(start) for start in _STARTS), key=cost)
     simplex = np.vstack([best, best + np.diag(_SIMPLEX)])
@@ -187,13 +192,13 @@ def _middle(task: SlidingTask, axis: str) -> Fraction:
     return (low + high) / 2
 
 
-def _guess(task: SlidingTask) -> SlidingClaims:
-    pressure = 2 * task.ranges["direct_effect"][1] * task.ranges["normal_stress"][0] * LOG_RATE
+def _guess(task: SlidingTask, log_rate: Fraction) -> SlidingClaims:
+    pressure = 2 * task.ranges["direct_effect"][1] * task.ranges["normal_stress"][0] * log_rate
     return _as_claims(
         {
-            "log_rate": LOG_RATE,
-            "log_state": _GUESSES["log_state"] * float(LOG_RATE),
-            "slip_error": task.ranges["critical_slip"][1] * LOG_RATE,
+            "log_rate": log_rate,
+            "log_state": _GUESSES["log_state"] * float(log_rate),
+            "slip_error": task.ranges["critical_slip"][1] * log_rate,
             "push": _GUESSES["push"] * float(pressure),
             "asked": _GUESSES["asked"] * float(pressure),
         }
@@ -204,9 +209,9 @@ def _as_claims(values: Mapping[str, Any]) -> SlidingClaims:
     return SlidingClaims(**{name: UpperBound(short(float(v), _SHORT)) for name, v in values.items()})
 
 
-def _claims(task: SlidingTask, held: Held) -> SlidingClaims | None:
+def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims | None:
     """Claims that follow from themselves, by the estimate, with the bound of y as told; None for none."""
-    claims = _guess(task)
+    claims = _guess(task, log_rate)
     for _ in range(_TURNS):
         found = _estimate(task, held, claims)
         if found is None:
@@ -215,12 +220,12 @@ def _claims(task: SlidingTask, held: Held) -> SlidingClaims | None:
         if min(float(getattr(claims, k)) / v for k, v in wider.items() if k != "log_rate") >= 1 / _ROOM:
             break
         try:
-            claims = _as_claims({**wider, "log_rate": LOG_RATE})
+            claims = _as_claims({**wider, "log_rate": log_rate})
         except ParameterError:  # larger than claims may be
             return None
     else:
         return None
-    return claims if float(found["log_rate"]) < float(LOG_RATE) else None
+    return claims if float(found["log_rate"]) < float(log_rate) else None
 
 
 def _estimate(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
@@ -278,8 +283,8 @@ def _excess(task: SlidingTask, held: Held, claims: SlidingClaims) -> float:
     return max(float(found[k]) / float(getattr(claims, k)) for k in SlidingClaims.__dataclass_fields__)
 
 
-def _too_much(task: SlidingTask) -> str:
+def _too_much(task: SlidingTask, log_rate: Fraction) -> str:
     return (
-        f"a stress of {float(task.stress):.3g} Pa is not shown to leave |ln(v/V)| below {float(LOG_RATE):.3g} with the "
+        f"a stress of {float(task.stress):.3g} Pa is not shown to leave |ln(v/V)| below {float(log_rate):.3g} with the "
         "laws that were tried"
     )

@@ -9,6 +9,7 @@ from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
 
+import mpmath
 import pytest
 
 from quakedesign.bounds import UpperBound
@@ -27,7 +28,8 @@ from quakedesign.certificates.slow_sliding import (
 )
 from quakedesign.errors import CertificateError, ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.loop import LinearLaw, SlidingModel
+from quakedesign.fault.friction import friction_law
+from quakedesign.loop import LinearLaw, SlidingModel, sliding_loop
 from quakedesign.synthesis.linear.sampled.slow_sliding import Weights, sliding_law
 
 PROOFS = Path(__file__).parents[3] / "proofs"
@@ -165,6 +167,12 @@ def test_the_pressure_that_is_needed_leaves_the_plan_and_lowers_the_normal_stres
     assert one.normal_stress(F(380000)) == cell.normal == normal
 
 
+FRICTION = {
+    "ageing": {},
+    "slip": {"state_law": "slip"},
+    "regularised": {"regularised": True},
+    "regularised slip": {"state_law": "slip", "regularised": True},
+}
 OUTPUTS = ("log_rate", "ageing", "strength", "log_state", "slip_error", "push", "asked", "left_out")
 PATHS = [
     {"lag": F(10)},
@@ -176,9 +184,11 @@ PATHS = [
 
 
 @pytest.mark.parametrize("path", PATHS)
-def test_both_checkers_state_the_same_loop_exactly(path):
+@pytest.mark.parametrize("friction", FRICTION.values(), ids=FRICTION)
+def test_both_checkers_state_the_same_loop_exactly(path, friction):
     """Flow, inputs, outputs, what bounds the inputs and what may move after a step; with a rock that damps much."""
-    one, held = task(ranges=UNSURE, ramp=F(14), damping=F(5 * 10**20)), Held(law=STIFF, step=F(200), **path)
+    one = task(ranges=UNSURE, ramp=F(14), damping=F(5 * 10**20), **friction)
+    held = Held(law=STIFF, step=F(200), **path)
     cell, model = alone(one, held), theorem.model_of(one, claims())
     plain, _, valve = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, task=one, held=held)))["loop"])
     theirs, ours = standalone.around(plain, cell, valve), theorem.loop_of(held, model, one)
@@ -195,9 +205,10 @@ def test_both_checkers_state_the_same_loop_exactly(path):
 
 
 @pytest.mark.parametrize("path", [*PATHS, {"diffusion": F(40), "delay": F(20), "slip_noise": F(1, 10**7)}])
-def test_both_checkers_make_the_same_of_gains(path, monkeypatch):
+@pytest.mark.parametrize("friction", FRICTION.values(), ids=FRICTION)
+def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
     """Exactly, of gains that are made up: what adds at once, what a step does, small gain and bounds."""
-    one, held = task(ranges=UNSURE, ramp=F(14)), Held(law=STIFF, step=F(200), **path)
+    one, held = task(ranges=UNSURE, ramp=F(14), **friction), Held(law=STIFF, step=F(200), **path)
     ours = theorem.loop_of(held, theorem.model_of(one, claims()), one)
     phases, names = theorem.after_a_step(ours), (*ours.inputs, *held.noise, *ours.fading)
 
@@ -268,6 +279,145 @@ def test_what_the_loop_leaves_out_of_the_equations_stays_below_its_shares():
                 bound = sum(float(c) * abs(seen[output]) for output, c in channels[name].shares.items())
                 worst[name] = max(worst[name], abs(value) / bound)
     assert all(0.9 < ratio <= 1 + 1e-9 for ratio in worst.values()), worst
+
+
+def test_what_the_loop_leaves_out_of_the_slip_law_stays_below_its_share():
+    """Ruina's law typed in again, at the corners; where the slip evolves fastest or slowest the share is reached."""
+    one, given = task(ranges=UNSURE, state_law="slip"), claims("1/2", "1/5")
+    held, model = Held(law=STIFF, step=F(200), lag=F(10)), theorem.model_of(one, given)
+    loop = theorem.loop_of(held, model, one)
+    channels = {c.name: c for c in theorem.channels_of(one, held, given, loop)}
+    assert set(channels["state"].shares) == {"ageing"}
+    assert loop.inputs["rate"][:2] == (model.rate, 0)
+    slope, evolving, fast = map(float, (model.slope, model.evolution_slope, model.state_rate))
+    ratios = []
+    for length, y, z in itertools.product((0.8e-3, 1.1e-3), (-0.5, 0.5), (-0.2, 0.2)):
+        evolved = float(RATE) / length * math.exp(y) * (y + z) / fast
+        assert abs(math.expm1(y) - slope * y) <= float(channels["rate"].shares["log_rate"]) * abs(y) * (1 + 1e-9)
+        bound = float(channels["state"].shares["ageing"]) * abs(evolving * (y + z))
+        ratios.append(abs(evolved - evolving * (y + z)) / bound)
+    assert sorted(ratios)[-4:] == pytest.approx([1.0] * 4)  # the shortest slips at +Y, the longest at -Y
+
+
+def test_the_slip_law_is_the_ageing_law_where_both_are_linear():
+    """With all slopes 1 both are the linearisation about steady sliding."""
+    loops = [sliding_loop(STIFF, replace(MODEL, state_law=law), F(200), lag=F(10)) for law in ("ageing", "slip")]
+    assert loops[0].flow == loops[1].flow
+    assert loops[0].outputs == loops[1].outputs
+    assert {n: v for n, v in loops[0].inputs.items() if n != "rate"} == {
+        n: v for n, v in loops[1].inputs.items() if n != "rate"
+    }
+
+
+def test_the_state_of_the_slip_law_moves_at_most_as_fast_as_the_slip():
+    given, slipping = claims("1/2", "1/18"), task(ranges=UNSURE, state_law="slip")
+    fastest = 1.2e-6 / 0.8e-3 * math.exp(0.5) * (0.5 + 1 / 18)
+    found = alone(slipping, given=given).fastest_state()
+    assert theorem._fastest_state(slipping, given) == found
+    assert float(found) == pytest.approx(fastest, rel=1e-9)
+
+
+@pytest.mark.parametrize(("a", "mu"), [("1/10", "1/2"), ("1/5", "3/5"), ("1/100", "3/5")])
+def test_regularised_friction_differs_from_its_logarithm_by_no_more_than_is_added(a, mu):
+    """arsinh in 60 digits at the corners of what the claims allow; a is large, so that there is a difference."""
+    b, y, z = F("0.015"), F(1, 2), F(1, 5)
+    ranges = {**UNSURE, "direct_effect": (F(a), F(a)), "evolution_effect": (b, b), "coefficient": (F(mu), F(mu))}
+    one, given = task(ranges=ranges, regularised=True), claims("1/2", "1/5")
+    held = Held(law=STIFF, step=F(200), lag=F(10))
+    added = theorem.regularisation(one, given)
+    assert alone(one, held, given).stress() - alone(replace(one, regularised=False), held, given).stress() == added
+    mpmath.mp.dps = 150
+    a, b, mu, y, z = (mpmath.mpf(v.numerator) / v.denominator for v in (F(a), b, F(mu), y, z))
+    off = [
+        a * mpmath.asinh(mpmath.sinh(mu / a) * mpmath.exp((a * s * y + b * t * z) / a)) - mu - a * s * y - b * t * z
+        for s, t in itertools.product((-1, 0, 1), repeat=2)
+    ]
+    largest = max(map(abs, off)) * mpmath.mpf(int(one.normal_stress(given.push)[1]))
+    assert 0 < largest < mpmath.mpf(added.numerator) / added.denominator
+    assert a < 0.05 or mpmath.mpf(added.numerator) / added.denominator < 8 * largest
+    assert theorem.regularisation(replace(one, regularised=False), given) == 0
+
+
+def test_regularised_friction_that_may_come_near_zero_is_refused_by_both():
+    """2m/a is 1 at an effect of 1/2 for Y = Z = 1/10 where mu* = 0.3015."""
+    for coefficient, refused in (("0.3015", False), ("0.3014", True)):
+        ranges = {**UNSURE, "direct_effect": (F(1, 2),) * 2, "evolution_effect": (F("0.015"),) * 2}
+        ranges["coefficient"] = (F(coefficient),) * 2
+        one, given = task(ranges=ranges, regularised=True), claims("1/10", "1/10")
+        assert (theorem.model_of(one, given) is None) is refused
+        if refused:
+            found = cell_bounds(one, LAGGED, given)
+            assert found.reason == "regularised friction may come near 0"
+            with pytest.raises(checker.Refused, match="must stay above half its direct effect"):
+                alone(one, given=given).stress()
+        else:
+            alone(one, given=given).stress()
+
+
+SLIPPING = replace(
+    CLAIM,
+    task=task("0.002", stress=8000, state_law="slip", regularised=True),
+    claims=claims("541/10000", "9/1250", "287/100000000", 34900, 34900),
+)
+
+
+def test_a_guarantee_of_the_slip_law_is_proved_by_both_checkers_and_survives_its_file():
+    text = guarantee_text(SLIPPING)
+    assert parse_guarantee(text) == SLIPPING
+    assert SLIPPING.check() is Verdict.PROVED
+    assert SLIPPING.sentence().endswith("(with inertia, friction regularised, state by the slip law)")
+    statement = checker.check(text).statement
+    assert "regularised rate-and-state friction with the slip law, with inertia" in statement[0]
+
+
+@pytest.mark.parametrize(
+    ("claim", "name", "new"),
+    [
+        (CLAIM, "state_law", "ageing"),
+        (CLAIM, "state_law", True),
+        (CLAIM, "regularised", False),
+        (CLAIM, "regularised", 1),
+        (CLAIM, "regularised", "true"),
+        (SLIPPING, "state_law", "slips"),
+        (SLIPPING, "state_law", ["slip"]),
+        (SLIPPING, "regularised", None),
+    ],
+)
+def test_a_law_of_the_state_that_is_not_known_is_refused_by_both(claim, name, new):
+    raw = json.loads(guarantee_text(claim))
+    raw["fault"][name] = new
+    with pytest.raises(checker.Refused, match=f"{name} must be"):
+        checker.check(json.dumps(raw))
+    with pytest.raises(CertificateError, match=f"{name} must be"):
+        parse_guarantee(json.dumps(raw))
+
+
+def test_what_is_proved_of_ageing_is_not_proved_of_the_slip_law():
+    raw = json.loads(guarantee_text(CLAIM))
+    raw["fault"]["state_law"] = "slip"
+    assert parse_guarantee(json.dumps(raw)).check() is Verdict.UNDECIDED
+    with pytest.raises(checker.Refused, match="small gain must be below 1"):
+        checker.check(json.dumps(raw))
+
+
+@pytest.mark.parametrize(
+    ("law", "more", "expected"),
+    [
+        ("rate-and-state-aging", {}, ("ageing", False)),
+        ("rate-and-state-slip", {}, ("slip", False)),
+        ("regularised-rate-and-state", {}, ("ageing", True)),
+        ("regularised-rate-and-state", {"evolution": "slip"}, ("slip", True)),
+    ],
+)
+def test_the_task_of_a_fault_has_its_law(law, more, expected):
+    patch = load_fault("crustal-patch")
+    quantities = {n: getattr(patch.friction, n) for n in patch.friction.quantities()}
+    found = sliding_task(replace(patch, friction=friction_law(law)(**quantities, **more)), F(1000))
+    assert (found.state_law, found.regularised) == expected
+    known = sliding_task(patch, F(1000))
+    assert [float(v) for v in found.ranges["coefficient"]] == pytest.approx(
+        [float(v) for v in known.ranges["coefficient"]]
+    )
 
 
 @pytest.mark.parametrize("path", [{"lag": 10}, {"diffusion": 40}, {"diffusion": 40, "lag": 10}])

@@ -20,7 +20,7 @@ from quakedesign.certificates.slow_sliding.theorem import cell_bounds
 from quakedesign.loop import SlidingModel
 from quakedesign.synthesis.guaranteed import slow_sliding
 from quakedesign.synthesis.guaranteed.sliding_adversary import SlidingPieces, corners, courses, worst_sliding
-from quakedesign.synthesis.guaranteed.slow_sliding import proved_sliding
+from quakedesign.synthesis.guaranteed.slow_sliding import LOG_RATES, proved_sliding
 from quakedesign.synthesis.linear.sampled.slow_sliding import Weights, sliding_law
 
 PROOFS = Path(__file__).parents[3] / "proofs"
@@ -94,7 +94,8 @@ def replayed(plant_task, stress, pieces=4):
     def field(_, state, s, held):
         x, z, p = state
         y = log_rate(x, z, p, s)
-        return [speed * math.expm1(y), speed / d * (math.exp(-z) - math.exp(y)), (held - p) / lag]
+        ages = math.exp(-z) - math.exp(y) if plant_task.state_law == "ageing" else -math.exp(y) * (y + z)
+        return [speed * math.expm1(y), speed / d * ages, (held - p) / lag]
 
     state, law, held, largest = np.zeros(3), np.zeros(len(output)), 0.0, 0.0
     for number, pushed in enumerate(stress):
@@ -107,8 +108,9 @@ def replayed(plant_task, stress, pieces=4):
     return largest
 
 
-def test_what_the_search_finds_is_reached_by_another_integrator_and_stays_below_what_is_proved():
-    found = proved_sliding(task("0", 8000), HELD)
+@pytest.mark.parametrize(("law", "room"), [("ageing", LOG_RATES[0]), ("slip", LOG_RATES[2])])
+def test_what_the_search_finds_is_reached_by_another_integrator_and_stays_below_what_is_proved(law, room):
+    found = proved_sliding(replace(task("0", 8000), state_law=law), HELD, log_rate=room)
     plant, worst = SlidingPieces(found, found.task), worst_sliding(found)
     stress = next(courses(found, plant))
     every = [plant.largest(stress[:, [k]])[0] for k in range(stress.shape[1])]
