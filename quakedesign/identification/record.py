@@ -29,7 +29,8 @@ COLUMNS = {
 _SHEAR = {"shear_stress": "normal_stress", "shear_force": "normal_force"}
 _LARGEST_FILE = 1 << 24
 MOST_SAMPLES = 10000
-_HEADING = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?\s*")
+_HEADING = re.compile(r"\s*(\w[\w \-]*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))?\s*")
+_BETWEEN_WORDS = re.compile(r"[ \-]+")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +75,7 @@ class Record:
 def read_record(path: str | Path, *, normal_stress: float | None = None) -> Record:
     """Record from a CSV file whose first line names columns with units, as ``time [s], shear_stress [MPa]``.
 
-    Lines that begin with ``#`` are remarks.
+    ``Time (s)`` and ``Shear stress (MPa)`` name the same columns. Lines that begin with ``#`` are remarks.
 
     Parameters
     ----------
@@ -115,9 +116,10 @@ def _headings(cells: Sequence[str]) -> dict[str, float]:
     headings: dict[str, float] = {}
     for cell in cells:
         match = _HEADING.fullmatch(cell)
-        name, unit = match.groups() if match else (cell.strip(), None)
+        said, *units = match.groups() if match else (cell.strip(), None)
+        name, unit = _BETWEEN_WORDS.sub("_", said).lower(), next((u for u in units if u is not None), None)
         if name not in COLUMNS:
-            raise RecordError(f"a column must be one of {', '.join(COLUMNS)}. Received {shown(name)}.{_remedy(name)}")
+            raise RecordError(f"a column must be one of {', '.join(COLUMNS)}. Received {shown(said)}.{_remedy(name)}")
         if name in headings:
             raise RecordError(f"a column must be there once. Received {name} twice. Remove one.")
         if unit is None and COLUMNS[name]:
@@ -187,7 +189,9 @@ def _friction(given: dict[str, "np.ndarray"], stress: float | None) -> "tuple[np
         normal, unit = np.ones_like(given[measured]), ""
     else:
         remedy = " or a constant normal stress" if across == "normal_stress" else ""
-        raise RecordError(f"{measured} needs the column {across}{remedy}. Received {', '.join(given)}. Add it.")
+        mixed = set(_SHEAR.values()) & set(given)
+        then = "Divide the force by the area that slides." if mixed else "Add it."
+        raise RecordError(f"{measured} needs the column {across}{remedy}. Received {', '.join(given)}. {then}")
     if np.any(normal <= 0):
         raise RecordError(f"{across} must be positive. Received {np.min(normal):.6g} {unit}. Compression is positive.")
     return given[measured] / (1 if measured == "friction" else normal), normal, unit

@@ -32,6 +32,22 @@ def test_a_rate_is_summed_to_a_displacement(tmp_path):
     assert record.stiffness_unit == "1/m"
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Time (s), Load point displacement (um), Shear-stress [MPa], NORMAL STRESS (MPa)",
+        " time[s] ,load_point_displacement(um),Shear  stress ( MPa ), Normal_Stress [MPa] ",
+    ],
+)
+def test_headings_of_laboratories_are_read(tmp_path, head):
+    """Round brackets, capitals, and blanks or hyphens between words."""
+    plain = "time [s], load_point_displacement [um], shear_stress [MPa], normal_stress [MPa]"
+    rows = ("0, 0, 3, 5", "1, 2, 2.9, 5", "2, 4, 3.1, 5")
+    found, known = (read_record(written(tmp_path, line, *rows)) for line in (head, plain))
+    for name in ("time", "friction", "load_point", "normal"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
+
+
 def test_a_constant_normal_stress_stands_in_for_a_column(tmp_path):
     path = written(tmp_path, "time [s], shear_stress [MPa], slip [mm]", "0, 3, 0", "1, 2, 1")
     np.testing.assert_allclose(read_record(path, normal_stress=5e6).friction, [0.6, 0.4])
@@ -49,6 +65,7 @@ def test_a_constant_normal_stress_stands_in_for_a_column(tmp_path):
         ([HEAD.replace("[ms]", "[lightyearz]"), *ROWS], "unit is unknown"),
         ([HEAD + ", normal_stress [Pa]", *ROWS], "twice"),
         ([HEAD.replace(", normal_stress [kPa]", ""), "0, 5, 3"], "needs the column normal_stress"),
+        ([HEAD.replace("shear_stress [MPa]", "shear_force [kN]"), *ROWS], "Divide the force by the area that slides"),
         ([HEAD.replace("shear_stress [MPa]", "slip [mm]"), *ROWS], "exactly one column friction"),
         ([HEAD + ", friction", "0, 5, 3, 5000, 1"], "exactly one column friction"),
         ([HEAD, ROWS[0], ROWS[0]], "time must ascend"),
