@@ -126,6 +126,7 @@ def design(
     out: Path | None = None,
     format: Formats = ("svg",),
     force: Force = False,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
     output: Output = PLAIN,
 ) -> int:
     """Derive, synthesise, prove, simulate, compare with the published gains, and write a report.
@@ -138,6 +139,8 @@ def design(
     ----------
     out
         Folder to write; ./quakedesign-FAULT unless given.
+    verbose
+        Print every premise, certified domain and feed-forward too, as they stand in the report.
     """
     from quakedesign.report.folder import prepare
 
@@ -154,8 +157,10 @@ def design(
     def said() -> None:
         from quakedesign.report.terminal import print_comparison
 
-        print_comparison(comparison, console())
+        print_comparison(comparison, console(), whole=verbose)
         print_lines(["", f"written: {folder}/ (results.json, report.html, certificates, figures)"])
+        if not verbose:
+            print_lines([f"premises, margins and equations: {folder}/report.html, or --verbose"])
 
     output.show(results, said)
     return 0 if positive(comparison) else 1

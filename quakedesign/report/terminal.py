@@ -26,10 +26,11 @@ if TYPE_CHECKING:
     from quakedesign.certificates.premises import Premise
     from quakedesign.fault import Fault
     from quakedesign.simulation import Trajectory
+    from quakedesign.studies.comparison import Entry
 
 
-def print_comparison(comparison: Comparison, console: Any) -> None:
-    """Fault, gains, verdicts with premises, and one table."""
+def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True) -> None:
+    """Fault, gains, verdicts with premises, and tables; unless `whole` no premise that holds, no domain, no variant."""
     console.print(comparison.fault.name, style="bold", end=" ")
     console.print(f"({comparison.fault.source})")
     for line in fault_sentences(comparison.fault):
@@ -38,25 +39,55 @@ def print_comparison(comparison: Comparison, console: Any) -> None:
         console.print(f"  {cycle_sentence(comparison.uncontrolled)}")
     for line in left_out_lines(comparison):
         console.print(f"  {line}")
-    for entry in (*comparison.of("designed"), *comparison.of("published")):
-        gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in entry.design.gains.items())
+    entries = (*comparison.of("designed"), *comparison.of("published"))
+    for entry in entries:
         console.print()
         console.print(f"{entry.label}:", style="bold")
-        for line in (*guarantee_lines(entry), headline(entry), *remarks(entry)):
+        for line in _whole(entry) if whole else _brief(entry):
             console.print(f"  {line}")
-        console.print(f"  gains: {gains or 'none'}")
-        for premise in entry.design.conditions:
-            console.print(f"  {_line(premise)}")
-        others = [premise for premise in entry.design.premises if premise not in entry.design.conditions]
-        if others:
-            console.print("  of the certificate of its base gains, in continuous time:")
-        for premise in others:
-            console.print(f"  {_line(premise)}")
-        if entry.design.domain is not None:
-            console.print(f"  {domain_sentence(entry.design.domain)}")
-        if entry.variants:
+        if whole and entry.variants:
             known = zip(FEEDFORWARD_COLUMNS, (None,) * len(FEEDFORWARD_COLUMNS), "lrrrr", strict=True)
             console.print(table(known, feedforward_rows(entry.variants), indent=2))
+    shared = [] if whole else list(dict.fromkeys(line for entry in entries for line in _of_task(entry)))
+    for line in [""] * bool(shared) + shared:
+        console.print(line)
+    _print_tables(comparison, console)
+
+
+def _whole(entry: "Entry") -> list[str]:
+    """All that is told of a controller in lines."""
+    others = [premise for premise in entry.design.premises if premise not in entry.design.conditions]
+    return [
+        *guarantee_lines(entry),
+        headline(entry),
+        *remarks(entry),
+        _gains(entry),
+        *map(_line, entry.design.conditions),
+        *(["of the certificate of its base gains, in continuous time:"] if others else []),
+        *map(_line, others),
+        *([domain_sentence(entry.design.domain)] if entry.design.domain is not None else []),
+    ]
+
+
+def _brief(entry: "Entry") -> list[str]:
+    """What is guaranteed and was seen, the gains, and premises that fail."""
+    said = entry.answer and entry.answer.compensation and entry.answer.compensation.sentence()
+    guaranteed = [line for line in guarantee_lines(entry) if line != said and line not in _of_task(entry)]
+    failing = [_line(premise) for premise in entry.design.conditions if not premise.holds]
+    return [*guaranteed, headline(entry), *remarks(entry), _gains(entry), *failing]
+
+
+def _of_task(entry: "Entry") -> list[str]:
+    """What is the same of all designs that run alike."""
+    return entry.answer.task_lines() if entry.answer else []
+
+
+def _gains(entry: "Entry") -> str:
+    gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in entry.design.gains.items())
+    return f"gains: {gains or 'none'}"
+
+
+def _print_tables(comparison: Comparison, console: Any) -> None:
     console.print()
     console.print("outcome", style="bold", end=", ")
     console.print("peak slip rate of the whole run, and its share of the natural earthquake's")

@@ -45,7 +45,7 @@ def test_headings_of_laboratories_are_read(tmp_path, head):
     rows = ("0, 0, 3, 5", "1, 2, 2.9, 5", "2, 4, 3.1, 5")
     found, known = (read_record(written(tmp_path, line, *rows)) for line in (head, plain))
     for name in ("time", "friction", "load_point", "normal"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
+        assert np.array_equal(getattr(found, name), getattr(known, name))
 
 
 def test_a_constant_normal_stress_stands_in_for_a_column(tmp_path):

@@ -1,5 +1,6 @@
 """Comparisons: headlines say what holds and what does not; figures and pages have units."""
 
+import io
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -9,6 +10,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premises import Premise
+from quakedesign.cli.shared import console
 from quakedesign.errors import OutputError
 from quakedesign.fault import Reference
 from quakedesign.report import Comparison, Entry, headline
@@ -16,6 +18,7 @@ from quakedesign.report.figures import metrics
 from quakedesign.report.folder import write_folder
 from quakedesign.report.headlines import remarks
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
+from quakedesign.report.terminal import print_comparison
 from quakedesign.synthesis import Design
 
 
@@ -165,3 +168,20 @@ def test_a_headline_has_at_most_two_hundred_characters_and_loses_no_sentence(len
     assert told.endswith("UNSTABLE at the step used" if controller else "x")
     assert len(first) <= 200
     assert bool(rest) is (len(told) > 200)
+
+
+def test_a_brief_account_leaves_out_what_holds_and_says_once_what_is_the_same(comparison):
+    whole, brief = io.StringIO(), io.StringIO()
+    print_comparison(comparison, console(file=whole, width=80))
+    print_comparison(comparison, console(file=brief, width=80), whole=False)
+    entries = (*comparison.of("designed"), *comparison.of("published"))
+    assert any(p.holds for entry in entries for p in entry.design.premises)
+    shared = {line for entry in entries if entry.answer for line in entry.answer.task_lines()}
+    assert shared
+    for out, holds in ((whole, True), (brief, False)):
+        said = " ".join(out.getvalue().split())
+        assert (" holds: required" in said) is holds
+        assert all(said.count(line) == (1 if not holds else len(comparison.of("designed"))) for line in shared)
+        assert all(f"{float(v):.6g}" in said for entry in entries for v in entry.design.gains.values())
+        failing = [p for entry in entries for p in entry.design.conditions if not p.holds]
+        assert all(f"premise {p.name}" in said for p in failing)

@@ -61,7 +61,7 @@ class Answer:
                 said.append(
                     f"{name}: slip error {seen.slip_error:.3g} m, slip-rate error {seen.slip_rate_error:.3g} m/s"
                 )
-        said += self.limit_lines() + self._narrower_class()
+        said += self.task_lines()
         if self.leaves_with_stick:
             said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
         return said if self.compensation is None else [*said, self.compensation.sentence()]
@@ -97,6 +97,10 @@ class Answer:
         both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
         rate = f"{limit.slip_rate_error:.3g} m/s"
         return [f"no controller held over T_s = {step} keeps the slip-rate error below {rate}{both}"]
+
+    def task_lines(self) -> list[str]:
+        """What is said of the task, whatever law it is for."""
+        return self.limit_lines() + self._narrower_class()
 
     def _narrower_class(self) -> list[str]:
         """That the fault's own disturbance belongs to the class ``rate`` as well, for people."""

@@ -62,6 +62,10 @@ class SlidingAnswer:
         """What no controller can do at the same T_s; none is known."""
         return []
 
+    def task_lines(self) -> list[str]:
+        """What is said of the task, whatever law it is for; nothing."""
+        return []
+
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
         if not isinstance(self.found, SlidingGuarantee):
