@@ -113,8 +113,8 @@ def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
     return cells
 
 
-def read_path(value: Any) -> tuple[Loop, Path, int]:
-    """The loop of a guarantee with the pressure's path alone, and where the valve's pressure is among its states."""
+def read_path(value: Any) -> tuple[Loop, Path]:
+    """The loop of a guarantee with the pressure's path alone."""
     given = keys(value, "loop", *PATH, *LAW)
     path = Path(*(number(given[name], name) for name in ("lag", "diffusion", "slip_noise")))
     need(path.lag > 0 or path.diffusion > 0, "the pressure must reach the fault through a lag or rock")
@@ -127,9 +127,7 @@ def read_path(value: Any) -> tuple[Loop, Path, int]:
     still, zero = (Fraction(0), Fraction(0)), Fraction(0)
     one = Fraction(1)
     nothing = Task("", one, still, still, (one, one), still, zero, zero, zero, True, zero, zero, zero, None, zero, True)
-    loop = read_loop(plain, nothing)
-    step, delay = number(given["step"], "step"), number(given["delay"], "delay")
-    return loop, path, 2 + len(given["states"]) + int(delay // step) + (delay % step > 0)
+    return read_loop(plain, nothing), path
 
 
 # ---------------------------------------------------------------- exponentials and sectors
@@ -238,7 +236,7 @@ class Cell:
         ]
 
 
-def around(loop: Loop, cell: Cell, valve: int) -> Loop:
+def around(loop: Loop, cell: Cell) -> Loop:
     """The loop about slow sliding: y, cy + c_z z, ay + bz, z, x, q, the valve's pressure and what is left out."""
     size, fault = len(loop.flow), cell.fault
     unit_rows, push = unit(size), loop.outputs[2]
@@ -318,9 +316,9 @@ def shares_of(loop: Loop, cell: Cell) -> tuple[Row, list[Row]]:
     return own, shares
 
 
-def bounds(plain: Loop, cell: Cell, valve: int) -> tuple[dict[str, Fraction], Fraction]:
+def bounds(plain: Loop, cell: Cell) -> tuple[dict[str, Fraction], Fraction]:
     """What follows from the claims on one cell, and the small gain."""
-    loop = around(plain, cell, valve)
+    loop = around(plain, cell)
     times = since_step(loop)
     late = min((t for t in times if loop.fade and loop.fade.weight(t) <= FADED), default=Fraction(0))
     found, more = found_gains(loop, cell, times, late), cell.soon(late)
@@ -349,13 +347,13 @@ def verify(document: dict[str, Any]) -> list[str]:
     need(min(claims.values()) > 0, "claims must be > 0")
     need(max(claims["log_rate"], claims["log_state"]) <= MAX_LOGARITHM, "logarithms must be at most 3")
     boxes = read_cells(document["cells"], fault.box)
-    loop, path, valve = read_path(document["loop"])
+    loop, path = read_path(document["loop"])
     small = Fraction(0)
     for box in boxes:
         part = replace(fault, box=box)
         normal = part.normal(claims["push"])
         need(normal[0] > 0, "the pressure must not open the fault")
-        found, gain = bounds(loop, Cell(part, path, claims, normal), valve)
+        found, gain = bounds(loop, Cell(part, path, claims, normal))
         small = max(small, gain)
         for name in CLAIMS:
             need(found[name] < claims[name], f"the claim {name} must follow from all claims on every cell. It does not")

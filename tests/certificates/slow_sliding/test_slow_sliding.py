@@ -125,9 +125,9 @@ def paired(one, held, given):
     """Bounds of both checkers for one cell."""
     document = json.loads(guarantee_text(replace(CLAIM, task=one, held=held, claims=given)))
     fault, numbers = standalone.read_fault(document), {name: F(v) for name, v in document["claims"].items()}
-    loop, path, valve = standalone.read_path(document["loop"])
+    loop, path = standalone.read_path(document["loop"])
     cell = standalone.Cell(fault, path, numbers, fault.normal(numbers["push"]))
-    return cell_bounds(one, held, given), standalone.bounds(loop, cell, valve)
+    return cell_bounds(one, held, given), standalone.bounds(loop, cell)
 
 
 STIFF = LinearLaw(
@@ -190,8 +190,8 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction):
     one = task(ranges=UNSURE, ramp=F(14), damping=F(5 * 10**20), **friction)
     held = Held(law=STIFF, step=F(200), **path)
     cell, model = alone(one, held), theorem.model_of(one, claims())
-    plain, _, valve = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, task=one, held=held)))["loop"])
-    theirs, ours = standalone.around(plain, cell, valve), theorem.loop_of(held, model, one)
+    plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, task=one, held=held)))["loop"])
+    theirs, ours = standalone.around(plain, cell), theorem.loop_of(held, model, one)
     assert [list(row) for row in ours.flow] == theirs.flow
     assert [list(row) for row in ours.inputs.values()] == theirs.inputs[: len(ours.inputs)]
     assert [list(ours.outputs[name]) for name, _ in zip(OUTPUTS, theirs.outputs, strict=False)] == theirs.outputs
@@ -224,8 +224,8 @@ def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
         return [list(made_up[output, name]) for output in OUTPUTS[: len(ours.outputs)]]
 
     monkeypatch.setattr(standalone, "gains", gains)
-    plain, _, valve = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, held=held)))["loop"])
-    theirs, small = standalone.bounds(plain, alone(one, held), valve)
+    plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, held=held)))["loop"])
+    theirs, small = standalone.bounds(plain, alone(one, held))
     found = theorem.bounds_from(one, held, claims(), ours, made_up, phases)
     assert {name: found[name] for name in theirs} == theirs
     assert small <= found["small_gain"] <= small * (1 + F(1, 10**5))
@@ -453,7 +453,8 @@ def test_what_is_asked_is_read_at_the_valve(delay):
     held = replace(LAGGED, delay=F(delay))
     document = json.loads(guarantee_text(replace(CLAIM, held=held)))
     loop = theorem.loop_of(held, theorem.model_of(task(), claims()), task())
-    assert standalone.read_path(document["loop"])[2] == loop.states.index("valve")
+    read = standalone.read_path(document["loop"])[0].outputs[-1]
+    assert read == [int(state == "valve") for state in loop.states]
 
 
 @pytest.mark.parametrize(
