@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from itertools import product
+from math import log
 from pathlib import Path
 
 from quakedesign.errors import RecordError
 from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox
 from quakedesign.fault.defaults import sliding_step
+from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.fault.template import fault_toml
 from quakedesign.identification.result import Estimate, Identification
 from quakedesign.output import write_whole
@@ -83,7 +85,8 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     """A fault with the friction of a record in place of its own.
 
     For a law that weakens with slip, friction and box together hold every law of the record's box, so that `guarantee`
-    and `design` cover all of them. For a law with state friction is the best fit.
+    and `design` cover all of them. For a law with state friction is the best fit, at the reference rate of a fault that
+    has one, for without control that is the rate at which it is loaded.
 
     Parameters
     ----------
@@ -109,7 +112,7 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     held = (
         cover(identification.law, identification.box, fault.box)
         if covers(identification.law)
-        else Cover(law=identification.law, box=fault.box)
+        else Cover(law=_at_rate_of(fault, identification.law), box=fault.box)
     )
     if _gains_a_state(identification, fault):
         step = sliding_step(held.law, fault.reference)
@@ -127,7 +130,25 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
 def other_parts(identification: Identification, fault: Fault) -> str:
     """What a fault file of a record takes from a fault, in words."""
     shared = "normal stress, size, task"
-    return shared if _gains_a_state(identification, fault) else f"{shared}, T_s, disturbance"
+    if _gains_a_state(identification, fault):
+        return shared
+    loaded = ", reference rate" if identification.law.state_names else ""
+    return f"{shared}, T_s, disturbance{loaded}"
+
+
+def _at_rate_of(fault: Fault, law: FrictionLaw) -> FrictionLaw:
+    """A law with the reference rate of a fault: the same friction, as μ_0 moves by (a − b)·ln of the ratio of rates."""
+    if not isinstance(law, RateAndState) or not isinstance(fault.friction, RateAndState):
+        return law
+    rate = fault.friction.reference_rate
+    moved = (law.direct_effect - law.evolution_effect) * log(rate / law.reference_rate)
+    return replace(
+        law,
+        reference_rate=rate,
+        reference_coefficient=law.reference_coefficient + moved,
+        slowest_rate=min(law.slowest_rate, rate),
+        fastest_rate=max(law.fastest_rate, rate),
+    )
 
 
 def _gains_a_state(identification: Identification, fault: Fault) -> bool:
