@@ -132,22 +132,26 @@ def other_parts(identification: Identification, fault: Fault) -> str:
     shared = "normal stress, size, task"
     if _gains_a_state(identification, fault):
         return shared
-    loaded = ", reference rate" if identification.law.state_names else ""
+    loaded = ", reference rate, working range" if identification.law.state_names else ""
     return f"{shared}, T_s, disturbance{loaded}"
 
 
 def _at_rate_of(fault: Fault, law: FrictionLaw) -> FrictionLaw:
-    """A law with the reference rate of a fault: the same friction, as μ_0 moves by (a − b)·ln of the ratio of rates."""
-    if not isinstance(law, RateAndState) or not isinstance(fault.friction, RateAndState):
+    """A law at the reference rate and on the working range of a fault.
+
+    The same friction, as μ_0 moves by (a − b)·ln of the ratio of rates.
+    """
+    own = fault.friction
+    if not isinstance(law, RateAndState) or not isinstance(own, RateAndState):
         return law
-    rate = fault.friction.reference_rate
+    rate = own.reference_rate
     moved = (law.direct_effect - law.evolution_effect) * log(rate / law.reference_rate)
     return replace(
         law,
         reference_rate=rate,
         reference_coefficient=law.reference_coefficient + moved,
-        slowest_rate=min(law.slowest_rate, rate),
-        fastest_rate=max(law.fastest_rate, rate),
+        slowest_rate=min(law.slowest_rate, own.slowest_rate),
+        fastest_rate=max(law.fastest_rate, own.fastest_rate),
     )
 
 

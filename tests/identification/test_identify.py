@@ -190,9 +190,11 @@ def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, nam
 @pytest.mark.parametrize("name", ["rate-and-state-aging", "regularised-rate-and-state"])
 def test_a_law_is_told_at_the_rate_at_which_its_fault_is_loaded_and_stays_the_same_friction(weak, name):
     patch = load_fault("crustal-patch")
-    law = friction_law(name)(**asdict(patch.friction) | {"reference_rate": 1e-6, "slowest_rate": 1e-8})
+    law = friction_law(name)(
+        **asdict(patch.friction) | {"reference_rate": 1e-6, "slowest_rate": 1e-8, "fastest_rate": 1e-3}
+    )
     found = identified_fault(replace(weak, law=law), patch).friction
-    assert (found.reference_rate, found.slowest_rate, found.fastest_rate) == (1e-9, 1e-9, law.fastest_rate)
+    assert (found.reference_rate, found.slowest_rate, found.fastest_rate) == (1e-9, 1e-20, 100.0)
     for rate, theta in ((1e-9, 1e6), (1e-6, 3.0), (1e-2, 1e-3)):
         assert float(found.coefficient(0, rate, theta)) == pytest.approx(
             float(law.coefficient(0, rate, theta)), rel=1e-12
@@ -216,7 +218,7 @@ def test_friction_with_a_state_brings_its_sampling_time_unless_the_fault_has_one
     )  # a stress is told to what runs it, not to the fault
     assert identified_fault(weak, lab).disturbance == lab.disturbance != Disturbance()
     assert other_parts(weak, lab) == "normal stress, size, task, T_s, disturbance"
-    assert other_parts(quick, patch) == "normal stress, size, task, T_s, disturbance, reference rate"
+    assert other_parts(quick, patch) == "normal stress, size, task, T_s, disturbance, reference rate, working range"
 
 
 @pytest.mark.parametrize(
