@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.cli.hardware import ActuatorOptions, SensorOptions
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, LawOptions, Output, RunOptions
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, LawOptions, Output, RunOptions, Scheduler
 from quakedesign.cli.shared import Metres, MetresPerSecond, Whole, app, console, progress
 from quakedesign.cli.state import SpreadOptions
 from quakedesign.errors import ParameterError
@@ -36,7 +36,7 @@ def campaign(
     search: str | None = None,
     rerun: str | None = None,
     workers: Whole | None = None,
-    scheduler: str | None = None,
+    scheduler: Scheduler = None,
     out: Path | None = None,
     format: Formats = ("png",),
     force: Force = False,
@@ -64,8 +64,6 @@ def campaign(
         Index of a sample to run again and store as NetCDF in the folder.
     workers
         Number of processes; one per core unless given.
-    scheduler
-        Address of a dask.distributed scheduler to use instead.
     out
         Folder; ./quakedesign-FAULT-campaign unless given.
     """

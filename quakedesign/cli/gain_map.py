@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Force, Formats, Output
+from quakedesign.cli.options import PLAIN, Force, Formats, Output, Scheduler
 from quakedesign.cli.shared import Gains, Whole, app, progress
 from quakedesign.errors import ParameterError
 
@@ -27,6 +27,7 @@ def gain_map(
     interior: Whole = 200,
     seed: Whole = 0,
     workers: Whole = 2,
+    scheduler: Scheduler = None,
     out: Path | None = None,
     format: Formats = ("png",),
     force: Force = False,
@@ -89,6 +90,7 @@ def gain_map(
             interior=interior,
             seed=seed,
             workers=workers,
+            scheduler=scheduler,
             tell=tell,
         )
     facts = write_gain_map(drawn, folder, format)

@@ -1,24 +1,29 @@
 """The command about the loop that runs."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Shaking
+from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Scheduler, Shaking
 from quakedesign.cli.shared import (
     ExactMetres,
     ExactMetresPerSecond,
     ExactPascals,
     ExactSeconds,
     Gains,
+    Whole,
     app,
     new_file,
+    progress,
 )
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, QuakedesignError
+from quakedesign.output import require_room
 from quakedesign.rationals import rational
 
 _USUAL = ("tracking", "amplitude")
@@ -70,7 +75,7 @@ _ALONE = Surroundings()
 def guarantee(
     fault: FaultName,
     /,
-    *,
+    *more: Annotated[FaultName, Parameter(help="Further faults, of which the same is asked.")],
     controller: str = "elqr",
     objective: Literal["tracking", "peak"] = "tracking",
     gains: Gains = (),
@@ -83,6 +88,8 @@ def guarantee(
     spread: str = "0",
     box: Box = None,
     disturbance: Shaking = None,
+    workers: Whole = 1,
+    scheduler: Scheduler = None,
     out: Path | None = None,
     force: Force = False,
     output: Output = PLAIN,
@@ -90,7 +97,7 @@ def guarantee(
     """Prove how far slip, slip rate and pressure of the loop that runs can go: sampled, held, late, for ever.
 
     For all friction and constant parameters of the box and every disturbance of a class, from rest or from every start
-    near it, along the reference. Exit code 0 only if proved.
+    near it, along the reference. Of several faults each has its own answer. Exit code 0 only if all are proved.
 
     Parameters
     ----------
@@ -114,38 +121,101 @@ def guarantee(
         shear stress disturbance, such as '25 kPa'; the largest that the design stands unless given.
     spread
         Of such a fault: by how much of their values a, b and D_c may be off, such as 0.1.
+    workers
+        Of several faults: number of processes.
     out
-        Certificate file to write.
+        Certificate file to write; of several faults a folder for one each.
     """
-    from quakedesign.certificates.guarantee.files import save_guarantee
     from quakedesign.fault import load_fault
+    from quakedesign.synthesis import answers
+
+    began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
+    files = _files(out, [one.name for one in faults], force=force)
+    held: dict[str, Any] = {"controller": controller, "step": None if step is None else rational(step, "step")}
+    laws = {"gains": gains, "objective": objective, "scheme": scheme, "measured": measured}
+    usual = not gains and scheme is None and (objective, disturbance_class) == _USUAL
+    slowly = {"stress": None if stress is None else rational(stress, "stress"), "spread": rational(spread, "spread")}
+    questions = [
+        _slowly(one, around.exact(), usual=usual, **held, **slowly)
+        if one.friction.state_names
+        else _swiftly(one, around.exact(), slowly, disturbance_class=disturbance_class, **held, **laws)
+        for one in faults
+    ]
+    with progress() as tell:
+        found = answers(questions, workers=workers, scheduler=scheduler, tell=tell if more else None)
+    said = {"class": disturbance_class, "seconds": perf_counter() - began}
+    if not more:
+        if isinstance(found[0], QuakedesignError):
+            raise found[0]
+        output.show(_facts(found[0], files[0]) | said, found[0].lines())
+    else:
+        each = zip(faults, found, files, strict=True)
+        facts = [{"fault": one.name} | _facts(proof, path) for one, proof, path in each]
+        lines = [f"{one.name}: {line}" for one, proof in zip(faults, found, strict=True) for line in _lines(proof)]
+        output.show({"guarantees": facts, **said}, lines)
+    return 0 if all(_proved(one) for one in found) else 1
+
+
+def _proved(answer: Any) -> bool:
+    return not isinstance(answer, QuakedesignError) and answer.proved
+
+
+def _lines(answer: Any) -> list[str]:
+    return [f"refused: {answer}"] if isinstance(answer, QuakedesignError) else answer.lines()
+
+
+def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | None]:
+    """Files of certificates, one a fault, refused early where they cannot be written.
+
+    Raises
+    ------
+    ParameterError, OutputError
+    """
+    again = next((name for name in names if names.count(name) > 1), None)
+    if again is not None:
+        raise ParameterError(f"several faults need names of their own. Received {again} twice. Rename one.")
+    if out is None:
+        return [None] * len(names)
+    if len(names) == 1:
+        new_file(out, "certificate file", force=force)
+        return [out]
+    require_room(out)
+    files = [out / f"{name}-guarantee.json" for name in names]
+    for path in (path for path in files if out.exists()):
+        new_file(path, "certificate file", force=force)
+    return [*files]
+
+
+def _facts(answer: Any, path: Path | None) -> dict[str, Any]:
+    """Answer as JSON, and its file written if there is a proof."""
+    from quakedesign.certificates.guarantee.files import save_guarantee
+
+    if isinstance(answer, QuakedesignError):
+        return {"verdict": "refused", "reason": str(answer), "certificate": None}
+    written = path if answer.proved else None
+    if written is not None:
+        written.parent.mkdir(parents=True, exist_ok=True)
+        save_guarantee(answer.found, written)
+    return {**answer.to_dict(), "certificate": written and str(written)}
+
+
+def _swiftly(fault: Any, around: dict[str, Any], pushed: dict[str, Any], **asked: Any) -> Callable[[], Any]:
+    """Guarantee along the reference; refuses what is meant for slow sliding.
+
+    Raises
+    ------
+    ParameterError
+    """
     from quakedesign.synthesis import answer
 
-    new_file(out, "certificate file", force=force)
-    began, chosen = perf_counter(), load_fault(fault, box=box, disturbance=disturbance)
-    known: dict[str, Any] = dict(around.exact())
-    held: dict[str, Any] = {"controller": controller, "step": None if step is None else rational(step, "step")}
-    sliding = {"stress": None if stress is None else rational(stress, "stress"), "spread": rational(spread, "spread")}
-    if chosen.friction.state_names:
-        usual = not gains and scheme is None and (objective, disturbance_class) == _USUAL
-        proof = _slowly(chosen, known, usual=usual, **held, **sliding)
-    elif any(sliding.values()):
+    if any(pushed.values()):
         raise ParameterError(
-            f"stress and spread need friction with a state. Received {chosen.friction.name}. Leave them out."
+            f"stress and spread need friction with a state. Received {fault.friction.name}. Leave them out."
         )
-    else:
-        options: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "measured": measured}
-        proof = answer(chosen, disturbance_class=disturbance_class, **held, **options, **known)
-    written = None
-    if out is not None and proof.proved:
-        save_guarantee(proof.found, out)
-        written = str(out)
-    facts = {"class": disturbance_class, "certificate": written, "seconds": perf_counter() - began}
-    output.show({**proof.to_dict(), **facts}, proof.lines())
-    return 0 if proof.proved else 1
+    return partial(answer, fault, **asked, **around)
 
 
-def _slowly(fault: Any, around: dict[str, Fraction], *, usual: bool, **asked: Any) -> Any:
+def _slowly(fault: Any, around: dict[str, Fraction], *, usual: bool, **asked: Any) -> Callable[[], Any]:
     """Guarantee of slow sliding; refuses what it has no use for.
 
     Raises
@@ -161,4 +231,4 @@ def _slowly(fault: Any, around: dict[str, Fraction], *, usual: bool, **asked: An
             "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class or an initial "
             "slip or slip rate. Leave them out."
         )
-    return answer_sliding(fault, **asked, **taken)
+    return partial(answer_sliding, fault, **asked, **taken)

@@ -39,6 +39,9 @@ Shaking = Annotated[
     ),
 ]
 Box = Annotated[str | None, Parameter(help="Uncertainty box: paper or ten-percent.")]
+Scheduler = Annotated[
+    str | None, Parameter(help="Address of a dask.distributed scheduler to use instead of processes of this machine.")
+]
 Formats = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],
     Parameter(consume_multiple=True, negative="", help="Of the figures, one or several: svg, pdf, png."),

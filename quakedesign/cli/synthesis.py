@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Force, Output
+from quakedesign.cli.options import PLAIN, Force, Output, Scheduler
 from quakedesign.cli.shared import Seconds, Whole, app, console, given, new_file, refuse
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
@@ -29,6 +29,7 @@ def synthesise(
     starts: Whole | None = None,
     seed: Whole | None = None,
     workers: Whole | None = None,
+    scheduler: Scheduler = None,
     step: Seconds | None = None,
     scheme: str | None = None,
     metric: str | None = None,
@@ -79,7 +80,7 @@ def synthesise(
     require_known(objective, (*OBJECTIVES, "sampled"), "objective", UnknownNameError)
     new_file(out, "certificate file", force=force)
     began = perf_counter()
-    of_search = {"starts": starts, "seed": seed, "workers": workers}
+    of_search = {"starts": starts, "seed": seed, "workers": workers, "scheduler": scheduler}
     of_trial, what = {"step": step, "scheme": scheme, "metric": metric}, f"the objective {objective}"
     if objective == "sampled":
         refuse({"--bound": bound, **{f"--{name}": value for name, value in of_search.items()}}, what)

@@ -1,17 +1,66 @@
 """What is guaranteed of a controller on a fault as it runs, given or designed for it."""
 
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from fractions import Fraction
-from typing import Unpack
+from typing import TypeVar, Unpack
 
 from quakedesign.certificates.guarantee import NoGuarantee, task_of
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.impossibility import hopeless
 from quakedesign.controllers import Controller, control_law
-from quakedesign.errors import ParameterError, require_known
+from quakedesign.errors import ParameterError, QuakedesignError, require_known
+from quakedesign.executors import crew_or_here
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, Answer
 from quakedesign.synthesis.methods.base import Wanted, method_of
+
+Found = TypeVar("Found")
+
+
+def answers(
+    questions: Sequence[Callable[[], Found]],
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    executor: Executor | None = None,
+    tell: Callable[[str, float], None] | None = None,
+) -> list[Found | QuakedesignError]:
+    """Answers to several questions, each asked where there is room, in the order of the questions; refusals too.
+
+    Parameters
+    ----------
+    questions : sequence of callable
+        Such as ``partial(answer, fault, step=Fraction(1, 20))``; without argument, and known to other processes.
+    workers : int
+        Number of processes; 1 computes in this one. No digit depends on who computes.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler that is used instead.
+    executor : Executor, optional
+        Any other executor of `concurrent.futures` that is used instead.
+    tell : callable, optional
+        Called with what is being done and the fraction done [-].
+
+    Raises
+    ------
+    SimulationError
+        When the workers cannot be reached, or do not live.
+    """
+    found: dict[int, Found | QuakedesignError] = {}
+    with crew_or_here(workers, scheduler, executor) as crew:
+        for place, one in crew.answers(_asked, [(question,) for question in questions]):
+            found[place] = one
+            if tell is not None:
+                tell(f"{len(found)} of {len(questions)} answered", len(found) / len(questions))
+    return [found[place] for place in range(len(questions))]
+
+
+def _asked(question: Callable[[], Found]) -> Found | QuakedesignError:
+    try:
+        return question()
+    except QuakedesignError as refused:
+        return refused
 
 
 def answer(

@@ -6,8 +6,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from quakedesign.cli import main
+from quakedesign.executors import Given, SerialExecutor
 from quakedesign.simulation.campaign import Campaign, running
-from quakedesign.simulation.campaign.crews import Given, SerialExecutor
 
 CALL = ["campaign", "lab-fault", "--controller", "elqr", "--duration", "0.2", "--initial-slip", "1e-4", "--box"]
 
@@ -16,7 +16,7 @@ CALL = ["campaign", "lab-fault", "--controller", "elqr", "--duration", "0.2", "-
 def call(tmp_path, monkeypatch, capsys):
     """Exit code, standard output and standard error of the command, computed in this process without a figure."""
     monkeypatch.setattr(Campaign, "plot", lambda _: Figure())
-    monkeypatch.setattr(running, "_crew", lambda *_: Given(SerialExecutor()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
 
     def run(*arguments, box="ten-percent"):
         with pytest.raises(SystemExit) as ended:
@@ -66,11 +66,11 @@ def test_ctrl_c_says_that_it_can_go_on(call, monkeypatch):
         def submit(self, task, /, *arguments, **named):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(running, "_crew", lambda *_: Given(Interrupted()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: Given(Interrupted()))
     code, _, err = call("--samples", "2")
     assert code == 130
     assert "the same command goes on from" in err
-    monkeypatch.setattr(running, "_crew", lambda *_: Given(SerialExecutor()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
     assert call("--samples", "2")[0] == 0
 
 
@@ -82,7 +82,7 @@ def test_a_batch_that_fails_is_told(call, monkeypatch):
 
             return super().submit(fail)
 
-    monkeypatch.setattr(running, "_crew", lambda *_: Given(Failing()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: Given(Failing()))
     code, out, _ = call("--samples", "3")
     assert code == 1
     assert "MemoryError: full" in out

@@ -11,6 +11,7 @@ from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import Held, guarantee, task_of
 from quakedesign.cli import main
 from quakedesign.fault import load_fault
+from quakedesign.fault.sources import source_text as load_text
 from quakedesign.synthesis import answer
 from quakedesign.synthesis.guaranteed import Answer
 from quakedesign.synthesis.guaranteed.families import family_of
@@ -258,3 +259,36 @@ def test_a_fault_behind_a_well_with_its_file(call, tmp_path):
         assert found[seen]["slip_error"] <= F(found["slip_error"])
         assert found[seen]["slip_rate_error"] <= F(found["slip_rate_error"])
     assert check_files([path], "real-fault")[str(path)][0] == "proved"
+
+
+def test_several_faults_are_asked_the_same_and_each_has_its_answer(call, tmp_path):
+    own, folder = tmp_path / "own.toml", tmp_path / "proofs"
+    own.write_text(load_text("real-fault").replace('name = "real-fault"', 'name = "own"'), encoding="utf-8")
+    asked = ("real-fault", "crustal-patch", str(own), "--step", "0.1 s", "--workers", "2", "--out", str(folder))
+    code, out, _ = call(*asked, "--json")
+    found = json.loads(out)["guarantees"]
+    assert [(one["fault"], one["verdict"]) for one in found] == [
+        ("real-fault", "proved"),
+        ("crustal-patch", "refused"),
+        ("own", "proved"),
+    ]
+    assert code == 1
+    assert "Give --diffusion" in found[1]["reason"]
+    files = sorted(folder.iterdir())
+    assert [one["certificate"] for one in found] == [str(files[1]), None, str(files[0])]
+    assert [each[0] for each in check_files(files).values()] == ["proved", "proved"]
+    assert {k: v for k, v in found[0].items() if k not in ("fault", "certificate")} == {
+        k: v for k, v in found[2].items() if k not in ("fault", "certificate")
+    }
+    code, _, err = call(*asked)
+    assert (code, "must be new" in err) == (2, True)
+
+
+def test_several_faults_for_people(call):
+    code, out, _ = call("real-fault", "crustal-patch", "--diffusion", "180 s", "--stress", "1 MPa", "--spread", "0")
+    assert (code, "need friction with a state" in out) == (2, False)
+    code, out, _ = call("real-fault", "crustal-patch", "--diffusion", "180 s", "--measured", "slip-and-rate")
+    assert out.startswith("real-fault: none: no controller whatever that withdraws at most 50 MPa")
+    assert "\ncrustal-patch: proved: " in out
+    code, _, err = call("real-fault", "real-fault")
+    assert (code, "need names of their own" in err) == (2, True)

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 from quakedesign.cli import main
+from quakedesign.executors import Given, SerialExecutor
 from quakedesign.simulation.campaign import running
-from quakedesign.simulation.campaign.crews import Given, SerialExecutor
 
 
 def no_number(text):
@@ -121,7 +121,7 @@ def test_a_mean_goes_into_an_exported_controller(run, tmp_path):
 
 
 def test_a_campaign_takes_the_same_options(run, monkeypatch, tmp_path):
-    monkeypatch.setattr(running, "_crew", lambda *_: Given(SerialExecutor()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
     options = ("--saturation", "20 kPa", *ROCK, "--slip-noise", "1 um", "--feedforward", "nominal", "--drift", "1 um/s")
     command = ("campaign", "lab-fault", "--samples", "3", "--duration", "50 ms", "--scale", "100", *options)
     code, out, _ = run(*command, "--rerun", "1", "--json")

@@ -233,7 +233,7 @@ def test_a_compiler_that_cannot_be_read_is_none(capsys, monkeypatch):
     ("given", "where"),
     [
         (("guarantee", "lab-fault", "--step", "-1 ms"), "joined by =. See quakedesign guarantee --help."),
-        (("guarantee", "lab-fault", "lab-fault"), "See quakedesign guarantee --help."),
+        (("limits", "lab-fault", "lab-fault"), "See quakedesign limits --help."),
         (("--json", "fault", "lab-fault"), "See quakedesign --help."),
         (("fault", "lab-fault", "--where", "x"), "See quakedesign fault --help."),
     ],

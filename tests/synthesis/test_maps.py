@@ -16,6 +16,7 @@ from quakedesign.synthesis.analysis.certify import closed_loop
 from quakedesign.synthesis.analysis.gain_map import SHARES, axis, gain_map
 from quakedesign.synthesis.analysis.gain_map_workers import Screener, Screeners
 from quakedesign.synthesis.lyapunov.search import find_certificate
+from quakedesign.workers import Processes
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "map_region", Path(__file__).with_name("super_twisting_region.py")
@@ -121,7 +122,8 @@ def test_an_interrupted_map_leaves_no_process_waiting(monkeypatch):
 def test_processes_give_the_same_answers_even_if_they_are_killed():
     sheet = maps._sheet("super-twisting", ("1.5", "1.1"), ("k1", "k2"), RANGES, 3, ("1",), (1, 1), 4)
     alone = Screener(sheet)
-    with Screeners(sheet, 2) as crew:
+    with Processes(2) as processes:
+        crew = Screeners(sheet, processes)
         first = [found for found, _ in crew.answers("row", [(row,) for row in sheet.rows])]
         for process in active_children():
             process.kill()

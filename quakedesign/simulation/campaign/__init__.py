@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.simulation.campaign.crews import SerialExecutor as SerialExecutor
+    from quakedesign.executors import SerialExecutor as SerialExecutor
     from quakedesign.simulation.campaign.problem import Problem as Problem
     from quakedesign.simulation.campaign.problem import SampleResult as SampleResult
     from quakedesign.simulation.campaign.result import Campaign as Campaign

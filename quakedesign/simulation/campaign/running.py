@@ -12,11 +12,11 @@ import numpy as np
 
 from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
+from quakedesign.executors import crew_of
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_seed
 from quakedesign.loop.schemes import Scheme, own_way, simulation_scheme
 from quakedesign.rationals import rational
-from quakedesign.simulation.campaign.crews import Cluster, Given
 from quakedesign.simulation.campaign.dispatch import dispatch
 from quakedesign.simulation.campaign.ledger import Ledger
 from quakedesign.simulation.campaign.problem import Problem, Program, SampleResult
@@ -31,7 +31,7 @@ from quakedesign.simulation.loading import Load
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.sliding_conditions import TIDE
 from quakedesign.temporary import temporary_folder
-from quakedesign.workers import Crew, Processes
+from quakedesign.workers import Crew
 
 if TYPE_CHECKING:
     import numpy as np
@@ -173,11 +173,9 @@ def run_campaign(
     require_count(samples)
     if metric is not None:
         require_metric(metric, problem.metrics)
-    if scheduler and executor:
-        raise ParameterError("give a scheduler or an executor. Received both. Leave one out.")
     began = perf_counter()
     ledger = Ledger.open(Path(folder), problem.inputs, renew=renew)
-    with temporary_folder() as private, _crew(workers, scheduler, executor) as crew:
+    with temporary_folder() as private, crew_of(workers, scheduler, executor) as crew:
         runner = _Runner(problem, ledger, problem.program.compiled(private), crew, batch, tell)
         chosen = [problem.sample(i) for i in range(samples)]
         results = runner.results(chosen, list(map(str, range(samples))), "samples")
@@ -190,12 +188,6 @@ def run_campaign(
         search=worst,
         seconds=perf_counter() - began,
     )
-
-
-def _crew(workers: int | None, scheduler: str | None, executor: Executor | None) -> Crew:
-    if executor is not None:
-        return Given(executor, workers)
-    return Cluster(scheduler) if scheduler else Processes(workers)
 
 
 class _Runner:

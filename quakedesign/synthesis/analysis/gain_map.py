@@ -1,6 +1,7 @@
 """Where two gains are certified: a grid screened with one compiled problem, its edges and a sample proved exactly."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
@@ -12,8 +13,10 @@ import numpy as np
 from quakedesign.certificates import Loop
 from quakedesign.controllers import Subject
 from quakedesign.errors import ParameterError
+from quakedesign.executors import Here, crew_or_here
 from quakedesign.fault.checks import MOST_WORKERS, require_count
 from quakedesign.rationals import rational
+from quakedesign.sos.solve.conic import handing_back
 from quakedesign.synthesis.analysis.certify import Number, closed_loop
 from quakedesign.synthesis.analysis.gain_map_workers import Place, Screeners, Sheet
 from quakedesign.synthesis.analysis.margins import necessary_limit
@@ -84,6 +87,8 @@ def gain_map(
     interior: int = 200,
     seed: int = 0,
     workers: int = 2,
+    scheduler: str | None = None,
+    executor: Executor | None = None,
     tell: Callable[[str, float], None] = lambda _what, _done: None,
 ) -> GainMap:
     """Certified region over two gains, at one or more levels of L̄.
@@ -115,7 +120,11 @@ def gain_map(
     seed : int
         Of their choice.
     workers : int
-        Number of processes; 1 computes in this one.
+        Number of processes; 1 computes in this one. No digit depends on who computes.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler that is used instead.
+    executor : Executor, optional
+        Any other executor of `concurrent.futures` that is used instead.
     tell : callable
         Progress.
 
@@ -127,11 +136,13 @@ def gain_map(
     ------
     ParameterError, UnknownNameError, CertificateError
         For unknown gains, empty ranges or levels, and as `certify`.
+    SimulationError
+        When the workers cannot be reached, or do not live.
     """
     require_count(MOST_WORKERS, workers=workers)
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
-    with Screeners(sheet, workers) as screeners:
-        began = perf_counter()
+    with Here() if handing_back() else crew_or_here(workers, scheduler, executor) as crew:
+        began, screeners = perf_counter(), Screeners(sheet, crew)
         limits, screened, solves = _screen(sheet, screeners, tell)
         middle = perf_counter()
         proved, texts, edges, more = _prove(sheet, screeners, dict(screened), interior, seed, tell)

@@ -1,19 +1,18 @@
-"""Who computes the points of a map: what is asked at each, and processes that keep their compiled sweeps."""
+"""Who computes the points of a map: what is asked at each, and workers that keep their compiled sweeps."""
 
-import os
+import threading
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, Self
+from typing import Any
 
 from quakedesign.certificates import Loop, certificate_text
 from quakedesign.certificates.claim import root_enclosure
 from quakedesign.controllers import Subject
 from quakedesign.errors import CertificateError
-from quakedesign.sos.solve.conic import handing_back
 from quakedesign.synthesis.analysis.margins import necessary_limit
 from quakedesign.synthesis.analysis.parametric_program import CLEAR, Sweep, prove
-from quakedesign.workers import Processes
+from quakedesign.workers import Crew
 
 Place = tuple[int, int]
 _FAST = 1e-8
@@ -123,26 +122,16 @@ class Screener:
 
 
 class Screeners:
-    """Screeners of a sheet, in processes or in this one.
+    """Screeners of a sheet, wherever a crew computes.
 
     Parameters
     ----------
     sheet : Sheet
-    workers : int
-        1 stands for this process.
+    crew : Crew
     """
 
-    def __init__(self, sheet: Sheet, workers: int) -> None:
-        alone = workers == 1 or handing_back()
-        self._own = Screener(sheet) if alone else None
-        self._crew = None if alone else Processes(workers, _begin, (sheet,))
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        if self._crew is not None:
-            self._crew.__exit__(*error)
+    def __init__(self, sheet: Sheet, crew: Crew) -> None:
+        self._sheet, self._crew = sheet, crew
 
     def answers(self, question: str, arguments: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
         """Answers of one method of `Screener` to many arguments, in any order.
@@ -152,21 +141,20 @@ class Screeners:
         SimulationError
             When processes die again and again; one that was killed from outside is replaced.
         """
-        if self._crew is None:
-            yield from (getattr(self._own, question)(*one) for one in arguments)
-        else:
-            found = self._crew.answers(_answer, [(question, one) for one in arguments])
-            yield from (answer for _, answer in found)
+        asked = [(self._sheet, question, one) for one in arguments]
+        return (answer for _, answer in self._crew.answers(_answer, asked))
 
 
-_screener: list[Screener] = []
+class _Kept(threading.local):
+    """Screener of the last sheet that a thread was asked about: compiled sweeps have one place for their parameters."""
+
+    screener: Screener | None = None
 
 
-def _begin(sheet: Sheet) -> None:
-    """Start a worker, on one thread."""
-    os.environ["OMP_NUM_THREADS"] = "1"
-    _screener.append(Screener(sheet))
+_kept = _Kept()
 
 
-def _answer(question: str, arguments: tuple[Any, ...]) -> Any:
-    return getattr(_screener[0], question)(*arguments)
+def _answer(sheet: Sheet, question: str, arguments: tuple[Any, ...]) -> Any:
+    if _kept.screener is None or _kept.screener.sheet != sheet:
+        _kept.screener = Screener(sheet)
+    return getattr(_kept.screener, question)(*arguments)

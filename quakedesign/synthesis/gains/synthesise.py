@@ -1,13 +1,14 @@
 """Gains and Lyapunov function found together for an objective; gains without a proof are never returned."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import partial
 from itertools import islice
 
 from quakedesign.certificates import Certificate, Loop
 from quakedesign.controllers import Subject
+from quakedesign.executors import Here, crew_or_here
 from quakedesign.fault.checks import MOST_WORKERS, require_count
 from quakedesign.sos.solve.conic import handing_back
 from quakedesign.synthesis.analysis.certify import Number
@@ -16,7 +17,7 @@ from quakedesign.synthesis.gains.objectives import SmallestNorm
 from quakedesign.synthesis.gains.path_following import climb, look, short, with_gains
 from quakedesign.synthesis.gains.problem import Question, begin_with, question
 from quakedesign.synthesis.gains.setting import FAINT, Setting, State
-from quakedesign.workers import Processes
+from quakedesign.workers import Crew
 
 _STRETCHES = (1.0, 1.5, 4.0)
 _DRAWS = 12
@@ -91,6 +92,8 @@ def synthesise(
     starts: int = 4,
     seed: int = 0,
     workers: int = 1,
+    scheduler: str | None = None,
+    executor: Executor | None = None,
     compare: bool = True,
 ) -> Synthesis | None:
     """Find gains with a proof that are best in one respect.
@@ -117,7 +120,11 @@ def synthesise(
     seed : int
         Of the random starts; the answer is the same for the same seed, however many workers.
     workers : int
-        Processes.
+        Processes; 1 computes in this one.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler that is used instead.
+    executor : Executor, optional
+        Any other executor of `concurrent.futures` that is used instead.
     compare : bool
         Whether to ask the same question about the gains from the literature.
 
@@ -132,12 +139,15 @@ def synthesise(
         For input out of range, a bound that is missing, or a law whose gains do not scale.
     UnknownNameError
         For an unknown law or objective.
+    SimulationError
+        When the workers cannot be reached, or do not live.
     """
     asked = question(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
     require_count(_MOST_STARTS, starts=starts)
     require_count(MOST_WORKERS, workers=workers)
     first = list(islice(begin_with(asked, seed), starts * _DRAWS))
-    best = _best(asked, _climbed(asked.setting, first, starts, workers))
+    with Here() if handing_back() else crew_or_here(workers, scheduler, executor) as crew:
+        best = _best(asked, _climbed(asked.setting, first, starts, crew))
     mine = _synthesis(asked, *best) if best else None
     return _beside(asked, mine) if compare else mine
 
@@ -180,18 +190,14 @@ def _covers(proved: Loop, wanted: Loop) -> bool:
     )
 
 
-def _climbed(setting: Setting, first: Sequence[Loop], wanted: int, workers: int) -> list[list[State]]:
+def _climbed(setting: Setting, first: Sequence[Loop], wanted: int, crew: Crew) -> list[list[State]]:
     """Climbs from as many starts as wanted, of those that can begin; in the order of the starts."""
-    job = partial(attempt, setting)
     done: list[list[State]] = []
-    if workers == 1 or handing_back():
-        return list(islice((states for states in map(job, first) if states), wanted))
-    with Processes(workers) as crew:
-        for at in range(0, len(first), workers):
-            climbs = dict(crew.answers(job, [(loop,) for loop in first[at : at + workers]]))
-            done += [climbs[place] for place in sorted(climbs) if climbs[place]]
-            if len(done) >= wanted:
-                break
+    for at in range(0, len(first), crew.width):
+        climbs = dict(crew.answers(attempt, [(setting, loop) for loop in first[at : at + crew.width]]))
+        done += [climbs[place] for place in sorted(climbs) if climbs[place]]
+        if len(done) >= wanted:
+            break
     return done[:wanted]
 
 

@@ -1,14 +1,12 @@
 """Deaths and errors of workers: who is charged, and what is kept."""
 
-import sys
 from concurrent.futures import BrokenExecutor, CancelledError, Future
 
 import pytest
 
-from quakedesign.errors import SimulationError
-from quakedesign.simulation.campaign.crews import Given, SerialExecutor
+from quakedesign.executors import Given, SerialExecutor
 from quakedesign.simulation.campaign.dispatch import ATTEMPTS, dispatch
-from quakedesign.workers import Crew, Processes
+from quakedesign.workers import Crew
 
 
 class Frail(Crew):
@@ -110,36 +108,3 @@ def test_an_error_is_tried_again_and_reported(error):
     assert sorted(found) == [0, 1, 3]
     assert tried.count(2) == ATTEMPTS
     assert type(error).__name__ in failed[2]
-
-
-def test_an_executor_of_the_user_is_not_replaced():
-    class Broken(SerialExecutor):
-        def submit(self, task, /, *arguments, **named):
-            raise BrokenExecutor
-
-    with pytest.raises(SimulationError, match="executor must keep its workers"):
-        run(Given(Broken()), abs, 2)
-
-
-@pytest.mark.parametrize("count", [0, -1, 1.5, True])
-def test_a_number_of_workers_that_is_none(count):
-    from quakedesign.errors import ParameterError
-
-    with pytest.raises(ParameterError, match="workers must be a whole number"):
-        Processes(count)
-
-
-def test_a_scheduler_that_does_not_answer(monkeypatch):
-    from quakedesign.simulation.campaign import crews
-
-    monkeypatch.setattr(crews, "_PATIENCE", "100ms")
-    with pytest.raises(SimulationError, match="a scheduler must answer"):
-        crews.Cluster("tcp://127.0.0.1:9")
-
-
-def test_a_scheduler_without_dask_says_how_to_get_it(monkeypatch):
-    from quakedesign.simulation.campaign import crews
-
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(SimulationError, match=r"not installed\. Install it with pip install 'dask\[distributed\]'"):
-        crews.Cluster("tcp://127.0.0.1:9")

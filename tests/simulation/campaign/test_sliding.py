@@ -14,11 +14,11 @@ from quakedesign.certificates.guarantee import Held
 from quakedesign.cli import main
 from quakedesign.controllers import published
 from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.executors import Given
 from quakedesign.fault import load_fault
 from quakedesign.loop import LinearLaw
 from quakedesign.simulation import Actuator, Lag, Load, Measurement, Tide, simulation_scheme
 from quakedesign.simulation.campaign import Campaign, SerialExecutor, campaign_problem, run_campaign, running
-from quakedesign.simulation.campaign.crews import Given
 from quakedesign.simulation.campaign.ledger import Ledger
 from quakedesign.simulation.sliding_conditions import SlidingVariation
 from quakedesign.synthesis.linear.plant.sliding_model import sliding_model
@@ -145,7 +145,7 @@ def test_the_command_samples_what_design_found(tmp_path, monkeypatch, capsys):
         return SimpleNamespace(controller=CONTROLLER, sliding=SimpleNamespace(task=task))
 
     monkeypatch.setattr(synthesis, "design", designed)
-    monkeypatch.setattr(running, "_crew", lambda *_: Given(SerialExecutor()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
     monkeypatch.setattr(Campaign, "plot", lambda _: Figure())
     call = [
         "campaign",
