@@ -160,17 +160,16 @@ def imported_for_types(module: str) -> dict[str, str]:
 
 
 def _require(function: Callable[..., Any], name: str, value: Any) -> None:
-    parameter, test = _wanted(function, name)
-    hint, values = _hint(function, name), [value]
-    if get_origin(hint) is Unpack:
-        return _require_entries(function, get_type_hints(get_args(hint)[0]), value)
-    if parameter.kind is Parameter.VAR_POSITIONAL:
-        values = list(value)
-    elif parameter.kind is Parameter.VAR_KEYWORD:
-        values = list(value.values())
-    for each in values:
-        if each is not parameter.default and not test(each):
-            _refuse(function, name, hint, each)
+    default, test, several = _wanted(function, name)
+    if several is None:
+        if value is not default and not test(value):
+            _refuse(function, name, _hint(function, name), value)
+    elif get_origin(_hint(function, name)) is Unpack:
+        _require_entries(function, get_type_hints(get_args(_hint(function, name))[0]), value)
+    else:
+        for each in value if several is Parameter.VAR_POSITIONAL else value.values():
+            if not test(each):
+                _refuse(function, name, _hint(function, name), each)
 
 
 def _require_entries(function: Callable[..., Any], hints: Mapping[str, Any], given: Mapping[str, Any]) -> None:
@@ -190,8 +189,11 @@ def _refuse(function: Callable[..., Any], name: str, hint: Any, value: Any) -> N
 
 
 @cache
-def _wanted(function: Callable[..., Any], name: str) -> tuple[Parameter, Callable[[Any], bool]]:
-    return _signature(function).parameters[name], _test(_hint(function, name))
+def _wanted(function: Callable[..., Any], name: str) -> tuple[Any, Callable[[Any], bool], Any]:
+    """Default of a parameter, whether a value is of its type, and its kind if it takes several values."""
+    parameter = _signature(function).parameters[name]
+    several = parameter.kind if parameter.kind in _VARIABLE else None
+    return parameter.default, _test(_hint(function, name)), several
 
 
 def matches(value: Any, hint: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
@@ -75,6 +76,14 @@ class Given(Crew):
         )
 
 
+@dataclass
+class _Sent:
+    """A value, and the future of dask.distributed that stands for it on the workers."""
+
+    value: Any
+    place: Any
+
+
 class Cluster(Given):
     """A dask.distributed cluster, whose scheduler replaces dead workers by itself.
 
@@ -86,7 +95,7 @@ class Cluster(Given):
     Raises
     ------
     SimulationError
-        When dask.distributed is not installed or the scheduler cannot be reached.
+        When dask.distributed is not installed, or the scheduler cannot be reached or has no workers.
     """
 
     def __init__(self, address: str) -> None:
@@ -104,7 +113,29 @@ class Cluster(Given):
             raise SimulationError(
                 f"a scheduler must answer at {address!r}. {said}. Start one with 'dask scheduler', or leave it out."
             ) from None
+        try:
+            self._client.wait_for_workers(1, timeout=_PATIENCE)
+        except TimeoutError:
+            self._client.close()
+            raise SimulationError(
+                f"a scheduler must have workers. The one at {address!r} has none. Start one with 'dask worker "
+                f"{address}', or leave the scheduler out."
+            ) from None
         super().__init__(self._client.get_executor(pure=False))
+
+    def shared(self, value: Any) -> Any:
+        """See `Crew.shared`: the workers hand it on among themselves."""
+        return _Sent(value, self._client.scatter(value, broadcast=True, hash=False))
+
+    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """See `Crew.submit`."""
+        return super().submit(task, *(self._there(given) if isinstance(given, _Sent) else given for given in arguments))
+
+    def _there(self, sent: "_Sent") -> Any:
+        """What stands for a value, sent again if all workers that had it are gone."""
+        if sent.place.status not in ("finished", "pending"):
+            sent.place = self._client.scatter(sent.value, broadcast=True, hash=False)
+        return sent.place
 
     @property
     def width(self) -> int:

@@ -44,6 +44,10 @@ class Crew(ABC):
             When that is not possible.
         """
 
+    def shared(self, value: Any) -> Any:
+        """Argument that stands for a value which many tasks take, so that it travels once where it has to travel."""
+        return value
+
     def answers(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
         """Answers to many arguments, each with their place in the sequence, in any order.
 

@@ -27,7 +27,7 @@ def scheduler():
     """Address of a cluster of one worker with two threads."""
     from distributed import LocalCluster
 
-    setting = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
+    setting = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": ":0"}
     with LocalCluster(protocol="tcp", **setting) as cluster:
         yield cluster.scheduler_address
 
@@ -87,6 +87,34 @@ def test_who_is_asked():
         assert isinstance(chosen, Given)
     with pytest.raises(ParameterError, match="give a scheduler or an executor"):
         crew_or_here(1, "tcp://127.0.0.1:9", SerialExecutor())
+
+
+def length(text):
+    return len(text)
+
+
+@pytest.mark.filterwarnings("ignore:Creating scratch directories")
+def test_what_many_tasks_take_is_sent_once_and_again_where_it_is_lost(scheduler):
+    with Cluster(scheduler) as crew:
+        sent = crew.shared("a programme")
+        assert crew.submit(length, sent).result() == len("a programme")
+        first = sent.place
+        crew.submit(length, sent).result()
+        assert sent.place is first
+        first.cancel()  # as when all workers that had it are gone
+        assert crew.submit(length, sent).result() == len("a programme")
+        assert sent.place is not first
+    assert Here().shared("a programme") == "a programme"
+
+
+@pytest.mark.filterwarnings("ignore:Creating scratch directories")
+def test_a_scheduler_without_workers_is_told_what_to_start(monkeypatch):
+    from distributed import LocalCluster
+
+    monkeypatch.setattr(executors, "_PATIENCE", "300ms")
+    with LocalCluster(n_workers=0, processes=False, dashboard_address=":0", protocol="tcp") as cluster:
+        with pytest.raises(SimulationError, match=r"a scheduler must have workers.*Start one with 'dask worker tcp"):
+            Cluster(cluster.scheduler_address)
 
 
 def kills(_place):

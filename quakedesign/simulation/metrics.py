@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 EVENTS = ("diverged", "opening", "reverse_slip", "stick")
@@ -61,7 +61,7 @@ class Metrics:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures by name, as JSON can hold them."""
-        return asdict(self)
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @staticmethod
     def unit(name: str) -> str:

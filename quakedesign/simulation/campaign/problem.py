@@ -119,6 +119,10 @@ class Problem(ABC):
     def start(self, sample: Sample) -> "np.ndarray":
         """Vector of a sample at time zero."""
 
+    def starts(self, samples: Sequence[Sample]) -> "np.ndarray":
+        """Vectors of samples at time zero, one a row."""
+        return np.array([self.start(sample) for sample in samples])
+
     @property
     @abstractmethod
     def program(self) -> Program:

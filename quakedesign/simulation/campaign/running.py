@@ -36,7 +36,7 @@ from quakedesign.workers import Crew
 if TYPE_CHECKING:
     import numpy as np
 
-LARGEST_BATCH = 64
+LARGEST_BATCH = 1024
 BATCHES_PER_WORKER = 8
 ROUNDS = 12
 
@@ -190,6 +190,10 @@ def run_campaign(
     )
 
 
+def _ends(program: Program, starts: "np.ndarray", steps: int) -> "np.ndarray":
+    return program.ends(starts, steps)
+
+
 class _Runner:
     """Results of samples, from the ledger or from the crew."""
 
@@ -197,6 +201,7 @@ class _Runner:
         self, problem: Problem, ledger: Ledger, program: Program, crew: Crew, batch: int | None, tell: Tell
     ) -> None:
         self._problem, self._ledger, self._program, self._crew = problem, ledger, program, crew
+        self._sent = crew.shared(program)
         self._batch, self._tell = batch, tell
         self._known = ledger.read()
         self._filed, self._used = frozenset(self._known), set[bytes]()
@@ -209,7 +214,7 @@ class _Runner:
 
     def results(self, samples: Sequence[Sample], names: Sequence[str], what: str) -> list[SampleResult | None]:
         """Result of every sample, None where its batch failed."""
-        starts = [self._problem.start(sample) for sample in samples]
+        starts = self._problem.starts(samples)
         missing = [i for i, start in enumerate(starts) if start.tobytes() not in self._known]
         self._used.update(start.tobytes() for start in starts)
         self._compute([starts[i] for i in missing], [names[i] for i in missing], what, len(starts))
@@ -231,8 +236,8 @@ class _Runner:
             self._tell(what, done / total)
 
         steps = self._problem.setting.steps
-        tasks = {first: (rows, steps) for first, rows in batches.items()}
-        for first, reason in sorted(dispatch(self._program.ends, tasks, self._crew, keep).items()):
+        tasks = {first: (self._sent, rows, steps) for first, rows in batches.items()}
+        for first, reason in sorted(dispatch(_ends, tasks, self._crew, keep).items()):
             self.failures.append(Failure(samples=tuple(names[first : first + size]), reason=reason))
 
     def _batch_size(self, count: int) -> int:

@@ -11,6 +11,8 @@ from scipy.linalg import expm
 from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Load, Variation, simulate
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
@@ -87,3 +89,14 @@ def test_what_a_campaign_cannot_do_is_refused():
         campaign_problem(LAB, LAW, seed=-1)
     with pytest.raises(ParameterError, match="plant must be one of"):
         campaign_problem(LAB, LAW, plant="none").sample(0) and campaign_problem(LAB, LAW, plant="none").program
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6])
+def test_many_starts_at_once_are_those_of_each(noise):
+    scheme = simulation_scheme("explicit", measurement=Measurement(slip_noise=noise))
+    problem = campaign_problem(LAB, LAW, scheme=scheme, initial_slip=1e-4, initial_slip_rate=1e-3, plant="coulomb")
+    samples = [problem.sample(i) for i in range(5)]
+    assert np.array_equal(problem.starts(samples), [problem.start(sample) for sample in samples])
+    assert len({start.tobytes() for start in problem.starts(samples)}) == 5
+    seeds = [replace(samples[0], noise_seed=seed) for seed in range(3)]
+    assert len({start.tobytes() for start in problem.starts(seeds)}) == (3 if noise else 1)

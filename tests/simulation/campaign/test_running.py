@@ -66,7 +66,7 @@ def test_processes_have_the_same_digits_and_a_death_loses_nothing(serial, tmp_pa
 def test_dask_has_the_same_digits(serial, tmp_path):
     from distributed import LocalCluster
 
-    setting = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
+    setting = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": ":0"}
     with LocalCluster(protocol="tcp", **setting) as cluster:
         found = run_campaign(PROBLEM, COUNT, tmp_path, scheduler=cluster.scheduler_address, batch=5, **SEARCH)
     assert answer(found) == answer(serial[0])
