@@ -15,7 +15,7 @@ from quakedesign.errors import CertificateError, WorkError
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.attraction_files import read as read_attraction
 from quakedesign.sos.exact.attraction_words import claim_words
-from quakedesign.sos.exact.files import read as read_polynomial_file
+from quakedesign.sos.exact.polynomial_files import read as read_polynomial_file
 from quakedesign.sos.exact.words import sentences
 from quakedesign.symbolic.terms import written
 

@@ -53,7 +53,7 @@ def sos(
         File for the proof (proofs/FORMAT.md).
     """
     from quakedesign.sos import prove, read_gram
-    from quakedesign.sos.exact.files import plain_proof
+    from quakedesign.sos.exact.polynomial_files import plain_proof
     from quakedesign.sos.exact.words import sentences
 
     new_file(out, "proof file", force=force)

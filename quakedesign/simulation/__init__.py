@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from quakedesign.loop.sensing.measurement import Measurement as Measurement
     from quakedesign.simulation.actuated_trajectory import SampledTrajectory as SampledTrajectory
     from quakedesign.simulation.c_source import ControllerStep as ControllerStep
-    from quakedesign.simulation.earthquake import natural_earthquake as natural_earthquake
     from quakedesign.simulation.energy import EnergyBudget as EnergyBudget
     from quakedesign.simulation.export import controller_step as controller_step
     from quakedesign.simulation.export import export_controller as export_controller
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
     from quakedesign.simulation.linear_models import loop_transfer as loop_transfer
     from quakedesign.simulation.linear_models import to_statespace as to_statespace
     from quakedesign.simulation.loading import Load as Load
+    from quakedesign.simulation.memoryless_earthquake import natural_earthquake as natural_earthquake
     from quakedesign.simulation.metrics import ActuatorMetrics as ActuatorMetrics
     from quakedesign.simulation.metrics import Metrics as Metrics
     from quakedesign.simulation.metrics import StickMetrics as StickMetrics

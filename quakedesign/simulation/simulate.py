@@ -12,9 +12,9 @@ from quakedesign.fault.checks import require_nonnegative
 from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, own_way
 from quakedesign.loop.sensing import Sensor
-from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator
 from quakedesign.simulation.loading import Load
+from quakedesign.simulation.memoryless_earthquake import natural_peak
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import loop_class, run, run_adaptive, sampled_scheme

@@ -1,7 +1,9 @@
 """What a fault with a state did without control: nucleation, event and arrest, and how often."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -50,6 +52,17 @@ def slip_events(fault: Fault, run: StateTrajectory, loading_rate: float) -> tupl
         _event(fault, run, loading_rate, float(onset), end, float(slips[i]) if i < len(slips) else None)
         for i, (onset, end) in enumerate(zip(run.onsets, ends, strict=True))
     )
+
+
+def last_cycle(events: Sequence[SlipEvent]) -> dict[str, float | None]:
+    """Recurrence interval [s], slip [m] and magnitude of the last one that is complete; None for none."""
+    intervals = [later.onset - event.onset for event, later in pairwise(events)]
+    whole = [event for event in events if event.arrest is not None]
+    return {
+        "recurrence_interval": intervals[-1] if intervals else None,
+        "slip": whole[-1].slip if whole else None,
+        "magnitude": whole[-1].magnitude if whole else None,
+    }
 
 
 def _event(

@@ -19,7 +19,7 @@ from quakedesign.certificates.slow_sliding.push import SlidingPush
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
-from quakedesign.simulation.earthquake import natural_peak
+from quakedesign.simulation.memoryless_earthquake import natural_peak
 from quakedesign.synthesis.guaranteed import design_held, longest_delay, reached
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer, answer_sliding
 from quakedesign.synthesis.linear.plant.sliding_model import near_path, sliding_model

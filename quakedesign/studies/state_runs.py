@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
 from time import perf_counter
 from typing import Any
 
@@ -19,7 +18,7 @@ from quakedesign.simulation import PressureCourse, StateTrajectory, simulate_sta
 from quakedesign.simulation.metrics import Metrics
 from quakedesign.simulation.outcome import Outcome
 from quakedesign.simulation.sliding_conditions import TIDE, Tide
-from quakedesign.simulation.slip_events import SlipEvent, cycle_outcome, dynamic_rate, slip_events
+from quakedesign.simulation.slip_events import SlipEvent, cycle_outcome, dynamic_rate, last_cycle, slip_events
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
 from quakedesign.simulation.starting_state import StartingState, cycles, disturbed, late_in_cycle, locked, sliding
 from quakedesign.symbolic import derive
@@ -80,13 +79,7 @@ class StateRun:
     @property
     def cycle(self) -> dict[str, float | None]:
         """Recurrence interval [s], slip [m] and magnitude of the last one that is complete; None for none."""
-        intervals = [later.onset - event.onset for event, later in pairwise(self.slip_events)]
-        whole = [event for event in self.slip_events if event.arrest is not None]
-        return {
-            "recurrence_interval": intervals[-1] if intervals else None,
-            "slip": whole[-1].slip if whole else None,
-            "magnitude": whole[-1].magnitude if whole else None,
-        }
+        return last_cycle(self.slip_events)
 
     @property
     def natural_peak(self) -> float | None:

@@ -86,7 +86,7 @@ def test_a_root_outside_its_range_is_refused():
 
 def test_decay_bounds_the_settling_time():
     from quakedesign.synthesis.lyapunov.balancing import balance
-    from quakedesign.synthesis.lyapunov.certify_exactly import with_largest_decay
+    from quakedesign.synthesis.lyapunov.claimed_rates import with_largest_decay
 
     certificate = qd.certify("cta", GAINS, lipschitz=1)[1]
     faster = with_largest_decay(certificate, balance(certificate.loop))

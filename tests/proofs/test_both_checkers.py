@@ -8,8 +8,9 @@ import pytest
 
 from quakedesign.certificates import checking, parse_certificate, term_files
 from quakedesign.errors import CertificateError
-from quakedesign.sos.exact import files, reduction, strict, work
-from quakedesign.sos.exact.files import load
+from quakedesign.sos.exact import polynomial_files as files
+from quakedesign.sos.exact import reduction, strict, work
+from quakedesign.sos.exact.polynomial_files import load
 from quakedesign.sos.exact.proofs import SumOfSquares, holds
 
 

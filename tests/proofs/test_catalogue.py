@@ -16,7 +16,7 @@ from quakedesign.certificates.guarantee.files import guarantee_text, parse_guara
 from quakedesign.certificates.slow_sliding import sliding_task
 from quakedesign.controllers import family, law
 from quakedesign.fault import load_fault
-from quakedesign.sos.exact import files as polynomial_files
+from quakedesign.sos.exact import polynomial_files
 from quakedesign.synthesis.guaranteed import design_compensated, design_held, tightened
 
 ROOT = Path(__file__).parents[2] / "proofs"

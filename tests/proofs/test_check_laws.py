@@ -12,7 +12,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import certificate_text, load_certificate
 from quakedesign.synthesis.lyapunov.balancing import balance
-from quakedesign.synthesis.lyapunov.certify_exactly import with_largest_decay
+from quakedesign.synthesis.lyapunov.claimed_rates import with_largest_decay
 
 PATH = Path(__file__).parents[2] / "proofs" / "check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("laws_check", PATH)

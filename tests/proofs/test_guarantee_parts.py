@@ -18,12 +18,12 @@ from quakedesign.certificates.guarantee import (
     Guarantee,
     Held,
     Task,
-    theorem,
+    small_gain,
 )
 from quakedesign.certificates.guarantee import task as package_task
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.guarantee.small_gain import bounds_from, certified_bounds, channels_of
 from quakedesign.certificates.guarantee.task import Friction
-from quakedesign.certificates.guarantee.theorem import bounds_from, certified_bounds, channels_of
 from quakedesign.errors import ParameterError
 from quakedesign.loop import (
     NOISES,
@@ -300,7 +300,7 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, asked, monkey
         monkeypatch.setattr(
             checker, "gains", lambda _l, _e, sudden, queue=answers: entered.append(sudden) or next(queue)
         )
-        monkeypatch.setattr(theorem, "norms" if held else "flow_norms", lambda _, known=table: known)
+        monkeypatch.setattr(small_gain, "norms" if held else "flow_norms", lambda _, known=table: known)
         given = checker.Root([], list(root.slopes), root.remainder) if root else None
         off = tuple(noise.get(name, F(0)) for name in NOISES)
         loop = checker.Loop([], events, [[]] * len(seen), [[] for _ in names], given, step, off, asked=bool(asked))

@@ -17,7 +17,7 @@ from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, SlowGain, guarantee, statement, task_of
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
 from quakedesign.certificates.guarantee.slow_gain import grown, slow_gains
-from quakedesign.certificates.guarantee.theorem import Bounds
+from quakedesign.certificates.guarantee.small_gain import Bounds
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop import Model, Prediction, disturbance_estimate

@@ -12,7 +12,7 @@ from quakedesign.fault import Disturbance, load_fault
 from quakedesign.simulation import Outcome, OutcomeCriterion, natural_earthquake, simulate
 from quakedesign.simulation.campaign import SampleResult, campaign_problem
 from quakedesign.simulation.campaign.result import Campaign
-from quakedesign.simulation.earthquake import _peak, natural_peak
+from quakedesign.simulation.memoryless_earthquake import _peak, natural_peak
 from quakedesign.simulation.outcome import KINDS
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")

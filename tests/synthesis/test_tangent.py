@@ -10,8 +10,8 @@ from quakedesign.certificates.obligations import Obligations
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.synthesis.analysis.certify import closed_loop
 from quakedesign.synthesis.gains.linearised_program import neighbourhood
+from quakedesign.synthesis.gains.pace import fastest, on_box, pace_of, rounded
 from quakedesign.synthesis.gains.path_following import short, with_gains
-from quakedesign.synthesis.lyapunov.decay_rate import fastest, on_box, pace_of, rounded
 from quakedesign.synthesis.lyapunov.search import find_certificate
 
 

@@ -10,13 +10,13 @@ if TYPE_CHECKING:
     from quakedesign.certificates.guarantee.fault_data import task_of as task_of
     from quakedesign.certificates.guarantee.files import read_guarantee as read_guarantee
     from quakedesign.certificates.guarantee.slow_gain import SlowGain as SlowGain
+    from quakedesign.certificates.guarantee.small_gain import Bounds as Bounds
+    from quakedesign.certificates.guarantee.small_gain import NoGuarantee as NoGuarantee
+    from quakedesign.certificates.guarantee.small_gain import certified_bounds as certified_bounds
     from quakedesign.certificates.guarantee.statement import Claims as Claims
     from quakedesign.certificates.guarantee.statement import Guarantee as Guarantee
     from quakedesign.certificates.guarantee.statement import Held as Held
     from quakedesign.certificates.guarantee.statement import guarantee as guarantee
     from quakedesign.certificates.guarantee.task import Task as Task
-    from quakedesign.certificates.guarantee.theorem import Bounds as Bounds
-    from quakedesign.certificates.guarantee.theorem import NoGuarantee as NoGuarantee
-    from quakedesign.certificates.guarantee.theorem import certified_bounds as certified_bounds
 
 face(__name__)

@@ -15,9 +15,9 @@ from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held
 from quakedesign.certificates.guarantee.task import Friction, Task
 from quakedesign.certificates.kinds import GUARANTEE, SLOW_SLIDING, kind_of
 from quakedesign.certificates.slow_sliding.cells import MOST_CELLS, Cuts, cells
+from quakedesign.certificates.slow_sliding.small_gain import SlidingClaims, loop_of, model_of
 from quakedesign.certificates.slow_sliding.statement import SlidingGuarantee
 from quakedesign.certificates.slow_sliding.task import AXES, SlidingTask
-from quakedesign.certificates.slow_sliding.theorem import SlidingClaims, loop_of, model_of
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.loop import ContinuousLaw, ImplicitRoot, LinearLaw, Power
 from quakedesign.loop.implicit_root import MOST_TERMS

@@ -6,8 +6,8 @@ from fractions import Fraction
 from itertools import chain
 
 from quakedesign.certificates.guarantee.norms import norms
+from quakedesign.certificates.guarantee.small_gain import Gains, GainSpread
 from quakedesign.certificates.guarantee.task import Task
-from quakedesign.certificates.guarantee.theorem import Gains, GainSpread
 from quakedesign.errors import ParameterError
 from quakedesign.loop import Model, PeriodicLoop
 

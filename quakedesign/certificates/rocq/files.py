@@ -18,8 +18,8 @@ from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.output import write_whole
 from quakedesign.sos.exact.attraction import LyapunovProof
 from quakedesign.sos.exact.attraction_files import read as read_attraction_file
-from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.polynomial import evaluate
+from quakedesign.sos.exact.polynomial_files import read as read_polynomial_file
 from quakedesign.sos.exact.proofs import Point, SumOfSquares
 from quakedesign.sos.exact.statement import Statement
 

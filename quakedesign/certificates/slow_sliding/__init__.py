@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from quakedesign.certificates.slow_sliding.cells import cells as cells
     from quakedesign.certificates.slow_sliding.cells import parts as parts
     from quakedesign.certificates.slow_sliding.fault_data import sliding_task as sliding_task
+    from quakedesign.certificates.slow_sliding.small_gain import SlidingClaims as SlidingClaims
+    from quakedesign.certificates.slow_sliding.small_gain import cell_bounds as cell_bounds
     from quakedesign.certificates.slow_sliding.statement import SlidingGuarantee as SlidingGuarantee
     from quakedesign.certificates.slow_sliding.task import SlidingTask as SlidingTask
-    from quakedesign.certificates.slow_sliding.theorem import SlidingClaims as SlidingClaims
-    from quakedesign.certificates.slow_sliding.theorem import cell_bounds as cell_bounds
 
 face(__name__)

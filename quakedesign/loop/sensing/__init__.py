@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.sensing.joint_choice import JointCondition as JointCondition
     from quakedesign.loop.sensing.joint_choice import joint_condition as joint_condition
     from quakedesign.loop.sensing.joint_choice import smallest_bound as smallest_bound
-    from quakedesign.loop.sensing.noise import Transducer as Transducer
     from quakedesign.loop.sensing.output_feedback import OutputFeedback as OutputFeedback
+    from quakedesign.loop.sensing.transducer import Transducer as Transducer
 
 face(__name__)

@@ -8,7 +8,7 @@ from typing import Any
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop.sensing.coefficients import LONGEST, TABLES
-from quakedesign.loop.sensing.discretisation import explicit_step, implicit_step, lag_free
+from quakedesign.loop.sensing.differentiator_step import explicit_step, implicit_step, lag_free
 
 DISCRETISATIONS = ("euler", "homogeneous", "implicit")
 
@@ -20,7 +20,7 @@ class Differentiator:
     With a reading off by ε at most, sampled every T, the estimate of derivative i is off by a multiple of
     λ_d·δ^(n_d+1−i), δ = max(T, (ε/λ_d)^(1/(n_d+1))); ``euler`` has this for n_d = 1 only. Levant and Livne (2020),
     European Journal of Control 55, 33. The paper takes n_d = n_f = 2, for which a sliding mode has no λ_d; n_d = 1 has
-    (ERRATA 21). See `quakedesign.loop.sensing.discretisation` for the equations.
+    (ERRATA 21). See `quakedesign.loop.sensing.differentiator_step` for the equations.
 
     Attributes
     ----------

@@ -15,9 +15,9 @@ from quakedesign.simulation.campaign.problem import NOT_COMPARED, Problem, Sampl
 from quakedesign.simulation.campaign.program import CompiledProgram
 from quakedesign.simulation.campaign.reseeding import reseeded
 from quakedesign.simulation.campaign.space import Sample
-from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.integrators import Integrator
 from quakedesign.simulation.loading import Load
+from quakedesign.simulation.memoryless_earthquake import natural_peak
 from quakedesign.simulation.metrics import events, metrics
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder

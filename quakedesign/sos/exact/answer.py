@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
-from quakedesign.sos.exact.files import save
+from quakedesign.sos.exact.polynomial_files import save
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares, holds
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.exact.work import limited

@@ -7,8 +7,8 @@ from typing import Any
 
 from quakedesign.errors import CertificateError, PolynomialError
 from quakedesign.sos.exact.attraction import Attraction, LyapunovProof
-from quakedesign.sos.exact.files import TERMS, plain_proof, read_proof, variables
 from quakedesign.sos.exact.polynomial import constant
+from quakedesign.sos.exact.polynomial_files import TERMS, plain_proof, read_proof, variables
 from quakedesign.sos.exact.proofs import Point
 from quakedesign.sos.exact.strict import (
     headed,

@@ -15,7 +15,7 @@ from quakedesign.symbolic.balls import enclose
 from quakedesign.symbolic.term_expressions import from_terms
 from quakedesign.synthesis.analysis.certify import Number, closed_loop
 from quakedesign.synthesis.lyapunov.balancing import balance
-from quakedesign.synthesis.lyapunov.certify_exactly import with_largest_decay
+from quakedesign.synthesis.lyapunov.claimed_rates import with_largest_decay
 from quakedesign.synthesis.lyapunov.search import candidate_degrees, find_certificate
 
 _BASE = sp.Symbol("V", positive=True)

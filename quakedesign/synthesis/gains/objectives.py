@@ -13,11 +13,12 @@ from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.synthesis.analysis.margins import largest_gain_range
 from quakedesign.synthesis.analysis.settling_time import fastest_settling
 from quakedesign.synthesis.gains.dilation import scaled_norm
+from quakedesign.synthesis.gains.pace import box, degrees_of, fastest, least_margins, on_box, rounded
 from quakedesign.synthesis.gains.path_following import look
 from quakedesign.synthesis.gains.setting import FAINT, Objective, Setting, State
 from quakedesign.synthesis.lyapunov.balancing import balance, below
-from quakedesign.synthesis.lyapunov.certify_exactly import GIVE_AWAY, bounds_of, finish, with_largest_decay
-from quakedesign.synthesis.lyapunov.decay_rate import box, degrees_of, fastest, least_margins, on_box, rounded
+from quakedesign.synthesis.lyapunov.certify_exactly import finish
+from quakedesign.synthesis.lyapunov.claimed_rates import GIVE_AWAY, bounds_of, with_largest_decay
 
 _HALVINGS = 8
 _BITS = (16, 24, 34)

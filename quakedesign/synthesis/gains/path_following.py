@@ -18,9 +18,9 @@ from quakedesign.sos.solve.joint import Limits
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.gains.dilation import scaled_norm
 from quakedesign.synthesis.gains.linearised_program import Neighbourhood, neighbourhood
+from quakedesign.synthesis.gains.pace import box, on_box, pace_of
 from quakedesign.synthesis.gains.setting import Setting, State
 from quakedesign.synthesis.lyapunov.balancing import balance
-from quakedesign.synthesis.lyapunov.decay_rate import box, on_box, pace_of
 
 _ROUNDS = 100  # programmes of steps to solve at most
 

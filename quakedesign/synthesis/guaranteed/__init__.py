@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from quakedesign.synthesis.guaranteed.design import OBJECTIVES as OBJECTIVES
     from quakedesign.synthesis.guaranteed.design import design_held as design_held
     from quakedesign.synthesis.guaranteed.families import MEASURED as MEASURED
-    from quakedesign.synthesis.guaranteed.reach import longest_delay as longest_delay
-    from quakedesign.synthesis.guaranteed.reach import reached as reached
+    from quakedesign.synthesis.guaranteed.longest_times import longest_delay as longest_delay
+    from quakedesign.synthesis.guaranteed.longest_times import reached as reached
     from quakedesign.synthesis.guaranteed.sliding import guarantee_of as guarantee_of
     from quakedesign.synthesis.guaranteed.slowly import best_guarantee as best_guarantee
     from quakedesign.synthesis.guaranteed.slowly import tightened as tightened

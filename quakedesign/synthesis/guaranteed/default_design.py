@@ -11,7 +11,7 @@ from quakedesign.controllers import SlidingMode
 from quakedesign.synthesis.guaranteed.compensated import WEIGHTS, Compensation, design_compensated
 from quakedesign.synthesis.guaranteed.design import design_held
 from quakedesign.synthesis.guaranteed.families import MEASURED
-from quakedesign.synthesis.guaranteed.reach import (
+from quakedesign.synthesis.guaranteed.longest_times import (
     design_at,
     longest_delay,
     longest_step,

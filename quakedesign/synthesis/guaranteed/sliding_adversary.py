@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from quakedesign.cache import search_once
 from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask
-from quakedesign.certificates.slow_sliding.theorem import loop_of, model_of
+from quakedesign.certificates.slow_sliding.small_gain import loop_of, model_of
 from quakedesign.loop import PeriodicLoop
 
 _PIECES = 4  # of a part of the period

@@ -15,7 +15,7 @@ from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.slow_sliding import SlidingClaims, SlidingGuarantee, SlidingTask
 from quakedesign.certificates.slow_sliding.cells import MOST_CELLS, Cuts, parts
-from quakedesign.certificates.slow_sliding.theorem import (
+from quakedesign.certificates.slow_sliding.small_gain import (
     after_a_step,
     bounds_from,
     cell_bounds,

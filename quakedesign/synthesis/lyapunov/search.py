@@ -16,7 +16,8 @@ from quakedesign.sos.solve.joint import Demand, Proposal, joint_program
 from quakedesign.symbolic.candidates import signed_monomials
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov.balancing import balance, below, exponents_of, lifted_scale, normal, scaled
-from quakedesign.synthesis.lyapunov.certify_exactly import bounds_of, claims_of, finish
+from quakedesign.synthesis.lyapunov.certify_exactly import finish
+from quakedesign.synthesis.lyapunov.claimed_rates import bounds_of, claims_of
 from quakedesign.synthesis.lyapunov.kept import kept
 
 _WORTH_A_PROOF = 1e-9

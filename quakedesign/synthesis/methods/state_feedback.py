@@ -30,7 +30,7 @@ from quakedesign.synthesis.guaranteed import (
     design_held,
     sampled_design,
 )
-from quakedesign.synthesis.guaranteed.reach import design_at, longest_step
+from quakedesign.synthesis.guaranteed.longest_times import design_at, longest_step
 from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
 from quakedesign.synthesis.linear.analysis.robust_stability import why_undecided
@@ -39,7 +39,8 @@ from quakedesign.synthesis.linear.plant.problem import FeedbackLoop, LinearProbl
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix
 from quakedesign.synthesis.linear.plant.sliding_model import near_path, sliding_model
 from quakedesign.synthesis.linear.sampled.held import HeldLoop, held_loop
-from quakedesign.synthesis.lyapunov.certify_exactly import claims_of, finish
+from quakedesign.synthesis.lyapunov.certify_exactly import finish
+from quakedesign.synthesis.lyapunov.claimed_rates import claims_of
 from quakedesign.synthesis.lyapunov.quadratic import quadratic_margin
 from quakedesign.synthesis.lyapunov.search import find_certificate
 from quakedesign.synthesis.methods.base import Designed, Method, Problem, Wanted

@@ -11,7 +11,7 @@ from standalone_guarantee import checker
 
 from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.certificates.guarantee.norms import norms
-from quakedesign.certificates.guarantee.theorem import bounds_from
+from quakedesign.certificates.guarantee.small_gain import bounds_from
 from quakedesign.loop import Fading, PeriodicLoop, Segment
 
 PROOFS = Path(__file__).parents[3] / "proofs"

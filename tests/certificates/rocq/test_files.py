@@ -19,8 +19,8 @@ from quakedesign.certificates.rocq.files import library, module_name, statement_
 from quakedesign.certificates.rocq.integers import in_integers
 from quakedesign.cli import main
 from quakedesign.errors import OutputError, UnsupportedError
-from quakedesign.sos.exact.files import read
 from quakedesign.sos.exact.polynomial import evaluate
+from quakedesign.sos.exact.polynomial_files import read
 from quakedesign.sos.exact.squares import as_polynomial
 
 CERTIFICATES = Path(__file__).parents[3] / "proofs" / "certificates"

@@ -24,7 +24,7 @@ from quakedesign.certificates.slow_sliding import (
     cell_bounds,
     cells,
     sliding_task,
-    theorem,
+    small_gain,
 )
 from quakedesign.errors import CertificateError, ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
@@ -78,7 +78,7 @@ def claims(log_rate="1/2", log_state="1/18", slip_error="4e-5", push=380000, ask
 CLAIM = SlidingGuarantee(task=task(), held=LAGGED, cuts=(None,), claims=claims())
 
 
-@pytest.mark.parametrize("chords", [theorem.chords, standalone.sector], ids=["package", "standalone"])
+@pytest.mark.parametrize("chords", [small_gain.chords, standalone.sector], ids=["package", "standalone"])
 @pytest.mark.parametrize("size", ["1/1000", "1/2", "1", "3"])
 def test_sectors_hold_the_exponentials_and_no_more(size, chords):
     low, high = chords(F(size))
@@ -88,7 +88,7 @@ def test_sectors_hold_the_exponentials_and_no_more(size, chords):
     assert high - low == pytest.approx(((exact - 1) - (1 - 1 / exact)) / x, rel=1e-11)
 
 
-@pytest.mark.parametrize("exponential", [theorem.exponential, standalone.power_of_e], ids=["package", "standalone"])
+@pytest.mark.parametrize("exponential", [small_gain.exponential, standalone.power_of_e], ids=["package", "standalone"])
 def test_the_exponential_is_above_by_less_than_its_remainder(exponential):
     for x in (F(1, 1000), F(1), F(3)):
         exact = sum((x**k / math.factorial(k) for k in range(60)), F(0))
@@ -189,18 +189,18 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction):
     """Flow, inputs, outputs, what bounds the inputs and what may move after a step; with a rock that damps much."""
     one = task(ranges=UNSURE, ramp=F(14), damping=F(5 * 10**20), **friction)
     held = Held(law=STIFF, step=F(200), **path)
-    cell, model = alone(one, held), theorem.model_of(one, claims())
+    cell, model = alone(one, held), small_gain.model_of(one, claims())
     plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, task=one, held=held)))["loop"])
-    theirs, ours = standalone.around(plain, cell), theorem.loop_of(held, model, one)
+    theirs, ours = standalone.around(plain, cell), small_gain.loop_of(held, model, one)
     assert [list(row) for row in ours.flow] == theirs.flow
     assert [list(row) for row in ours.inputs.values()] == theirs.inputs[: len(ours.inputs)]
     assert [list(ours.outputs[name]) for name, _ in zip(OUTPUTS, theirs.outputs, strict=False)] == theirs.outputs
     assert [list(fading.entry) for fading in ours.fading.values()] == theirs.inputs[4 + bool(held.slip_noise) :]
-    channels, (own, shares) = theorem.channels_of(one, held, claims(), ours), standalone.shares_of(theirs, cell)
+    channels, (own, shares) = small_gain.channels_of(one, held, claims(), ours), standalone.shares_of(theirs, cell)
     assert [channel.own for channel in channels] == own
     assert [[c.shares.get(name, 0) for name in OUTPUTS[: len(theirs.outputs)]] for c in channels] == shares
-    assert list(theorem.after_a_step(ours)) == standalone.since_step(theirs)
-    moved = theorem._moved(one, held, claims(), model, F(3))
+    assert list(small_gain.after_a_step(ours)) == standalone.since_step(theirs)
+    moved = small_gain._moved(one, held, claims(), model, F(3))
     assert [moved[name] for name in OUTPUTS[:3]] == cell.soon(F(3))
 
 
@@ -209,8 +209,8 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction):
 def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
     """Exactly, of gains that are made up: what adds at once, what a step does, small gain and bounds."""
     one, held = task(ranges=UNSURE, ramp=F(14), **friction), Held(law=STIFF, step=F(200), **path)
-    ours = theorem.loop_of(held, theorem.model_of(one, claims()), one)
-    phases, names = theorem.after_a_step(ours), (*ours.inputs, *held.noise, *ours.fading)
+    ours = small_gain.loop_of(held, small_gain.model_of(one, claims()), one)
+    phases, names = small_gain.after_a_step(ours), (*ours.inputs, *held.noise, *ours.fading)
 
     def gain(output, name, j):
         return F(1 + (7 * OUTPUTS.index(output) + 3 * names.index(name) + 5 * j) % 11, 10**9)
@@ -226,7 +226,7 @@ def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
     monkeypatch.setattr(standalone, "gains", gains)
     plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, held=held)))["loop"])
     theirs, small = standalone.bounds(plain, alone(one, held))
-    found = theorem.bounds_from(one, held, claims(), ours, made_up, phases)
+    found = small_gain.bounds_from(one, held, claims(), ours, made_up, phases)
     assert {name: found[name] for name in theirs} == theirs
     assert small <= found["small_gain"] <= small * (1 + F(1, 10**5))
     assert asked == [(name, name in held.noise, name in ours.fading) for name in names]
@@ -235,9 +235,9 @@ def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
 def test_what_adds_at_once_and_after_a_step_is_that_of_the_format():
     """Through rock, with gains of 0: y, g and f have what the stress and a step add, that of the last part at first."""
     one, held = task(ranges=UNSURE), Held(law=STIFF, step=F(200), diffusion=F(40))
-    model = theorem.model_of(one, claims())
-    loop = theorem.loop_of(held, model, one)
-    phases, late, fading = theorem.after_a_step(loop), theorem.settled(loop), loop.fading["left_out"]
+    model = small_gain.model_of(one, claims())
+    loop = small_gain.loop_of(held, model, one)
+    phases, late, fading = small_gain.after_a_step(loop), small_gain.settled(loop), loop.fading["left_out"]
     weights = [
         float(fading.height) / sum((float(fading.rate * t)) ** k / math.factorial(k) for k in range(5))
         + float(fading.floor)
@@ -246,7 +246,7 @@ def test_what_adds_at_once_and_after_a_step_is_that_of_the_format():
     assert late == next(t for t, w in zip(phases, weights, strict=True) if w <= 1 / 16)
     assert 0 < phases.index(late) < len(phases) - 1
     still = {(y, n): (F(0),) * len(phases) for y in loop.outputs for n in (*loop.inputs, "left_out")}
-    found = theorem._once_settled(theorem._with_what_adds_at_once(loop, model, still, phases), phases, late)
+    found = small_gain._once_settled(small_gain._with_what_adds_at_once(loop, model, still, phases), phases, late)
     for output, share in (("log_rate", 1), ("ageing", model.slope), ("strength", model.direct)):
         stress = float(share / model.strength)
         assert [float(v) for v in found[output, "stress"]] == pytest.approx([stress] * len(phases))
@@ -261,8 +261,8 @@ def test_what_the_loop_leaves_out_of_the_equations_stays_below_its_shares():
     The shares are no larger than it takes: at some corner each input is near its bound.
     """
     one, given = task(ranges=UNSURE, damping=F(5 * 10**20)), claims("1/2", "1/5")
-    held, model = Held(law=STIFF, step=F(200), lag=F(10)), theorem.model_of(one, given)
-    channels = {c.name: c for c in theorem.channels_of(one, held, given, theorem.loop_of(held, model, one))}
+    held, model = Held(law=STIFF, step=F(200), lag=F(10)), small_gain.model_of(one, given)
+    channels = {c.name: c for c in small_gain.channels_of(one, held, given, small_gain.loop_of(held, model, one))}
     strength, slope, bent, fast = map(float, (model.strength, model.slope, model.state_slope, model.state_rate))
     rate, x = float(RATE), 2e-5
     worst = dict.fromkeys(("stress", "rate", "state"), 0.0)
@@ -284,9 +284,9 @@ def test_what_the_loop_leaves_out_of_the_equations_stays_below_its_shares():
 def test_what_the_loop_leaves_out_of_the_slip_law_stays_below_its_share():
     """Ruina's law typed in again, at the corners; where the slip evolves fastest or slowest the share is reached."""
     one, given = task(ranges=UNSURE, state_law="slip"), claims("1/2", "1/5")
-    held, model = Held(law=STIFF, step=F(200), lag=F(10)), theorem.model_of(one, given)
-    loop = theorem.loop_of(held, model, one)
-    channels = {c.name: c for c in theorem.channels_of(one, held, given, loop)}
+    held, model = Held(law=STIFF, step=F(200), lag=F(10)), small_gain.model_of(one, given)
+    loop = small_gain.loop_of(held, model, one)
+    channels = {c.name: c for c in small_gain.channels_of(one, held, given, loop)}
     assert set(channels["state"].shares) == {"ageing"}
     assert loop.inputs["rate"][:2] == (model.rate, 0)
     slope, evolving, fast = map(float, (model.slope, model.evolution_slope, model.state_rate))
@@ -313,7 +313,7 @@ def test_the_state_of_the_slip_law_moves_at_most_as_fast_as_the_slip():
     given, slipping = claims("1/2", "1/18"), task(ranges=UNSURE, state_law="slip")
     fastest = 1.2e-6 / 0.8e-3 * math.exp(0.5) * (0.5 + 1 / 18)
     found = alone(slipping, given=given).fastest_state()
-    assert theorem._fastest_state(slipping, given) == found
+    assert small_gain._fastest_state(slipping, given) == found
     assert float(found) == pytest.approx(fastest, rel=1e-9)
 
 
@@ -324,7 +324,7 @@ def test_regularised_friction_differs_from_its_logarithm_by_no_more_than_is_adde
     ranges = {**UNSURE, "direct_effect": (F(a), F(a)), "evolution_effect": (b, b), "coefficient": (F(mu), F(mu))}
     one, given = task(ranges=ranges, regularised=True), claims("1/2", "1/5")
     held = Held(law=STIFF, step=F(200), lag=F(10))
-    added = theorem.regularisation(one, given)
+    added = small_gain.regularisation(one, given)
     assert alone(one, held, given).stress() - alone(replace(one, regularised=False), held, given).stress() == added
     mpmath.mp.dps = 150
     a, b, mu, y, z = (mpmath.mpf(v.numerator) / v.denominator for v in (F(a), b, F(mu), y, z))
@@ -335,7 +335,7 @@ def test_regularised_friction_differs_from_its_logarithm_by_no_more_than_is_adde
     largest = max(map(abs, off)) * mpmath.mpf(int(one.normal_stress(given.push)[1]))
     assert 0 < largest < mpmath.mpf(added.numerator) / added.denominator
     assert a < 0.05 or mpmath.mpf(added.numerator) / added.denominator < 8 * largest
-    assert theorem.regularisation(replace(one, regularised=False), given) == 0
+    assert small_gain.regularisation(replace(one, regularised=False), given) == 0
 
 
 def test_regularised_friction_that_may_come_near_zero_is_refused_by_both():
@@ -344,7 +344,7 @@ def test_regularised_friction_that_may_come_near_zero_is_refused_by_both():
         ranges = {**UNSURE, "direct_effect": (F(1, 2),) * 2, "evolution_effect": (F("0.015"),) * 2}
         ranges["coefficient"] = (F(coefficient),) * 2
         one, given = task(ranges=ranges, regularised=True), claims("1/10", "1/10")
-        assert (theorem.model_of(one, given) is None) is refused
+        assert (small_gain.model_of(one, given) is None) is refused
         if refused:
             found = cell_bounds(one, LAGGED, given)
             assert found.reason == "regularised friction may come near 0"
@@ -425,7 +425,7 @@ def test_both_checkers_add_the_inertia_of_the_balance_of_forces(path):
     """m V e^Y sup|r| over the smallest strength, typed in again."""
     held = Held(law=LAW, step=F(50), **{name: F(v) for name, v in path.items()})
     one = task(ranges=UNSURE, ramp=F(14))
-    found = theorem.inertia(one, held, claims())
+    found = small_gain.inertia(one, held, claims())
     for density in (F(1, 10**9), F(2700), F(27 * 10**9)):
         heavy = replace(one, density=density)
         assert alone(heavy, held).stress() == heavy.stress + found * density / 2700
@@ -444,7 +444,7 @@ def test_the_state_that_ages_fastest_counts():
     given = claims("1/18", "1/2")
     cell = alone(task(ranges=UNSURE), given=given)
     fastest = 1.2e-6 / 0.8e-3 * (math.exp(0.5) - math.exp(-1 / 18))
-    assert theorem._fastest_state(task(ranges=UNSURE), given) == cell.fastest_state()
+    assert small_gain._fastest_state(task(ranges=UNSURE), given) == cell.fastest_state()
     assert float(cell.fastest_state()) == pytest.approx(fastest, rel=1e-9)
 
 
@@ -452,7 +452,7 @@ def test_the_state_that_ages_fastest_counts():
 def test_what_is_asked_is_read_at_the_valve(delay):
     held = replace(LAGGED, delay=F(delay))
     document = json.loads(guarantee_text(replace(CLAIM, held=held)))
-    loop = theorem.loop_of(held, theorem.model_of(task(), claims()), task())
+    loop = small_gain.loop_of(held, small_gain.model_of(task(), claims()), task())
     read = standalone.read_path(document["loop"])[0].outputs[-1]
     assert read == [int(state == "valve") for state in loop.states]
 
@@ -665,7 +665,7 @@ def test_a_claim_that_is_only_reached_on_one_cell_does_not_follow(name, monkeypa
     numbers = {k: F(v) for k, v in json.loads(guarantee_text(two))["claims"].items()}
     below = {k: v * F(999, 1000) for k, v in numbers.items()}
     given = [(below, F(1, 2)), (below | ({name: numbers[name]} if name else {}), F(1, 4))]
-    assert [theorem.follows(found, claims()) for found, _ in given] == [True, name is None]
+    assert [small_gain.follows(found, claims()) for found, _ in given] == [True, name is None]
     answers = iter(given)
     monkeypatch.setattr(standalone, "bounds", lambda *_: next(answers))
     document = json.loads(guarantee_text(two))

@@ -20,8 +20,8 @@ from quakedesign.sos.exact.definiteness import (
     positive_definite,
     positive_definite_integers,
 )
-from quakedesign.sos.exact.files import read as read_polynomial_file
 from quakedesign.sos.exact.polynomial import evaluate, product
+from quakedesign.sos.exact.polynomial_files import read as read_polynomial_file
 from quakedesign.sos.exact.proofs import Functional, _functional_holds, _sum, localizing_matrix
 from quakedesign.sos.exact.reduction import _contributions, reach
 from quakedesign.sos.exact.squares import IntegerGram, Square, form, integer_gram

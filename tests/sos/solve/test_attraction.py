@@ -20,7 +20,7 @@ from quakedesign.cli import main
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.attraction_files import load, text
 from quakedesign.sos.exact.field_files import read_field
-from quakedesign.sos.exact.files import load as load_polynomial
+from quakedesign.sos.exact.polynomial_files import load as load_polynomial
 from quakedesign.sos.exact.proofs import Point
 from quakedesign.sos.solve import attraction
 

@@ -5,7 +5,7 @@ from fractions import Fraction as F
 import pytest
 
 from quakedesign import sos
-from quakedesign.sos.exact.files import load, text
+from quakedesign.sos.exact.polynomial_files import load, text
 from quakedesign.sos.exact.text import parse
 from quakedesign.sos.solve import multipliers
 from quakedesign.sos.solve.multipliers import searched

@@ -8,7 +8,7 @@ from quakedesign import cache
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, task_of
 from quakedesign.fault import load_fault
-from quakedesign.synthesis.guaranteed import adversary, design, reach
+from quakedesign.synthesis.guaranteed import adversary, design, longest_times
 
 STEP = Fraction("0.184")
 
@@ -60,11 +60,12 @@ def test_where_a_reach_ended_is_tried_at_once_and_no_more_is_believed(tmp_path, 
     def end():
         tried.clear()
         assert isinstance(
-            reach.reached_again(attempt, lambda once: reach.reached_delay(STEP, once, Fraction(1)), 1), Guarantee
+            longest_times.reached_again(attempt, lambda once: longest_times.reached_delay(STEP, once, Fraction(1)), 1),
+            Guarantee,
         )
         return tried[-1]
 
-    monkeypatch.setattr(reach, "MOST_DELAY", 100)
+    monkeypatch.setattr(longest_times, "MOST_DELAY", 100)
     monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
     end()
     searched = list(tried)
@@ -73,6 +74,6 @@ def test_where_a_reach_ended_is_tried_at_once_and_no_more_is_believed(tmp_path, 
     assert longest > Fraction(15, 16) * min(time for time in searched if time > 5)
     assert end() == longest
     assert tried == [longest]
-    monkeypatch.setattr(reach, "search_once", lambda _search, *_question: ["9"])
+    monkeypatch.setattr(longest_times, "search_once", lambda _search, *_question: ["9"])
     end()
     assert tried == [9, *searched]

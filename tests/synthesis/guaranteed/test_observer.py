@@ -19,7 +19,7 @@ from quakedesign.studies import comparison
 from quakedesign.synthesis import answer
 from quakedesign.synthesis.guaranteed import design_held, worst_found
 from quakedesign.synthesis.guaranteed.design import first_held
-from quakedesign.synthesis.guaranteed.reach import design_at
+from quakedesign.synthesis.guaranteed.longest_times import design_at
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -178,7 +178,9 @@ def test_a_delay_is_designed_for_with_the_slip_alone():
 
 def test_another_objective_is_designed_for_what_a_guarantee_measures(monkeypatch):
     claim, told = designed("slip alone"), []
-    monkeypatch.setattr("quakedesign.synthesis.guaranteed.reach.design_held", lambda *a, **k: told.append((a, k)))
+    monkeypatch.setattr(
+        "quakedesign.synthesis.guaranteed.longest_times.design_held", lambda *a, **k: told.append((a, k))
+    )
     assert design_at(claim.task, claim, "tracking") is claim
     around = {"delay": 0, "lag": 0, "diffusion": 0, "slip_noise": NOISE, "rate_noise": 0}
     around |= {"initial_slip": 0, "initial_slip_rate": 0}

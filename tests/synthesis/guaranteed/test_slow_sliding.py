@@ -16,7 +16,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Held
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
 from quakedesign.certificates.slow_sliding import SlidingClaims, SlidingTask
-from quakedesign.certificates.slow_sliding.theorem import cell_bounds
+from quakedesign.certificates.slow_sliding.small_gain import cell_bounds
 from quakedesign.loop import SlidingModel
 from quakedesign.synthesis.guaranteed import slow_sliding
 from quakedesign.synthesis.guaranteed.sliding_adversary import SlidingPieces, corners, courses, worst_sliding

@@ -6,7 +6,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.controllers import published
-from quakedesign.sos.exact.files import load, text
+from quakedesign.sos.exact.polynomial_files import load, text
 from quakedesign.synthesis.linear.analysis.definite_files import definite_files, held_files, inverse_optimality_files
 from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
 from quakedesign.synthesis.linear.plant.problem import LinearProblem

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from quakedesign import sos
 from quakedesign.errors import CertificateError
 from quakedesign.sos.exact.answer import Answer
-from quakedesign.sos.exact.files import load, save, text
+from quakedesign.sos.exact.polynomial_files import load, save, text
 from quakedesign.sos.exact.proofs import Functional, Point, holds
 
 QUESTIONS = {

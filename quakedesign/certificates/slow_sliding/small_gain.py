@@ -56,8 +56,8 @@ from typing import Any
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee.norms import norms
+from quakedesign.certificates.guarantee.small_gain import Channel, Gains, NoGuarantee, channel_bounds
 from quakedesign.certificates.guarantee.statement import Held
-from quakedesign.certificates.guarantee.theorem import Channel, Gains, NoGuarantee, channel_bounds
 from quakedesign.certificates.slow_sliding.task import Range, SlidingTask
 from quakedesign.errors import ParameterError
 from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop

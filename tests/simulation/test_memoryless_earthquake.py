@@ -5,7 +5,7 @@ import pytest
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import friction_law, load_fault
-from quakedesign.simulation import earthquake, natural_earthquake
+from quakedesign.simulation import memoryless_earthquake, natural_earthquake
 
 REAL = load_fault("real-fault")
 
@@ -87,7 +87,7 @@ def test_the_peak_depends_neither_on_the_nudge_nor_on_the_step(monkeypatch, faul
     peaks = {f"{natural_earthquake(fault).metrics.peak_slip_rate:.6g}"}
     for name, value in (("NUDGE", 1e-10), ("NUDGE", 7e-9), ("FINENESS", 1.3e-3), ("FINENESS", 9e-4)):
         with monkeypatch.context() as changed:
-            changed.setattr(earthquake, name, value)
+            changed.setattr(memoryless_earthquake, name, value)
             peaks.add(f"{natural_earthquake(fault).metrics.peak_slip_rate:.6g}")
     assert len(peaks) == 1
 
@@ -105,6 +105,6 @@ def test_fast_weakening_is_simulated_until_the_slow_spring_has_unloaded():
 
 
 def test_an_unstable_fault_that_does_not_move_is_a_defect(monkeypatch):
-    monkeypatch.setattr(earthquake, "NUDGE", 1e-22)
+    monkeypatch.setattr(memoryless_earthquake, "NUDGE", 1e-22)
     with pytest.raises(SimulationError, match=r"lab-fault is unstable .* but its simulation does not move"):
         natural_earthquake(LAWS["linear"])
