@@ -7,17 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Formats, Output, Shaking
-from quakedesign.cli.shared import (
-    ExactMetres,
-    ExactMetresPerSecond,
-    ExactPascals,
-    ExactSeconds,
-    app,
-    command_line,
-    console,
-    print_lines,
-    progress,
-)
+from quakedesign.cli.shared import app, command_line, console, print_lines, progress
+from quakedesign.cli.units import ExactMetres, ExactMetresPerSecond, ExactPascals, ExactSeconds
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 if TYPE_CHECKING:

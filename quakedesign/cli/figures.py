@@ -23,7 +23,7 @@ def compare(
     """
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import results
-    from quakedesign.report.numbers import printed_lines
+    from quakedesign.report.terminal import printed_lines
     from quakedesign.studies.paper_numbers import printed, table
 
     loaded, asked = options.asked(fault)
@@ -66,9 +66,9 @@ def figures(
     folder = out or Path(f"quakedesign-{loaded.name}-figures")
     prepare(folder, force=force)
     from quakedesign.report.comparison import designed_comparison
-    from quakedesign.report.numbers import printed_lines
     from quakedesign.report.outcomes import run_sentences
     from quakedesign.report.paper_study import paper_study
+    from quakedesign.report.terminal import printed_lines
 
     with progress() as tell:
         comparison = designed_comparison(loaded, tell=tell, **asked)

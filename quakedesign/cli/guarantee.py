@@ -11,17 +11,8 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Scheduler, Shaking
-from quakedesign.cli.shared import (
-    ExactMetres,
-    ExactMetresPerSecond,
-    ExactPascals,
-    ExactSeconds,
-    Gains,
-    Whole,
-    app,
-    new_file,
-    progress,
-)
+from quakedesign.cli.shared import app, new_file, progress
+from quakedesign.cli.units import ExactMetres, ExactMetresPerSecond, ExactPascals, ExactSeconds, Gains, Whole
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.output import require_room
 from quakedesign.rationals import rational

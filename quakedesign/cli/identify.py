@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from quakedesign.cli.options import PLAIN, FaultName, Force, Output
-from quakedesign.cli.shared import Pascals, Whole, app, in_unit, new_file, require_different
+from quakedesign.cli.shared import app, new_file, require_different
+from quakedesign.cli.units import Pascals, Whole, in_unit
 
 
 @app.command

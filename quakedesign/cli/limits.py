@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
-from quakedesign.cli.shared import Pascals, SquareMetresPerSecond, app
+from quakedesign.cli.shared import app
+from quakedesign.cli.units import Pascals, SquareMetresPerSecond
 
 
 @app.command

@@ -15,20 +15,9 @@ from quakedesign.cli.options import (
     RunOptions,
     StartOptions,
 )
-from quakedesign.cli.shared import (
-    Gains,
-    Seconds,
-    Texts,
-    Whole,
-    app,
-    console,
-    given,
-    new_file,
-    print_json,
-    print_lines,
-    progress,
-)
+from quakedesign.cli.shared import app, console, given, new_file, print_json, print_lines, progress
 from quakedesign.cli.state import NO_STATE, StateOptions, require_no_state_options, show_state_run
+from quakedesign.cli.units import Gains, Seconds, Texts, Whole
 from quakedesign.errors import ParameterError
 
 _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.shared import Gains, Metres, MetresPerSecond, Push, Seconds, Whole, hush, print_json, print_lines
+from quakedesign.cli.shared import hush, print_json, print_lines
+from quakedesign.cli.units import Gains, Metres, MetresPerSecond, Push, Seconds, Whole
 
 if TYPE_CHECKING:
     from quakedesign.controllers import Controller

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, Force, Output
-from quakedesign.cli.shared import ExactSeconds, Gains, app, new_file, refuse
+from quakedesign.cli.shared import app, new_file, refuse
+from quakedesign.cli.units import ExactSeconds, Gains
 from quakedesign.errors import ParameterError
 
 

@@ -1,4 +1,4 @@
-"""What all commands share: the application, options, output and progress."""
+"""What all commands share: the application, output and progress."""
 
 import json
 import logging
@@ -11,93 +11,15 @@ from contextvars import ContextVar
 from itertools import combinations
 from pathlib import Path
 from textwrap import wrap
-from typing import Annotated, Any
+from typing import Any
 
-from cyclopts import App, Parameter
+from cyclopts import App
 from rich.console import Console
 from rich.text import Text
 
-from quakedesign.errors import OutputError, ParameterError, UnitError
+from quakedesign.errors import OutputError, ParameterError
 from quakedesign.output import require_room
-from quakedesign.rationals import rational
 from quakedesign.text import in_lines, visible
-
-# Negative decimals are values anyhow; with leading hyphens allowed, options after the values would be values too.
-Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
-
-
-def _gains(_type: Any, tokens: Sequence[Any]) -> tuple[str, ...]:
-    """One word, or numbers as they are written."""
-    texts = tuple(token.value for token in tokens)
-    for place, text in enumerate(texts if len(texts) > 1 else (), start=1):
-        rational(text, f"gain k{place}")
-    return texts
-
-
-Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_gains)]
-
-
-def quantity(unit: str) -> Callable[[Any, Sequence[Any]], float]:
-    """Converter of an option's text, with a unit or a bare number in the SI unit."""
-
-    def read(_type: Any, tokens: Sequence[Any]) -> float:
-        return in_unit(tokens[0].value, unit, (tokens[0].keyword or "value").strip("-").replace("-", " "))
-
-    return read
-
-
-def in_unit(text: str, unit: str, name: str) -> float:
-    """Number of a text with a unit, or a bare one in that SI unit."""
-    try:
-        return float(text)
-    except ValueError:
-        return _with_unit(text, unit, name)
-
-
-def whole(_type: Any, tokens: Sequence[Any]) -> int:
-    """Whole number of an option's text."""
-    text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
-    try:
-        return int(text)
-    except ValueError:
-        raise ParameterError(f"{name} must be a whole number. Received {text!r}. Write for example 8.") from None
-
-
-def _exact_reader(unit: str) -> Callable[[Any, Sequence[Any]], str]:
-    """Converter to a number as it is written, p/q among them, or that of a text with a unit."""
-
-    def read(_type: Any, tokens: Sequence[Any]) -> str:
-        text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
-        try:
-            rational(text)
-        except ParameterError:
-            return repr(_with_unit(text, unit, name))
-        return str(text)
-
-    return read
-
-
-def _with_unit(text: str, unit: str, name: str) -> float:
-    from quakedesign.fault.units import si_value
-
-    if unit == "Hz" and "rad" in text:
-        raise UnitError(f"{name} must be a frequency in Hz. Received {text!r}. Divide it by 2π.")
-    return si_value(text, unit, name)
-
-
-Seconds = Annotated[float, Parameter(converter=quantity("s"))]
-Hertz = Annotated[float, Parameter(converter=quantity("Hz"))]
-Metres = Annotated[float, Parameter(converter=quantity("m"))]
-MetresPerSecond = Annotated[float, Parameter(converter=quantity("m/s"))]
-MetresPerSecondSquared = Annotated[float, Parameter(converter=quantity("m/s^2"))]
-Pascals = Annotated[float, Parameter(converter=quantity("Pa"))]
-SquareMetresPerSecond = Annotated[float, Parameter(converter=quantity("m^2/s"))]
-ExactSeconds = Annotated[str, Parameter(converter=_exact_reader("s"))]
-ExactPascals = Annotated[str, Parameter(converter=_exact_reader("Pa"))]
-ExactMetres = Annotated[str, Parameter(converter=_exact_reader("m"))]
-ExactMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m/s"))]
-Whole = Annotated[int, Parameter(converter=whole)]
-Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 _log = logging.getLogger("quakedesign")

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
-from quakedesign.cli.shared import Pascals, Seconds, given
+from quakedesign.cli.shared import given
+from quakedesign.cli.units import Pascals, Seconds
 from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Force, Output, Scheduler
-from quakedesign.cli.shared import Seconds, Whole, app, console, given, new_file, refuse
+from quakedesign.cli.shared import app, console, given, new_file, refuse
+from quakedesign.cli.units import Seconds, Whole
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 if TYPE_CHECKING:

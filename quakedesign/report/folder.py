@@ -14,9 +14,9 @@ from quakedesign.fault import fault_toml
 from quakedesign.output import require_room, whole_folder, write_whole
 from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.comparison import Comparison
+from quakedesign.report.csv_tables import csv_text
 from quakedesign.report.figure_files import DEFAULT, figure_bytes, write_results
 from quakedesign.report.kept_figures import drawn_once
-from quakedesign.report.numbers import csv_text
 from quakedesign.report.page import page_html
 from quakedesign.report.paper_figures import PAPER
 from quakedesign.report.reproduction import reproduction, versions

@@ -9,9 +9,9 @@ import numpy as np
 
 from quakedesign.controllers import LoopField, law
 from quakedesign.output import whole_folder, write_whole
+from quakedesign.report.csv_tables import csv_text
 from quakedesign.report.drawing import SMALL, WIDTH
 from quakedesign.report.figure_files import write_figures, write_results
-from quakedesign.report.numbers import csv_text
 from quakedesign.synthesis.analysis.gain_map import GainMap
 from quakedesign.synthesis.analysis.gain_map_workers import Place
 

@@ -138,3 +138,16 @@ def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", 
         console.print(f"  {name} first at {time:.6g} s")
     for premise in premises:
         console.print(f"  {_line(premise)}")
+
+
+def printed_lines(rows: list[dict[str, Any]]) -> list[str]:
+    """Printed numbers beside ours, for people; nothing where the paper says nothing of the fault."""
+    if not rows:
+        return []
+    return ["", "printed in the paper, and found here:"] + [
+        f"  {row['run']}, {row['metric']}: {row['printed']:.3g} {row['unit']} printed ({row['place']}), "
+        f"{row['found']:.3g} found, ratio {row['ratio']:.3g}. {row['note']}"
+        if row["ratio"] is not None
+        else f"  {row['run']}, {row['metric']}: {row['printed']:.3g} printed ({row['place']}), no run to compare with"
+        for row in rows
+    ]

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from quakedesign.studies.fault_limits import Limit as Limit
     from quakedesign.studies.fault_limits import Limits as Limits
     from quakedesign.studies.fault_limits import limits as limits
-    from quakedesign.studies.objectives import FrontPoint as FrontPoint
-    from quakedesign.studies.objectives import objective_front as objective_front
+    from quakedesign.studies.peak_against_tracking import FrontPoint as FrontPoint
+    from quakedesign.studies.peak_against_tracking import objective_front as objective_front
 
 face(__name__)

@@ -22,7 +22,8 @@ from quakedesign.certificates.guarantee import (
 )
 from quakedesign.certificates.guarantee import task as package_task
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
-from quakedesign.certificates.guarantee.small_gain import bounds_from, certified_bounds, channels_of
+from quakedesign.certificates.guarantee.inputs import channels_of
+from quakedesign.certificates.guarantee.small_gain import bounds_from, certified_bounds
 from quakedesign.certificates.guarantee.task import Friction
 from quakedesign.errors import ParameterError
 from quakedesign.loop import (

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
 
+from quakedesign.certificates.guarantee.inputs import Gains, GainSpread
 from quakedesign.certificates.guarantee.norms import norms
-from quakedesign.certificates.guarantee.small_gain import Gains, GainSpread
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.errors import ParameterError
 from quakedesign.loop import Model, PeriodicLoop

@@ -57,23 +57,28 @@ is past of a slow gain takes R as it takes v, with the same c. Two inputs more, 
 x2. A bound of e2 is one of x2 and one of β0Y: the gain of ``awaited`` and what that adds at once. ∎
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from types import MappingProxyType
 from typing import Any
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee.flow_norms import flow_norms
-from quakedesign.certificates.guarantee.free_response import START
+from quakedesign.certificates.guarantee.inputs import (
+    NOISELESS,
+    Channel,
+    Gains,
+    GainSpread,
+    beside,
+    channels_of,
+    through_layer,
+)
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.loop import ImplicitRoot, PeriodicLoop
 
-Gains = Mapping[tuple[str, str], tuple[Any, ...]]
 _ZERO = Fraction(0)
-NOISELESS: Mapping[str, Fraction] = MappingProxyType({})
 OUTPUTS = ("slip_error", "slip_rate_error", "push")
 _WORDS = {
     ("acceleration", "slip_error"): "range of friction's slope in slip",
@@ -85,40 +90,6 @@ _WORDS = {
 }
 _LEFT_OUT = "what the modes of the layer leave out"
 _HALVINGS = 96
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Channel:
-    """An input of the nominal loop and what bounds it: F + Σ c_y·|y|.
-
-    Attributes
-    ----------
-    name : str
-    own : Fraction
-        F, in the unit of the input.
-    shares : mapping of str to Fraction
-        c_y by the output.
-    """
-
-    name: str
-    own: Fraction
-    shares: Mapping[str, Fraction]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GainSpread:
-    """How far the input gain may be off that of a nominal loop [-].
-
-    Attributes
-    ----------
-    half : Fraction
-        By itself.
-    aged : Fraction
-        Of that of a time σ ago, over e^{ασ}.
-    """
-
-    half: Fraction
-    aged: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,9 +184,9 @@ def bounds_from(
     spread: GainSpread | None = None,
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
-    channels = (*channels_of(task, root, step, noise, spread), *_beside(task, {name for _, name in gains}))
+    channels = (*channels_of(task, root, step, noise, spread), *beside(task, {name for _, name in gains}))
     if ("push", "awaited") in gains:
-        channels = tuple(_through_layer(channels, gains))
+        channels = tuple(through_layer(channels, gains))
     small_gain, peaks = channel_bounds(channels, gains)
     if peaks is None:
         return _none(small_gain, channels, gains)
@@ -247,55 +218,6 @@ def channel_bounds(channels: Sequence[Channel], gains: Gains) -> tuple[Any, dict
         )
         for y in dict.fromkeys(y for y, _ in gains)
     }
-
-
-def channels_of(
-    task: Task,
-    root: ImplicitRoot | None,
-    step: Fraction,
-    noise: Mapping[str, Fraction] = NOISELESS,
-    spread: GainSpread | None = None,
-) -> tuple[Channel, ...]:
-    """Inputs of the loop of a task, of a law with an implicit root or without, with noise or without."""
-    force, drift, coupling = _task_inputs(task)
-    half, implicit, aged = task.half_ranges, [], []
-    if spread is not None:
-        half = {**half, "push": spread.half}
-        aged.append(Channel(name="aged", own=_ZERO, shares={"push": spread.aged}))
-    if root is not None:
-        share = root.half_range / step
-        own = root.remainder + share * noise.get("slip_noise", _ZERO)
-        implicit.append(Channel(name="root", own=own, shares={"slip_error": share}))
-    return (
-        Channel(name="acceleration", own=force, shares=half),
-        Channel(name="drift", own=drift, shares={"slip_rate_error": coupling}),
-        *implicit,
-        *aged,
-        *(Channel(name=name, own=size, shares={}) for name, size in noise.items()),
-    )
-
-
-def _beside(task: Task, names: Collection[str]) -> Iterator[Channel]:
-    """Inputs of a law in continuous time that uses the reference itself (`continuous_loop`), and a start."""
-    if "reference_acceleration" in names:
-        yield Channel(name="reference_acceleration", own=task.reference_rates[1], shares={})
-    if "reference_jerk" in names:
-        yield Channel(name="reference_jerk", own=task.reference_jerk, shares={})
-    if START in names:
-        yield Channel(name=START, own=Fraction(1), shares={})
-
-
-def _through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
-    """Inputs of a loop through a layer: what its modes leave out acts as v does, by itself where it fades."""
-    fades = ("left_out", "left_out") in gains
-    for channel in channels:
-        share = {"left_out": channel.shares["push"]} if "push" in channel.shares else {}
-        if fades and channel.name == "acceleration":
-            yield from (channel, Channel(name="left_out", own=_ZERO, shares=share))
-        else:
-            yield replace(channel, shares={**channel.shares, **share})
-    for name in ("awaited", "awaited_told"):
-        yield Channel(name=name, own=_ZERO, shares={"left_out": Fraction(1)})
 
 
 def spectral_radius(matrix: Sequence[Sequence[Any]]) -> Any:
@@ -336,18 +258,6 @@ def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
             if k != i:
                 rows[k] = [v - rows[k][i] * p for v, p in zip(rows[k], rows[i], strict=True)]
     return [row[size] for row in rows]
-
-
-def _task_inputs(task: Task) -> tuple[Fraction, Fraction, Fraction]:
-    """F of a [m/s²] and of d [m/s³], and κ [1/s²]."""
-    if task.change is None:
-        return task.reference_force + task.amplitude, task.drift, _ZERO
-    law = task.friction
-    if law.rate_slope:
-        middle, half = (task.beta[0] + task.beta[1]) / 2, task.half_ranges["push"]
-        return task.reference_force + half / middle * task.amplitude, task.drift + task.change / middle, _ZERO
-    coupling = task.amplitude * max(law.weakening, law.strengthening) * task.area_per_mass[1] / task.authority
-    return task.reference_force, task.drift + task.change + coupling * task.reference_rates[0], coupling
 
 
 def _unshifted(task: Task) -> Fraction:

@@ -9,8 +9,9 @@ from quakedesign import loop as loops
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import sector
+from quakedesign.certificates.guarantee.inputs import Gains
 from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
-from quakedesign.certificates.guarantee.small_gain import Bounds, Gains, NoGuarantee, best_bounds, certified_bounds
+from quakedesign.certificates.guarantee.small_gain import Bounds, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.loop import (

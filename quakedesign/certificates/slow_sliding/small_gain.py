@@ -55,8 +55,9 @@ from itertools import accumulate
 from typing import Any
 
 from quakedesign.bounds import UpperBound
+from quakedesign.certificates.guarantee.inputs import Channel, Gains
 from quakedesign.certificates.guarantee.norms import norms
-from quakedesign.certificates.guarantee.small_gain import Channel, Gains, NoGuarantee, channel_bounds
+from quakedesign.certificates.guarantee.small_gain import NoGuarantee, channel_bounds
 from quakedesign.certificates.guarantee.statement import Held
 from quakedesign.certificates.slow_sliding.task import Range, SlidingTask
 from quakedesign.errors import ParameterError

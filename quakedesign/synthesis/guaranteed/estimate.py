@@ -10,7 +10,8 @@ from scipy.linalg import expm
 
 from quakedesign.certificates.guarantee import Bounds, Held, NoGuarantee, Task
 from quakedesign.certificates.guarantee.free_response import START
-from quakedesign.certificates.guarantee.small_gain import GainSpread, bounds_from
+from quakedesign.certificates.guarantee.inputs import GainSpread
+from quakedesign.certificates.guarantee.small_gain import bounds_from
 from quakedesign.loop import PeriodicLoop
 
 _PIECES = 4

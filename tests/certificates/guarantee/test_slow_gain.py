@@ -23,7 +23,7 @@ from quakedesign.certificates.guarantee import (
 )
 from quakedesign.certificates.guarantee import slow_gain as module
 from quakedesign.certificates.guarantee.files import guarantee_text
-from quakedesign.certificates.guarantee.small_gain import GainSpread, channels_of
+from quakedesign.certificates.guarantee.inputs import GainSpread, channels_of
 from quakedesign.certificates.guarantee.task import Friction, Task
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from quakedesign.certificates.guarantee import Bounds, NoGuarantee, task_of
-from quakedesign.certificates.guarantee.small_gain import bounds_from, channels_of, spectral_radius
+from quakedesign.certificates.guarantee.inputs import channels_of
+from quakedesign.certificates.guarantee.small_gain import bounds_from, spectral_radius
 from quakedesign.fault import load_fault
 from quakedesign.loop import ImplicitRoot, Power
 

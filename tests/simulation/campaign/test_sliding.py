@@ -73,7 +73,7 @@ def test_processes_have_the_same_digits_and_files_answer(serial, tmp_path):
 
 
 def test_a_batch_over_a_whole_task_is_a_few_samples(tmp_path):
-    """At most 10 000 steps of T_s = 300 s, all of which a worker that dies loses; of the shortest runs an eighth of all."""
+    """At most 10 000 steps of T_s = 300 s, all of which a worker that dies loses; of the shortest runs an eighth."""
     for duration, most in ((1e6, 3), (30000.0, 100), (3000.0, 250)):
         problem = campaign_problem(PATCH, CONTROLLER, duration=duration)
         with Given(SerialExecutor(), width=1) as crew:
