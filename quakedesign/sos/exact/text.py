@@ -2,6 +2,7 @@
 
 A polynomial is built from numbers (12, 0.5, 1e-8), names, + - * / ^ ** and parentheses. Products need their *, powers
 a whole number from 0 to 60, and only numbers divide. A constraint is two polynomials around >=, <= or ==.
+A name that elsewhere is a number (pi, nan, …) is a variable only where the variables are given.
 Nothing is ever handed to an interpreter, and every limit is enforced before the work that it limits.
 """
 
@@ -30,6 +31,7 @@ _TOKEN = re.compile(
 _BLANK = re.compile(r"[ \t\r\n]*")
 _SAME = {"**": "^", "−": "-", "=": "=="}
 _STRENGTH = {"+": 1, "-": 1, "*": 2, "/": 2, "negative": 3}
+_NUMBERS = frozenset({"nan", "NaN", "NAN", "inf", "Inf", "INF", "infinity", "Infinity", "oo", "zoo", "pi", "E", "I"})
 _RELATIONS = {">=": "inequality", "<=": "inequality", "==": "equality"}
 
 Kind = Literal["inequality", "equality"]
@@ -43,7 +45,8 @@ def parse(text: str, variables: Sequence[str] | None = None) -> tuple[tuple[str,
     text : str
         For example ``x^4*y^2 + x^2*y^4 + 1 - 3*x^2*y^2``.
     variables : sequence of str, optional
-        Names and their order; any other name in the text is refused. Unless given, the names in order of appearance.
+        Names and their order; any other name in the text is refused. Unless given, the names in order of appearance,
+        none of which may be that of a number (``pi``, ``E``, ``I``, ``nan``, ``inf``, ``oo``, …).
 
     Returns
     -------
@@ -150,6 +153,9 @@ def _order(text: str, tokens: Sequence[Token], variables: Sequence[str] | None) 
     for name, token in used.items():
         if len(name) > _NAME:
             refuse(text, token, f"a name of at most {_NAME} characters", "Shorten it.")
+        if variables is None and name in _NUMBERS:
+            remedy = "Write numbers in digits; name a variable otherwise, or declare it (variables=)."
+            refuse(text, token, "a number in digits or the name of a variable", remedy)
         if name not in order:
             refuse(text, token, f"one of the variables {', '.join(order)}", "Correct the name, or declare it.")
     if len(order) > VARIABLES:

@@ -38,11 +38,22 @@ from quakedesign.sos.exact.text import DEPTH, LENGTH, VARIABLES, names, parse, p
         ("x - x", "x", {}),
         ("(x + y)*(x - y)\n", "xy", {(2, 0): 1, (0, 2): -1}),
         ("0^0", "", {(): 1}),
-        ("E + I*pi", ("E", "I", "pi"), {(1, 0, 0): 1, (0, 1, 1): 1}),
     ],
 )
 def test_what_the_grammar_has_is_read_exactly(text, variables, polynomial):
     assert parse(text) == (tuple(variables), polynomial)
+
+
+NUMBERS = ["nan", "NaN", "NAN", "inf", "Inf", "INF", "infinity", "Infinity", "oo", "zoo", "pi", "E", "I"]
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_the_name_of_a_number_is_a_variable_only_where_it_is_declared(name):
+    for read in (parse, names, lambda text: parse_constraint(f"{text} >= 0")):
+        with pytest.raises(PolynomialError, match=rf"at character 7\..*x\^2 \+ ⟦{name}⟧ .*Write numbers in digits"):
+            read(f"x^2 + {name}")
+    assert parse(f"x^2 + {name}", ["x", name]) == (("x", name), {(2, 0): 1, (0, 1): 1})
+    assert parse(f"{name}1 + e + i") == ((f"{name}1", "e", "i"), {(1, 0, 0): 1, (0, 1, 0): 1, (0, 0, 1): 1})
 
 
 def test_given_variables_fix_the_order_and_exclude_other_names():
