@@ -10,7 +10,7 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly_ctx
 
 from quakedesign.errors import PolynomialError
-from quakedesign.rationals import fraction_of
+from quakedesign.rationals import fraction_of, fraction_of_float, to_sympy
 from quakedesign.sos.exact.work import expanded, length, longest, spend
 
 Exponents = tuple[int, ...]
@@ -130,7 +130,7 @@ def monomials(variables: int, most: int, least: int = 0) -> Iterator[Exponents]:
 
 
 def from_sympy(expression: Any, variables: Sequence[Any]) -> dict[Exponents, Fraction]:
-    """Sparse form of a SymPy polynomial with rational coefficients.
+    """Sparse form of a SymPy polynomial with rational coefficients, floats read as `fraction_of_float` does.
 
     Raises
     ------
@@ -139,8 +139,10 @@ def from_sympy(expression: Any, variables: Sequence[Any]) -> dict[Exponents, Fra
     """
     import sympy as sp
 
+    expanded = expression.as_expr()
+    floats = {f: to_sympy(fraction_of_float(f)) for f in expanded.atoms(sp.Float)}  # "QQ" would take one close to them
     try:
-        terms = sp.Poly(expression, *variables, domain="QQ").terms()
+        terms = sp.Poly(expanded.xreplace(floats), *variables, domain="QQ").terms()
     except (sp.PolynomialError, sp.CoercionFailed) as error:
         raise PolynomialError(
             f"a polynomial in {', '.join(map(str, variables))} with rational coefficients is needed. "

@@ -19,6 +19,14 @@ def test_text_expressions_and_exponents_are_the_same():
     assert read(x**2 - y / 2, (0 <= x, sp.Eq(y, 0)), "auto", (x, y)) == (*expected[:4], "auto")
 
 
+@pytest.mark.parametrize(
+    ("constant", "below"), [(0.9999999999999999, F(1, 10**16)), (1 - sp.Float(2, 40) ** -99, F(1, 2**99))]
+)
+def test_floats_of_sympy_are_not_rounded(constant, below):
+    """A square where SymPy's own rationals are taken: they are only close to floats."""
+    assert read(9 * x**2 - 6 * x + constant, (), None, None)[1] == {(2,): 9, (1,): -6, (0,): 1 - below}
+
+
 def test_both_directions_of_a_relation():
     assert read(x, (x <= 3,), None, None)[2] == ({(1,): -1, (0,): 3},)
     assert read(x, (sp.Ge(x, y),), None, None)[2] == ({(1, 0): 1, (0, 1): -1},)
