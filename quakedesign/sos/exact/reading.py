@@ -51,8 +51,8 @@ def read_element(given: Any, names: tuple[str, ...]) -> Element:
 
 
 def _whole(exponent: Any) -> Any:
-    """Integer of an exponent that another programme wrote as a float."""
-    return floor(exponent) if isinstance(exponent, Real) and exponent % 1 == 0 else exponent
+    """Integer of an exponent that another programme wrote as a float; text of what is no exponent."""
+    return floor(exponent) if isinstance(exponent, Real) and exponent % 1 == 0 else str(exponent)
 
 
 def _names(inputs: Sequence[Any]) -> tuple[str, ...]:

@@ -35,7 +35,7 @@ def parse(text: str) -> Any:
         raise CertificateError(f"the file is nested deeper than {_DEPTH} levels.")
     try:
         return json.loads(
-            text, object_pairs_hook=_unique, parse_float=_no_float, parse_constant=_no_float, parse_int=_integer
+            text, object_pairs_hook=unique, parse_float=_no_float, parse_constant=_no_float, parse_int=_integer
         )
     except (json.JSONDecodeError, RecursionError) as error:
         raise CertificateError(f"the file is not JSON: {error}.") from None
@@ -47,7 +47,8 @@ def _depth(text: str) -> int:
     return max(accumulate(1 if bracket in "[{" else -1 for bracket in brackets), default=0)
 
 
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Object whose keys differ. Raises CertificateError for others."""
     need(len({k for k, _ in pairs}) == len(pairs), "a key occurs twice in one object")
     return dict(pairs)
 

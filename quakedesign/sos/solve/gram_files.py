@@ -8,10 +8,11 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from quakedesign.errors import PolynomialError
+from quakedesign.errors import ParameterError, PolynomialError
 from quakedesign.input import read_bytes
 from quakedesign.rationals import rational
 from quakedesign.sos.exact.answer import Answer
+from quakedesign.sos.exact.strict import unique
 from quakedesign.sos.solve.verification import verify
 
 _LARGEST = 4 << 20  # bytes
@@ -46,7 +47,8 @@ def read_gram(path: str | Path) -> GramFile:
 
     A file ``.mat`` has the variables p, Q, Z and vars, any other is JSON with the keys polynomial, gram, basis and
     variables. A polynomial is text, or a list of terms, each its coefficient and then the exponents; a basis has texts,
-    or lists of exponents. Floats are read as the decimals that they print as.
+    or lists of exponents. Numbers of JSON are read as they are written, floats of MATLAB as the decimals that they
+    print as.
 
     Raises
     ------
@@ -56,7 +58,7 @@ def read_gram(path: str | Path) -> GramFile:
     path = Path(path)
     content = read_bytes(path, "a file with a Gram matrix", largest=_LARGEST, refusal=PolynomialError)
     try:
-        raw = _matlab(content) if path.suffix == ".mat" else json.loads(content)
+        raw = _matlab(content) if path.suffix == ".mat" else _json(content)
     except Exception as error:  # a broken file raises anything
         reason = str(error).partition("\n")[0]
         raise PolynomialError(
@@ -65,6 +67,18 @@ def read_gram(path: str | Path) -> GramFile:
     if not isinstance(raw, dict) or set(raw) != _KEYS:
         raise PolynomialError(f"{path} must have exactly the keys {', '.join(sorted(_KEYS))}. Received others.")
     return _gram_file(raw)
+
+
+def _json(content: bytes) -> Any:
+    return json.loads(content, object_pairs_hook=unique, parse_float=_number)
+
+
+def _number(written: str) -> Fraction | str:
+    """The number exactly; where it has too many digits for that its text, which is good enough for a matrix."""
+    try:
+        return rational(written)
+    except ParameterError:
+        return written
 
 
 def _gram_file(raw: dict[str, Any]) -> GramFile:
@@ -106,8 +120,8 @@ def _matlab(content: bytes) -> dict[str, Any]:
     terms, basis = _plain(found["polynomial"]), _plain(found["basis"])
     return {
         "variables": _texts(found["variables"]),
-        "polynomial": terms[0] if isinstance(terms[0], str) else terms,
-        "basis": _texts(found["basis"]) if isinstance(basis[0], str) else basis,
+        "polynomial": terms[0] if len(terms) == 1 and isinstance(terms[0], str) else terms,
+        "basis": _texts(found["basis"]) if basis and isinstance(basis[0], str) else basis,
         "gram": _dense(found["gram"]),
     }
 

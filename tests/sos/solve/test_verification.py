@@ -194,6 +194,9 @@ def test_a_file_of_json(tmp_path, changes):
         (json.dumps(in_json(basis=[[10**400, 1], [1, 1], [0, 2]])), "Lower the degree"),
         (json.dumps(in_json(polynomial=3)), "a coefficient and 2 exponents"),
         (json.dumps(in_json(polynomial=[[float("nan"), [1, 1]]])), "coefficient must be a finite number"),
+        (json.dumps(in_json(polynomial=["x^4", "-y^4"])), "a coefficient and 2 exponents"),
+        (json.dumps(in_json(basis=[[[2, 0]], [1, 1], [0, 2]])), "2 non-negative integers"),
+        ('{"polynomial": 1, "polynomial": 2}', "a key occurs twice"),
         (json.dumps(in_json(gram=[[1, None]])), "3 x 3"),
         ("[" * 100_000, "must be JSON"),
     ],
@@ -204,6 +207,31 @@ def test_another_file_is_refused_in_one_line(tmp_path, content, said):
     with pytest.raises((PolynomialError, ParameterError), match=said) as refused:
         sos.read_gram(path).verify()
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("constant", ["[-1e-300, [0]]", "[0.99999999999999999999999, [0]], [-1, [0]]"])
+def test_numbers_of_json_are_read_as_they_are_written(tmp_path, constant):
+    """The sum of the constants is negative; with floats the second is zero."""
+    terms = f"{constant}, [1.0, [2.0]]"
+    path = tmp_path / "gram.json"
+    path.write_text(f'{{"variables": ["x"], "polynomial": [{terms}], "basis": [[1.0]], "gram": [[1.0]]}}')
+    assert sos.read_gram(path).verify().verdict is sos.Positivity.NEGATIVE
+
+
+def test_a_number_too_small_for_a_float_is_no_coefficient_but_an_entry_of_a_matrix(tmp_path):
+    path = tmp_path / "gram.json"
+    common = '{"variables": ["x"], "basis": ["x", "1"], "gram": [[1.0, 0.0], [-1e-400, 1.0]], "polynomial":'
+    path.write_text(f'{common} "x^2 + 1"}}')
+    assert sos.read_gram(path).verify().remark.startswith("proved by the given matrix")
+    path.write_text(f"{common} [[1, [2]], [-1e-400, [0]]]}}")
+    with pytest.raises(ParameterError, match="coefficient must have at most 308 digits"):
+        sos.read_gram(path)
+
+
+def test_two_rows_of_text_are_no_polynomial(tmp_path):
+    savemat(tmp_path / "gram.mat", in_matlab(p=np.array(["x^4", "-y^4"])))
+    with pytest.raises(PolynomialError, match="a coefficient and 2 exponents"):
+        sos.read_gram(tmp_path / "gram.mat")
 
 
 def test_a_file_that_is_not_there_too_long_or_no_matlab_is_refused(tmp_path):
