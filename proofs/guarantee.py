@@ -38,6 +38,7 @@ def verify(document: dict[str, Any]) -> list[str]:
     need(
         loop.asked or not asked, "without a lag and rock the claims must not tell the valve's pressure from the fault's"
     )
+    need(not (loop.pump and loop.asked) or bool(asked), "a pump behind which there is a lag or rock needs claims of it")
     within = loop.root is None or root_within(loop.root, loop.step, *errors)
     need(within, "the root of the implicit step must lie between its lines for all errors that are claimed")
     slow = read_slow(document["slow_gain"], task, loop) if "slow_gain" in more else None
@@ -49,6 +50,9 @@ def verify(document: dict[str, Any]) -> list[str]:
         value = found[name]
         holds = value >= claims[name] if name.startswith("least") else value <= claims[name]
         need(holds, f"the claim {name} must follow from the rest. It does not")
+    least, largest = ASKED if asked else CLAIMS[3:]
+    held = not loop.pump or (loop.pump[0] <= claims[least] and claims[largest] <= loop.pump[1])
+    need(held, "the pressure that is claimed at the valve must stay within what the pump can do")
     return statement(document, task, claims, small)
 
 
@@ -76,6 +80,8 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
     if "noise" in loop:
         rate = "" if alone else f", slip rate within {loop['noise']['rate']} m/s"
         off = f", measured slip within {loop['noise']['slip']} m of the true one{rate}"
+    if "pump" in loop:
+        off += f", a pump from {loop['pump']['least']} Pa to {loop['pump']['largest']} Pa that is never at its limits"
     where = "from rest"
     if "start" in document:
         slip, rate = (lower(Fraction(document["start"][name])) for name in ("slip", "rate"))

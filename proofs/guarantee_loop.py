@@ -45,7 +45,8 @@ class Loop:
     be two inputs more, the second and third derivatives of the reference.
     With a layer of rock, L^2/D = `layer`, a fourth output bounds what its modes leave out; where `fade` is given, that
     is one more input, the last one. Where `asked`, the last output is the pressure at the valve. `start` has the
-    columns of the box from which it starts, none where that is rest.
+    columns of the box from which it starts, none where that is rest. `pump`: what its pressure at the valve must stay
+    between, nothing where there are no limits.
     """
 
     flow: list[Row]
@@ -61,6 +62,7 @@ class Loop:
     layer: Fraction = Fraction(0)
     start: list[Row] = field(default_factory=list)
     asked: bool = False
+    pump: Row = field(default_factory=list)
 
 
 @dataclass
@@ -78,6 +80,7 @@ class Held:
     root: Root | None
     noise: tuple[Fraction, Fraction]
     first: list[Row]  # what the law makes of slip and slip rate before its first sample
+    pump: Row
 
     def __post_init__(self) -> None:
         whole, self.part = self.delay // self.step, self.delay % self.step  # arrival after a sample
@@ -112,14 +115,14 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     inputs += [entry for entry, off in zip(told, law.noise, strict=True) if off]
     outputs = [unit(size)[0], unit(size)[1], push]
     cuts = BENT if law.lag else EVEN
-    loop = Loop(flow, events, outputs, inputs, root, step, law.noise, cuts, start=starts_of(law, errors))
+    loop = Loop(flow, events, outputs, inputs, root, step, law.noise, cuts, start=starts_of(law, errors), pump=law.pump)
     loop = with_left_out(loop, law) if law.diffusion else loop
     return replace(loop, outputs=[*loop.outputs, unit(size)[law.valve]], asked=True) if law.path else loop
 
 
 def read_held(value: Any) -> Held:
-    """Read step, delay, lag and diffusion, the law's matrices, the implicit step and the noise."""
-    more = [k for k in ("root", "noise", "diffusion", "first") if type(value) is dict and k in value]
+    """Read step, delay, lag and diffusion, the law's matrices, the implicit step, the noise and the pump."""
+    more = [k for k in ("root", "noise", "diffusion", "first", "pump") if type(value) is dict and k in value]
     parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
     given = keys(value, "loop", *parts, *more)
     implicit = "root" in more
@@ -134,7 +137,9 @@ def read_held(value: Any) -> Held:
     time = number(given.get("diffusion", "0"), "diffusion")
     need("diffusion" not in more or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
     first = matrix(given["first"], "first", n, 2) if "first" in more else [[Fraction(0)] * 2] * n
-    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first)
+    pump = [*numbers(given["pump"], "pump", "least", "largest").values()] if "pump" in more else []
+    need(not pump or (pump[0] <= 0 <= pump[1] and any(pump)), "a pump needs a range with 0 in it")
+    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first, pump)
     need(law.size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
     return law
 

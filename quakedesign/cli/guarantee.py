@@ -44,6 +44,11 @@ class Surroundings:
         Bound of the slip at the start, of either sign, such as '0.01 mm'; the law begins as it always does.
     initial_slip_rate
         The same of the slip rate, such as '0.1 mm/s'. Slip rates below zero are those of the continued plant.
+    saturation
+        Largest pressure of the pump, such as '20 MPa', and largest withdrawal unless that is given: a proof is one that
+        these limits are never reached.
+    withdrawal
+        Largest decrease of the pressure; 0 for a pump that only injects.
     """
 
     delay: ExactSeconds = "0"
@@ -53,10 +58,33 @@ class Surroundings:
     rate_noise: ExactMetresPerSecond = "0"
     initial_slip: ExactMetres = "0"
     initial_slip_rate: ExactMetresPerSecond = "0"
+    saturation: ExactPascals | None = None
+    withdrawal: ExactPascals | None = None
 
-    def exact(self) -> dict[str, Fraction]:
-        """All of it as rationals in SI units."""
-        return {name: rational(told, name.replace("_", " ")) for name, told in asdict(self).items()}
+    def exact(self) -> dict[str, Any]:
+        """All of it as rationals in SI units, and the pump, None without limits.
+
+        Raises
+        ------
+        ParameterError
+            For a withdrawal without a largest pressure.
+        """
+        told = {name: text for name, text in asdict(self).items() if text is not None}
+        values: dict[str, Any] = {name: rational(text, name.replace("_", " ")) for name, text in told.items()}
+        largest, withdrawn = values.pop("saturation", None), values.pop("withdrawal", None)
+        return {**values, "pump": _pump(largest, withdrawn)}
+
+
+def _pump(largest: Fraction | None, withdrawn: Fraction | None) -> Any:
+    from quakedesign.certificates.guarantee.pump import Pump
+
+    if largest is None and withdrawn is None:
+        return None
+    if largest is None:
+        raise ParameterError(
+            "a withdrawal belongs to a saturation, the largest pressure. Received it alone. Give both."
+        )
+    return Pump(least=-(largest if withdrawn is None else withdrawn), largest=largest)
 
 
 _ALONE = Surroundings()
@@ -206,7 +234,7 @@ def _swiftly(fault: Any, around: dict[str, Any], pushed: dict[str, Any], **asked
     return partial(answer, fault, **asked, **around)
 
 
-def _slowly(fault: Any, around: dict[str, Fraction], *, usual: bool, **asked: Any) -> Callable[[], Any]:
+def _slowly(fault: Any, around: dict[str, Any], *, usual: bool, **asked: Any) -> Callable[[], Any]:
     """Guarantee of slow sliding; refuses what it has no use for.
 
     Raises

@@ -292,3 +292,15 @@ def test_several_faults_for_people(call):
     assert "\ncrustal-patch: proved: " in out
     code, _, err = call("real-fault", "real-fault")
     assert (code, "need names of their own" in err) == (2, True)
+
+
+def test_a_pump_is_asked_for_no_more_than_it_can_do(call):
+    """14.3 MPa of withdrawal and 14.2 MPa of injection are what is proved of this loop."""
+    given = ("real-fault", "--gains", *GAINS, "--saturation", "15 MPa", "--json")
+    code, out, _ = call(*given)
+    assert (code, json.loads(out)["pump"]) == (0, {"least": "-15000000", "largest": "15000000"})
+    code, out, _ = call(*given, "--withdrawal", "14 MPa")
+    assert (code, json.loads(out)["verdict"]) == (1, "undecided")
+    assert "which a pump of -14 MPa to 15 MPa cannot all hold" in json.loads(out)["reason"]
+    code, _, err = call("real-fault", "--withdrawal", "14 MPa")
+    assert (code, "a withdrawal belongs to a saturation" in err) == (2, True)

@@ -63,6 +63,7 @@ CONTINUOUS = changed(
 
 LAYERED = changed(HELD, (("loop", "diffusion"), "2"))
 NOISY = changed(HELD, (("loop", "noise"), {"slip": "1/9", "rate": "1/7"}), (("loop", "feedback"), ["1", "0"]))
+PUMPED = changed(HELD, (("loop", "pump"), {"least": "-4", "largest": "5"}))
 ALONE = changed(NOISY, (("loop", "measured"), [["1", "0"]]), (("loop", "noise", "rate"), "0"))
 
 
@@ -116,6 +117,10 @@ LIMITS = [
     (CONTINUOUS, ("loop",), [CONTINUOUS["loop"]], [CONTINUOUS["loop"] | {"more": "1"}, {"rates": [["0"]]}]),
     (CONTINUOUS, ("loop", "noise"), [], [{"slip": "0", "rate": "0"}]),
     (CONTINUOUS, ("loop", "diffusion"), [], ["1"]),
+    (CONTINUOUS, ("loop", "pump"), [], [PUMPED["loop"]["pump"]]),
+    (PUMPED, ("loop", "pump"), [{"least": "0", "largest": "5"}, {"least": "-4", "largest": "0"}],
+     [{"least": "0", "largest": "0"}, {"least": "1/9", "largest": "5"}, {"least": "-4", "largest": "-1/9"},
+      {"least": "-4"}, {"largest": "5"}, {"least": "-4", "largest": "5", "rate": "1"}, {}, [], "5", None, 5]),
     (LAYERED, ("loop", "diffusion"), ["1/32", "1/31", "5"], ["1/33", "0", "-1", 1, None]),
     (LAYERED, ("loop",), [many(7, "1", "0", "1")["loop"], many(8, "0", "1", "1")["loop"]],
      [many(8, "1", "0", "1")["loop"], many(8, "1/2", "1", "1")["loop"]]),
@@ -189,6 +194,26 @@ def test_every_claim_may_be_what_follows_and_no_less(name, monkeypatch):
         checker.verify(BEHIND | {"claims": fewer | {"least_asked": claims["least_asked"]}})
     with pytest.raises(checker.Refused, match="must not tell the valve's pressure"):
         checker.verify(HELD | {"claims": claims})
+
+
+@pytest.mark.parametrize(("raw", "names"), [(HELD, CLAIMS[3:]), (BEHIND, ("least_asked", "largest_asked"))])
+def test_what_is_claimed_at_the_valve_may_touch_the_limits_of_its_pump_and_not_pass_them(raw, names, monkeypatch):
+    """Claims of the fault's pressure are from -4 to 5 Pa, in all that is derived; those of the valve twice that."""
+    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(0)] * 4, F(1, 3)))
+    given = checker.read_task(HELD)
+    given.rest = (F(-1), F(1))
+    monkeypatch.setattr(checker, "read_task", lambda _: given)
+    claims = HELD["claims"] | dict(zip(names, ("-8", "10"), strict=True))
+    for least, largest, holds in (("-8", "10", True), ("-79/10", "10", False), ("-8", "99/10", False)):
+        pumped = changed(raw, (("loop", "pump"), {"least": least, "largest": largest}), (("claims",), claims))
+        if holds:
+            assert checker.verify(pumped)[2].endswith(", a pump from -8 Pa to 10 Pa that is never at its limits")
+        else:
+            with pytest.raises(checker.Refused, match="must stay within what the pump can do"):
+                checker.verify(pumped)
+    fewer = changed(BEHIND, (("loop", "pump"), {"least": "-8", "largest": "10"}))
+    with pytest.raises(checker.Refused, match="a pump behind which there is a lag or rock needs claims of it"):
+        checker.verify(fewer)
 
 
 @pytest.mark.usefixtures("coarse")

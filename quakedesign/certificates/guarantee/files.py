@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.slow_gain import SlowGain
 from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held
 from quakedesign.certificates.guarantee.task import Friction, Task
@@ -44,6 +45,7 @@ _TIMES = ("step", "delay", "lag")
 _SLIDING_TIMES = (*_TIMES, "diffusion", "slip_noise")
 _SLIDING_REFERENCE = ("rate", "distance", "ramp")
 _NOISE = ("slip", "rate")
+_PUMP = ("least", "largest")
 _LAW = ("states", "measured", "output", "feedback")
 _FAULT = re.compile(r"\w[\w .+-]{0,59}")
 _MOST_COEFFICIENTS = 13
@@ -154,6 +156,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         own |= {} if root is None else {"root": _root_document(root)}
         noise = claim.held.noise
         own |= {"noise": {name: str(noise.get(f"{name}_noise", 0)) for name in _NOISE}} if noise else {}
+        own |= {"pump": claim.held.pump.to_dict()} if claim.held.pump else {}
     return {
         **times,
         "states": list(law.states),
@@ -178,6 +181,8 @@ def _read_tracking(raw: Any) -> Guarantee | ContinuousPeaks:
     loop = claim.loop
     told = "asked" in loop.outputs or claims.least_asked is None
     need(told, "without a lag and rock the claims must not tell the valve's pressure from the fault's")
+    pumped = isinstance(claim, Guarantee) and claim.held.pump and "asked" in loop.outputs
+    need(not pumped or claims.least_asked is not None, "a pump behind which there is a lag or rock needs claims of it")
     _require_few(loop.states)
     return claim
 
@@ -260,7 +265,7 @@ def _start(raw: Any) -> dict[str, Fraction]:
 
 
 def _held(raw: Any, start: dict[str, Fraction]) -> Held:
-    given = {"root", "noise", "diffusion", "first"} & set(raw) if isinstance(raw, dict) else set[str]()
+    given = {"root", "noise", "diffusion", "first", "pump"} & set(raw) if isinstance(raw, dict) else set[str]()
     with_keys(raw, {*_TIMES, "update", *_LAW} | given)
     root = _read_root(raw["root"]) if "root" in given else None
     law = LinearLaw(
@@ -270,7 +275,9 @@ def _held(raw: Any, start: dict[str, Fraction]) -> Held:
     diffusion = read_rational(raw["diffusion"]) if "diffusion" in given else _ZERO
     need(diffusion > 0 or "diffusion" not in given, "diffusion must be positive where it is given")
     times = {name: read_rational(raw[name]) for name in _TIMES}
-    return Held(law=law, diffusion=diffusion, **times, **{f"{name}_noise": v for name, v in noise.items()}, **start)
+    told = {f"{name}_noise": v for name, v in noise.items()}
+    pump = Pump(**read_exactly(raw["pump"], _PUMP)) if "pump" in given else None
+    return Held(law=law, diffusion=diffusion, pump=pump, **times, **told, **start)
 
 
 def _sliding_held(raw: Any) -> Held:
@@ -283,7 +290,8 @@ def _sliding_held(raw: Any) -> Held:
         output=read_row(raw["output"], "output", length=len(states)),
         feedback=(read_rational(raw["feedback"]), _ZERO),
     )
-    return Held(law=law, **{name: read_rational(raw[name]) for name in _SLIDING_TIMES})
+    around: dict[str, Any] = {name: read_rational(raw[name]) for name in _SLIDING_TIMES}
+    return Held(law=law, **around)
 
 
 def _cuts(raw: Any) -> Cuts:

@@ -10,6 +10,7 @@ from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import sector
 from quakedesign.certificates.guarantee.inputs import Gains
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
 from quakedesign.certificates.guarantee.small_gain import Bounds, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.certificates.guarantee.task import Task
@@ -42,7 +43,7 @@ _TURNS = 32  # of claims that follow from themselves
 
 
 class Around(TypedDict, total=False):
-    """What `Held` has besides the law and T_s; what is left out is 0."""
+    """What `Held` has besides the law and T_s; what is left out is 0, a pump without limits None."""
 
     delay: Fraction
     lag: Fraction
@@ -51,6 +52,7 @@ class Around(TypedDict, total=False):
     rate_noise: Fraction
     initial_slip: Fraction
     initial_slip_rate: Fraction
+    pump: Pump | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +70,8 @@ class Held:
         Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
     initial_slip, initial_slip_rate : Fraction
         Bounds of both at the start, where the reference has none, of either sign [m], [m/s].
+    pump : Pump, optional
+        Limits at the valve, which the loop must never reach.
 
     Raises
     ------
@@ -84,6 +88,7 @@ class Held:
     rate_noise: Fraction = Fraction(0)
     initial_slip: Fraction = Fraction(0)
     initial_slip_rate: Fraction = Fraction(0)
+    pump: Pump | None = None
 
     def __post_init__(self) -> None:
         if min(self.start) < 0:
@@ -305,6 +310,8 @@ class Guarantee:
         bounds = self.bounds()
         if isinstance(bounds, NoGuarantee) or not _root_within(self.held, self.claims):
             return Verdict.UNDECIDED
+        if _beyond_the_pump(self.held, self.claims):
+            return Verdict.UNDECIDED
         if self.slow_gain is not None and not bounds.slip_error < self.claims.slip_error:
             return Verdict.UNDECIDED
         return Verdict.PROVED if self.claims.covers(Claims.of(self.task, bounds)) else Verdict.UNDECIDED
@@ -319,6 +326,7 @@ class Guarantee:
         when += ", with the slip alone measured" if held.law.of_slip_alone else ""
         for name, bound in held.noise.items():
             when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
+        when += f", {held.pump.words()}" if held.pump else ""
         return sentence_of(self.task, self.claims, when, _start(*held.start))
 
 
@@ -355,6 +363,8 @@ def guarantee(task: Task, held: Held, slow_gain: SlowGain | None = None) -> Guar
     if not _root_within(held, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
         return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
+    if reason := _beyond_the_pump(held, claims):
+        return NoGuarantee(reason=reason, small_gain=None)
     return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
 
 
@@ -400,6 +410,11 @@ def _root_within(held: Held, claims: Claims) -> bool:
     root = held.law.root
     errors = claims.slip_error + held.slip_noise, claims.slip_rate_error + held.rate_noise
     return root is None or sector.holds(root, held.step, *errors)
+
+
+def _beyond_the_pump(held: Held, claims: Claims) -> str:
+    """Why the pump cannot do what is claimed; empty where it can."""
+    return held.pump.exceeded(*claims.pressures[-1]) if held.pump else ""
 
 
 def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:

@@ -126,7 +126,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     )
     quiet = Held(law=alone, step=F(1))
     around = ("delay", "lag", "diffusion", "slip_noise", "rate_noise", "initial_slip", "initial_slip_rate")
-    assert (quiet.noise, quiet.around) == ({}, dict.fromkeys(around, 0))
+    assert (quiet.noise, quiet.around) == ({}, dict.fromkeys(around, 0) | {"pump": None})
     said = Guarantee(task=TASK, held=quiet, claims=CLAIMS).sentence()
     assert "held over 1 s, with the slip alone measured, for every" in said
     assert Held(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
