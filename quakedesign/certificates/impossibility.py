@@ -3,27 +3,35 @@
 A claim about all frictions and parameters of the box fails if it fails for one of them, so each theorem picks the plant
 that hurts most among a few. κ = k̂ − φ1 and w = η̂ − φ2 stand for the plant, φ is any measurable function of time with
 |φ| ≤ H, the pressure p is whatever a controller likes: linear or not, with memory, knowing plant, slip, slip rate and
-disturbance exactly up to the sample. X and P below are the largest slip-rate error and the largest withdrawal.
+disturbance exactly up to the sample; or, with noise in theorem 1, knowing the plant and being told, at all times up to
+the sample, slip and slip rate within n and n′ of the true ones, either of which may be missing (n = ∞). X and P below
+are the largest slip-rate error and the largest withdrawal.
 
 **Theorem 1 (surprise).** Let the pressure be decided at samples T apart, act θ later and stay for T. On the plant
 continued to negative slip rates no controller keeps the slip error within E and the slip-rate error below X for ever if
 
-    X ≤ 2H·h(T + θ),   h: impulse response of h″ = σh − wh′ from acceleration to slip.
+    X ≤ 2H·h(T + θ + τ),   h: impulse response of h″ = σh − wh′ from acceleration to slip,
 
-Once the reference r rests, friction that is affine there, μ(r + e1) = μr − m·e1 for |e1| ≤ E, gives with q = p − p*
+where noise hides for τ that a push has turned: H·h₊(t) ≤ n′ and H·∫₀ᵗ h₊ ≤ n for 0 ≤ t ≤ τ, h₊ as h with σ₊; τ = 0
+without noise. Once the reference r rests, friction that is affine there, μ(r + e1) = μr − m·e1 for |e1| ≤ E, gives with
+q = p − p*
 
-    e1′ = e2,   e2′ = s·e1 − w·e2 + N̂(μr − m·e1)q + φ,   s = N̂m(σ′ − p*) − κ,   σ = s − m(2X/T + sE + |w|X)/(μr − mE),
+    e1′ = e2,   e2′ = s·e1 − w·e2 + N̂(μr − m·e1)q + φ,   s = N̂m(σ′ − p*) − κ,
+    σ = s − m(2X/T + sE + |w|X)/(μr − mE),   σ₊ = s + m(2X/T + sE + |w|X + H)/(μr − mE),
 
-and σ must not be negative. Friction that does not change, m = 0, leaves σ = s = −κ, and E may be any bound.
-*Proof.* Suppose |e1| ≤ E, |e2| ≤ X′ < X for every φ. Take φ = H from the rest of r on. While p is held, y = e2 obeys
-y″ = σ_k·y − w·y′ with σ_k = s − N̂mq_k. Integrated over the T that q_k lasts, e2′ bounds q_k from below and, N̂q_k(μr −
-mE) ≤ 2X′/T + sE + |w|X′, from above: σ ≤ σ_k ≤ some σ₊. If y ≥ δ > 0 at all changes of p from some on, then y is in
-between above the solution for σ₊ with δ at both ends (maximum principle, or for σ < 0 since κT² ≤ 1 < π²), each T adds
-at least a fixed part of δ to e1, and e1 leaves E. So for every δ some change of p, at t + θ + T with t a sample, has
-e2 < δ. Turn φ to −H at t: what p does until then was decided by t and stays. The difference d of both courses has d2′ =
-σ(t)d1 − w·d2 + 2H with σ(t) ≥ σ, so d2 ≥ 2H·h(θ + T) ≥ X, and the turned course has e2 < δ − X, for every δ > 0. ∎
+and σ must not be negative. Friction that does not change, m = 0, leaves σ = σ₊ = s = −κ, and E may be any bound.
+*Proof.* Suppose |e1| ≤ E, |e2| ≤ X′ < X for every φ and every noise. Take φ = H from the rest of r on. While p is
+held, y = e2 obeys y″ = σ_k·y − w·y′ with σ_k = s − N̂mq_k. Integrated over the T that q_k lasts, e2′ bounds q_k: −(2X′/T
++ sE + |w|X′ + H) ≤ N̂q_k(μr − mE) ≤ 2X′/T + sE + |w|X′, so σ ≤ σ_k ≤ σ₊. If y ≥ δ > 0 at all changes of p from some on,
+then y is in between above the solution for σ₊ with δ at both ends (maximum principle, or for σ < 0 since κT² ≤ 1 < π²),
+each T adds at least a fixed part of δ to e1, and e1 leaves E. So for every δ some change of p, at t + θ + T with t a
+sample, has e2 < δ, as late as one likes. Turn φ to −H at t − τ. As long as p is the same in both, the difference d of
+both courses has d2′ = σ(t)d1 − w·d2 + 2H with σ ≤ σ(t) ≤ σ₊, so that d1 and d2 are at least 0 and at most what σ₊ makes
+of them: up to t at most 2n and 2n′. So let what is told be n and n′ too low in the first course, always, and higher by
+d in the turned one: it is within n and n′ there too, and up to t what is told is the same, which decides what p does
+until t + θ + T. By then d2 ≥ 2H·h(τ + θ + T) ≥ X, and the turned course has e2 < δ − X, for every δ > 0. ∎
 A controller that holds for T also holds for T/n, and one that acts θ late could act earlier, so T and θ may be
-shortened.
+shortened, and τ as well.
 
 **Theorem 2 (withdrawal).** Let a fault rest at p = 0 when a push φ = H begins, and the pressure at the well be 0 until
 T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse response is not
@@ -46,7 +54,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 from math import ceil, sqrt
-from typing import Any
+from typing import Any, TypedDict
 
 from flint import arb, arb_mat, ctx
 
@@ -60,6 +68,7 @@ from quakedesign.rationals import end_of
 _BITS = 128
 _SHARE = Fraction(1, 20)  # E of theorem 1: of the slip over which friction falls, and of the target
 _BISECTIONS = 14
+_SHARES = [Fraction(3, 4) ** n for n in range(16)]  # of τ, tried until they forbid less
 _GROWN, _TURNED = 32, 1  # longest T·√|s| that theorem 1 is used with, for s above and below 0
 _ZERO = Fraction(0)
 
@@ -80,6 +89,13 @@ class SmallestPeak:
     slip_error: UpperBound | None
 
 
+class Noise(TypedDict):
+    """Bounds n [m] and n′ [m/s] of theorem 1; None for a slip rate that is not measured."""
+
+    slip_noise: Fraction
+    rate_noise: Fraction | None
+
+
 @dataclass(frozen=True, slots=True)
 class _Surprised:
     """A plant of theorem 1: s [1/s²], w [1/s], m [1/m], the least friction near r [-], E [m]."""
@@ -89,6 +105,39 @@ class _Surprised:
     weakening: Fraction
     friction: Fraction
     reach: Fraction | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What a controller is told: bounds n [m] and n′ [m/s] of the noise; None for a slip rate that is not measured."""
+
+    slip_noise: Fraction
+    rate_noise: Fraction | None
+
+    @property
+    def noisy(self) -> bool:
+        """Whether anything is hidden."""
+        return bool(self.slip_noise) and self.rate_noise != 0
+
+    def hides(self, slip: Fraction, rate: Fraction, push: Fraction, step: Fraction) -> Fraction:
+        """τ [s], within a small part of T: for how long a turned push [m/s²] is hidden with σ₊ = `slip`, w = `rate`.
+
+        A larger σ₊ hides it for less. Answers with σ₊ of at least 0 only grow: it is enough to look at their ends.
+        """
+        if not push or not self.noisy:
+            return _ZERO
+
+        def hidden(time: Fraction) -> bool:
+            told = zip(_moved(max(slip, _ZERO), rate, time), (self.slip_noise, self.rate_noise), strict=True)
+            return all(noise is None or bool(ball(push) * answer <= ball(noise)) for answer, noise in told)
+
+        low, high = _ZERO, step
+        while hidden(high):
+            low, high = high, 2 * high
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if hidden(middle) else (low, middle)
+        return low
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +155,14 @@ class _Pushed:
         return ((w * w + 4 * ball(self.slip)).sqrt() - w) / 2
 
 
-def smallest_peak(task: Task, step: Fraction, delay: Fraction = _ZERO) -> SmallestPeak | None:
+def smallest_peak(
+    task: Task,
+    step: Fraction,
+    delay: Fraction = _ZERO,
+    *,
+    slip_noise: Fraction = _ZERO,
+    rate_noise: Fraction | None = _ZERO,
+) -> SmallestPeak | None:
     """Theorem 1; None without a disturbance.
 
     Parameters
@@ -114,17 +170,22 @@ def smallest_peak(task: Task, step: Fraction, delay: Fraction = _ZERO) -> Smalle
     task : Task
     step, delay : Fraction
         T, positive, and θ [s].
+    slip_noise, rate_noise : Fraction
+        n [m] and n′ [m/s]; None for a slip rate that is not measured.
 
     Raises
     ------
     ParameterError
-        For times that are negative, or a step of 0.
+        For times or noise that are negative, or a step of 0.
     """
     _require(step > 0 and delay >= 0, "a step above 0 and a delay of at least 0", step, delay)
+    noise = (slip_noise, *([] if rate_noise is None else [rate_noise]))
+    _require(min(noise) >= 0, "bounds of noise of at least 0", *noise)
+    told = _Told(slip_noise, rate_noise)
     with ctx.workprec(_BITS):
         peaks = [
             SmallestPeak(
-                slip_rate_error=LowerBound(_surprise(plant, step, delay, task.amplitude)),
+                slip_rate_error=LowerBound(_surprise(plant, step, delay, told, task.amplitude)),
                 slip_error=None if plant.reach is None else UpperBound(plant.reach),
             )
             for plant in _surprised(task)
@@ -202,7 +263,8 @@ def _least(task: Task | SlidingPush, value: Callable[[_Pushed | SlidingPush], An
 
 def _corners(task: Task) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
     """κ, w and N̂ at the ends of their ranges."""
-    for k, eta, area in product(task.stiffness, task.specific_damping, task.area_per_mass):
+    ranges = (dict.fromkeys(ends) for ends in (task.stiffness, task.specific_damping, task.area_per_mass))
+    for k, eta, area in product(*ranges):
         yield k - task.growths[0], eta - task.growths[1], area
 
 
@@ -231,29 +293,54 @@ def _surprised(task: Task) -> Iterator[_Surprised]:
             yield _Surprised(slip, w, law.weakening, middle - law.weakening * reach, reach)
 
 
-def _surprise(plant: _Surprised, step: Fraction, delay: Fraction, amplitude: Fraction) -> Fraction:
+def _surprise(plant: _Surprised, step: Fraction, delay: Fraction, told: _Told, amplitude: Fraction) -> Fraction:
     """X, or 0 where the theorem says nothing."""
     pace = sqrt(abs(plant.slip))
     most = _GROWN if plant.slip > 0 else _TURNED
     held = step / max(1, ceil(float(step) * pace / most))
-    late = delay if float(delay) * pace <= most else Fraction(most / pace)
 
-    def bound(slip: Fraction) -> Any:
-        flow = arb_mat([[arb(0), arb(1)], [ball(slip), -ball(plant.rate)]])
-        return 2 * ball(amplitude) * (flow * ball(held + late)).exp()[0, 1]
+    def shortened(time: Fraction) -> Fraction:
+        return time if float(time) * pace <= most else Fraction(most / pace)
 
-    def holds(peak: Fraction, reach: Fraction) -> bool:
-        force = 2 * peak / held + plant.slip * reach + abs(plant.rate) * peak
-        slip = plant.slip - plant.weakening * force / plant.friction
-        return slip >= 0 and bool(bound(slip) >= ball(peak))
+    def hidden(slip: Fraction) -> Fraction:
+        return shortened(told.hides(slip, plant.rate, amplitude, step))
 
-    if plant.reach is None:
-        return max(_ZERO, end_of(bound(plant.slip).lower()))
-    low, high = _ZERO, upper(bound(plant.slip))
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if holds(middle, plant.reach) else (low, middle)
-    return low
+    def bound(slip: Fraction, unseen: Fraction) -> Any:
+        return 2 * ball(amplitude) * _moved(slip, plant.rate, held + shortened(delay) + unseen)[1]
+
+    reach = plant.reach or _ZERO
+
+    def gained(peak: Fraction, more: Fraction = _ZERO) -> Fraction:
+        """What friction's slope makes of the pressure's force."""
+        force = 2 * peak / held + plant.slip * reach + abs(plant.rate) * peak + more
+        return plant.weakening * force / plant.friction
+
+    def largest(share: Fraction) -> Fraction:
+        unseen = share * hidden(plant.slip)
+        if not plant.weakening:
+            return end_of(bound(plant.slip, unseen).lower())
+        low, high = _ZERO, upper(bound(plant.slip, unseen))
+        unseen = min(unseen, hidden(plant.slip + gained(high, amplitude)))
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            slip = plant.slip - gained(middle)
+            holds = slip >= 0 and bool(bound(slip, unseen) >= ball(middle))
+            low, high = (middle, high) if holds else (low, middle)
+        return low
+
+    best = _ZERO
+    for share in _SHARES if told.noisy else _SHARES[:1]:
+        if (found := largest(share)) <= best:
+            break
+        best = found
+    return best
+
+
+def _moved(slip: Fraction, rate: Fraction, time: Fraction) -> tuple[Any, Any]:
+    """Slip and slip rate after a unit push for some time, from rest."""
+    flow = arb_mat([[arb(0), arb(1), arb(0)], [ball(slip), -ball(rate), arb(1)], [arb(0), arb(0), arb(0)]])
+    moved = (flow * ball(time)).exp()
+    return moved[0, 2], moved[1, 2]
 
 
 def _require(holds: bool, what: str, *values: Fraction) -> None:

@@ -1,10 +1,11 @@
 """The command about what no controller can do."""
 
 from pathlib import Path
+from typing import Literal
 
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
 from quakedesign.cli.shared import app
-from quakedesign.cli.units import Pascals, SquareMetresPerSecond
+from quakedesign.cli.units import ExactMetres, ExactMetresPerSecond, Pascals, SquareMetresPerSecond
 
 
 @app.command
@@ -15,6 +16,9 @@ def limits(
     pressure: Pascals | None = None,
     diffusivity: SquareMetresPerSecond = 1.0,
     stress: Pascals | None = None,
+    measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
+    slip_noise: ExactMetres = "0",
+    rate_noise: ExactMetresPerSecond = "0",
     box: Box = None,
     disturbance: Shaking = None,
     out: Path | None = None,
@@ -36,6 +40,13 @@ def limits(
     stress
         Of a fault with rate-and-state friction, whose limits are those of its linearisation about slow sliding: bound
         of the shear stress disturbance, such as '25 kPa'; the largest that a design stands unless given.
+    measured
+        What controllers are told: slip-and-rate, or slip.
+    slip_noise
+        Bound of the error of the measured slip, whatever its course, such as '1 um': how far noise limits the slip-rate
+        error of any controller.
+    rate_noise
+        The same of the measured slip rate.
     out
         Folder for a figure and results.json; nothing is written unless given.
     """
@@ -50,7 +61,15 @@ def limits(
     from quakedesign.report.limits import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits
 
-    answer = all_limits(loaded, pressure=pressure, diffusivity=diffusivity, stress=stress)
+    answer = all_limits(
+        loaded,
+        pressure=pressure,
+        diffusivity=diffusivity,
+        stress=stress,
+        measured=measured,
+        slip_noise=slip_noise,
+        rate_noise=rate_noise,
+    )
     if out is not None:
         write_limits(answer, out, format)
     written = [] if out is None else [f"written: {out}/ ({file_names('limits', format)}, results.json)"]

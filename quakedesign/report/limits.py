@@ -15,7 +15,7 @@ from quakedesign.report.figure_files import write_figures, write_results
 from quakedesign.studies import Limits
 from quakedesign.studies.fault_limits import SlidingLimits
 
-_FORBIDDEN, _PROVED = "#F3C6B2", "#0072B2"
+_FORBIDDEN, _HIDDEN, _PROVED = "#F3C6B2", "#F9E4DA", "#0072B2"
 
 
 def limits_lines(limits: Limits) -> list[str]:
@@ -42,10 +42,13 @@ def _meaning(limits: Limits) -> list[str]:
     if limits.peak_slip_rate_error.impossible_beyond is None:
         return ["without a disturbance no limit is known"]
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
+    known = "even with slip, slip rate and disturbance known"
+    if limits.told.noisy:
+        known = f"told no more than {limits.told.words()}"
     told = [
         "impossible for every controller, linear or not, for some friction of the box and some disturbance of the "
         "class amplitude, which may jump",
-        "slip-rate error: even with slip, slip rate and disturbance known up to the sample, if the slip error stays "
+        f"slip-rate error: {known} up to the sample, if the slip error stays "
         f"{within}; slip rates may be negative, as in the guarantees",
         "proved: of two designs, the one with the smaller slip-rate error; design prefers a smaller slip error unless "
         "its objective is peak",
@@ -113,6 +116,11 @@ def limits_figure(limits: Limits) -> Any:
         axis.fill_between(steps, peaks[0] / 3, peaks, color=_FORBIDDEN, lw=0, label="impossible for every controller")
         if last is not None:
             axis.axvspan(float(last), 2 * steps[-1], color=_FORBIDDEN, lw=0)
+        if limits.told.noisy:
+            exact = [float(peak) for _, peak in limits.smallest_peaks(told=False)]
+            axis.fill_between(
+                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"and for those told {limits.told.words()}"
+            )
         axis.set(xlim=(steps[0], (1 if last is None else 2) * steps[-1]), ylim=(peaks[0] / 3, top))
     if limits.achieved:
         proved = [(float(step), float(error)) for step, error in limits.achieved]

@@ -8,6 +8,7 @@ from typing import Any
 from quakedesign.bounds import Bound, LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task, task_of
 from quakedesign.certificates.impossibility import (
+    Noise,
     farthest_well,
     longest_diffusion,
     longest_reaction,
@@ -16,11 +17,11 @@ from quakedesign.certificates.impossibility import (
 )
 from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.certificates.slow_sliding.push import SlidingPush
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.simulation.memoryless_earthquake import natural_peak
-from quakedesign.synthesis.guaranteed import design_held, longest_delay, reached
+from quakedesign.synthesis.guaranteed import MEASURED, design_held, longest_delay, reached
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer, answer_sliding
 from quakedesign.synthesis.linear.plant.sliding_model import near_path, sliding_model
 
@@ -28,6 +29,7 @@ _ATTEMPTS = 6  # designs for one time
 _POINTS = 24  # of the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
+TOLD = "all controllers, linear or not, that know the fault and are told up to the sample no more than {}"
 WAITING = "all controllers, linear or not, all-knowing from the first sample after the disturbance begins"
 QUANTITIES = {
     "peak_slip_rate_error": ("slip-rate error", "m/s"),
@@ -74,6 +76,67 @@ class Limit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """What controllers are told of slip and slip rate, at all times up to a sample.
+
+    Attributes
+    ----------
+    measured : str
+        One of `MEASURED`.
+    slip_noise, rate_noise : Fraction
+        Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
+
+    Raises
+    ------
+    ParameterError
+        For a negative bound, another name, or noise of a slip rate that is not measured.
+    """
+
+    measured: str = MEASURED[0]
+    slip_noise: Fraction = Fraction(0)
+    rate_noise: Fraction = Fraction(0)
+
+    def __post_init__(self) -> None:
+        require_known(self.measured, MEASURED, "measured")
+        noise = f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s"
+        if min(self.slip_noise, self.rate_noise) < 0:
+            raise ParameterError(f"a bound of noise must be 0 or more. Received {noise}. Check their signs.")
+        if self._alone and self.rate_noise:
+            raise ParameterError(
+                f"noise of the slip rate needs one that is measured. Received {noise}, measured {self.measured}. Leave "
+                "it out."
+            )
+
+    @property
+    def _alone(self) -> bool:
+        return self.measured == MEASURED[1]
+
+    @property
+    def noisy(self) -> bool:
+        """Whether noise hides anything: what is known exactly of the slip rate tells as much as both."""
+        return bool(self.slip_noise and (self._alone or self.rate_noise))
+
+    @property
+    def bounds(self) -> Noise:
+        """Of `smallest_peak`."""
+        return {"slip_noise": self.slip_noise, "rate_noise": None if self._alone else self.rate_noise}
+
+    @property
+    def around(self) -> dict[str, Any]:
+        """Of a design."""
+        return {"measured": self.measured, "slip_noise": self.slip_noise, "rate_noise": self.rate_noise}
+
+    def words(self) -> str:
+        """For people: rounded up, since who is told less can do less."""
+        slip = f"the slip within {UpperBound(self.slip_noise).quantity('m')}"
+        return slip if self._alone else f"{slip}, the slip rate within {UpperBound(self.rate_noise).quantity('m/s')}"
+
+    def knowing(self) -> str:
+        """Controllers for which a smallest slip-rate error holds."""
+        return TOLD.format(self.words()) if self.noisy else KNOWING
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """Limits of a fault, for the worst friction and parameters of its box.
 
@@ -90,6 +153,8 @@ class Limits:
         Each of the latter three and the delay at the fault's T_s.
     proved : tuple of Guarantee
         Of the designs without delay that were found on the way, by T_s.
+    told : Told
+        What controllers are told, for the slip-rate error and designs; all others may know everything.
     """
 
     fault: Fault
@@ -103,6 +168,7 @@ class Limits:
     farthest_well: Limit
     smallest_pressure: Limit
     proved: tuple[Guarantee, ...]
+    told: Told
 
     def __repr__(self) -> str:
         return f"Limits({self.fault.name}: {', '.join(self.named())})"
@@ -136,14 +202,20 @@ class Limits:
             "step": self.fault.sampling_time,
             "withdrawal": float(self.withdrawal),
             "diffusivity": float(self.diffusivity),
+            "measured": self.told.measured,
+            "slip_noise": str(self.told.slip_noise),
+            "rate_noise": str(self.told.rate_noise),
             "slip_error": None if self.slip_error is None else str(self.slip_error),
             **{name: limit.to_dict() for name, limit in self.named().items()},
         }
 
-    def smallest_peaks(self) -> list[tuple[Fraction, LowerBound]]:
-        """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below."""
-        task = task_of(self.fault)
-        peaks = [(step, smallest_peak(task, step)) for step in self._steps()]
+    def smallest_peaks(self, *, told: bool = True) -> list[tuple[Fraction, LowerBound]]:
+        """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below.
+
+        Of controllers that are `told` no more than these, or that know everything.
+        """
+        task, noise = task_of(self.fault), (self.told if told else Told()).bounds
+        peaks = [(step, smallest_peak(task, step, **noise)) for step in self._steps()]
         return [(step, peak.slip_rate_error) for step, peak in peaks if peak is not None]
 
     def _steps(self) -> list[Fraction]:
@@ -186,7 +258,7 @@ class SlidingLimits(Limits):
         """Plain values, SI; what is proved as decimal texts, rounded outwards."""
         return Limits.to_dict(self) | {"disturbance": None, "stress": float(self.push.amplitude)}
 
-    def smallest_peaks(self) -> list[tuple[Fraction, LowerBound]]:
+    def smallest_peaks(self, *, told: bool = True) -> list[tuple[Fraction, LowerBound]]:
         """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below."""
         return [(step, self.push.smallest_rate_error(step)) for step in self._steps()]
 
@@ -197,6 +269,9 @@ def limits(
     pressure: float | None = None,
     diffusivity: float = 1.0,
     stress: float | None = None,
+    measured: str = MEASURED[0],
+    slip_noise: float | str | Fraction = 0,
+    rate_noise: float | str | Fraction = 0,
     prove: bool = True,
 ) -> Limits:
     """What no controller can do with a fault whose disturbance is of the class ``amplitude``.
@@ -216,6 +291,11 @@ def limits(
     stress : float, optional
         Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that a design stands unless
         given.
+    measured : str
+        What controllers are told: ``slip-and-rate`` or ``slip``.
+    slip_noise, rate_noise : float, str or Fraction
+        Bounds of what that is off [m], [m/s], whatever the course, for the slip-rate error and designs. With friction
+        that has a state no limit of noise is known.
     prove : bool
         Whether to look for designs with a guarantee, which takes a minute.
 
@@ -226,10 +306,20 @@ def limits(
     Raises
     ------
     ParameterError
-        For a negative pressure, a diffusivity that is not positive, a stress without friction that has a state, or none
-        where no design stands any.
+        For a negative pressure, a diffusivity that is not positive, a stress without friction that has a state, none
+        where no design stands any, noise with it, negative noise, or noise of a slip rate that is not measured.
     """
+    told = Told(
+        measured=measured,
+        slip_noise=rational(slip_noise, "slip noise"),
+        rate_noise=rational(rate_noise, "rate noise"),
+    )
     if fault.friction.state_names:
+        if told != Told():
+            raise ParameterError(
+                f"no limit of slow sliding is known for noise. Received {fault.friction.name}, told {told.words()}. "
+                "Leave noise out: what cannot be done without it cannot be done with it."
+            )
         return _sliding_limits(fault, pressure, diffusivity, stress, prove)
     if stress is not None:
         raise ParameterError(
@@ -238,24 +328,27 @@ def limits(
         )
     task, step = task_of(fault), rational(fault.sampling_time)
     withdrawal, spread = _given(fault, pressure, diffusivity)
-    held = _proved_steps(task, step) if prove else ()
+    held = _proved_steps(task, step, told) if prove else ()
     if own := next((g for g in held if g.held.step == step), None):
-        own = _best_at(own)
+        own = _best_at(own, told)
         held = tuple(own if g.held.step == step else g for g in held)
-    peak, proved = smallest_peak(task, step), dict[str, Bound | None]()
+    peak, proved = smallest_peak(task, step, **told.bounds), dict[str, Bound | None]()
     if held:
         proved["largest_step"] = LowerBound(held[-1].held.step)
     if own is not None:
         proved["peak_slip_rate_error"] = own.claims.slip_rate_error
-        proved["largest_delay"] = _proved_delay(task, step)
+        proved["largest_delay"] = _proved_delay(task, step, told)
         proved["smallest_pressure"] = UpperBound(max(-own.claims.least_pressure, Fraction(0)))
     return Limits(
         fault=fault,
         withdrawal=withdrawal,
         diffusivity=spread,
         slip_error=peak.slip_error if peak else None,
-        **_limits(_impossible(task, withdrawal, step, spread, peak.slip_rate_error if peak else None), proved),
+        **_limits(
+            _impossible(task, withdrawal, step, spread, peak.slip_rate_error if peak else None), proved, told.knowing()
+        ),
         proved=held,
+        told=told,
     )
 
 
@@ -275,7 +368,7 @@ def _impossible(
 
 
 def _limits(
-    impossible: Mapping[str, Bound | None], proved: Mapping[str, Bound | None], plant: str = ""
+    impossible: Mapping[str, Bound | None], proved: Mapping[str, Bound | None], knowing: str, plant: str = ""
 ) -> dict[str, Limit]:
     """Limits by name, of a plant that is not the fault itself if one is named."""
     return {
@@ -284,7 +377,7 @@ def _limits(
             unit=unit,
             impossible_beyond=impossible[name],
             proved_up_to=proved.get(name),
-            holds_for=(KNOWING if name == "peak_slip_rate_error" else WAITING) + plant,
+            holds_for=(knowing if name == "peak_slip_rate_error" else WAITING) + plant,
         )
         for name, (title, unit) in QUANTITIES.items()
     }
@@ -323,7 +416,7 @@ def _sliding_limits(
         proved["largest_diffusion_time"] = LowerBound(found.held.diffusion)
         proved["smallest_pressure"] = found.claims.push
     impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
-    known = _limits(impossible, proved, ", of the linearised plant")
+    known = _limits(impossible, proved, KNOWING, ", of the linearised plant")
     return SlidingLimits(
         fault=fault,
         withdrawal=withdrawal,
@@ -331,6 +424,7 @@ def _sliding_limits(
         slip_error=None,
         **known | {"smallest_pressure": replace(known["smallest_pressure"], title="pressure")},
         proved=(),
+        told=Told(),
         push=push,
         guarantee=found,
     )
@@ -344,17 +438,17 @@ def _above_the_reference(found: SlidingGuarantee) -> UpperBound:
     return UpperBound(found.peak_slip_rate - found.task.rate)
 
 
-def _proved_steps(task: Task, step: Fraction) -> tuple[Guarantee, ...]:
-    return reached(lambda held: design_held(task, held, objective="peak"), step, attempts=_ATTEMPTS)
+def _proved_steps(task: Task, step: Fraction, told: Told) -> tuple[Guarantee, ...]:
+    return reached(lambda held: design_held(task, held, objective="peak", **told.around), step, attempts=_ATTEMPTS)
 
 
-def _best_at(least_peak: Guarantee) -> Guarantee:
+def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
     """Of a design for the smallest slip-rate error and one that tracks, that with the smaller one that is proved."""
-    tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking")
+    tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.around)
     found = [least_peak, *([tracking] if isinstance(tracking, Guarantee) else [])]
     return min(found, key=lambda g: g.claims.slip_rate_error)
 
 
-def _proved_delay(task: Task, step: Fraction) -> LowerBound | None:
-    longest = longest_delay(task, step)
+def _proved_delay(task: Task, step: Fraction, told: Told) -> LowerBound | None:
+    longest = longest_delay(task, step, **told.around)
     return LowerBound(longest.held.delay) if longest else None

@@ -7,6 +7,7 @@ from math import acosh, cosh, exp, log, sinh, sqrt
 import mpmath
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import brentq, linprog
 from scipy.special import erfc
@@ -334,6 +335,140 @@ def test_nor_below_that_of_a_pressure_one_period_late(name):
     assert limit - left <= peak <= 1.5 * limit
 
 
+def hidden_time(plant, push, slip_noise, rate_noise=None):
+    """For how long a turned push is not seen: s, w of the plant; slips and slip rates in closed form by quadrature."""
+
+    def rate(t):
+        return answer_in_slip(*plant, t)
+
+    def seen(t):
+        slip = quad(rate, 0, t)[0] * push / slip_noise
+        return max(slip, 0 if rate_noise is None else rate(t) * push / rate_noise) - 1
+
+    return brentq(seen, 0, 100)
+
+
+def test_noise_of_the_slip_counts_as_a_delay():
+    """First-order plant, the slip told within n: H(τ/w − (1 − e^{−wτ})/w²) = n."""
+    for noise in (1e-8, 1e-6, 1e-4):
+        hidden = brentq(lambda t, n=noise: 3.2e-4 * (t / 1.6 - (1 - exp(-1.6 * t)) / 1.6**2) - n, 0, 100)
+        exact = 2 * 3.2e-4 * (1 - exp(-1.6 * (0.184 + hidden))) / 1.6
+        found = smallest_peak(STEADY, STEP, slip_noise=F(noise), rate_noise=None)
+        assert exact * (1 - 1e-4) < float(found.slip_rate_error) <= exact * (1 + 1e-9)
+
+
+def test_noise_of_the_slip_rate_of_a_first_order_plant_is_added_twice():
+    """X = 2H(1 − e^{−wT})/w + 2n′e^{−wT}, the slip told within so much that it tells nothing."""
+    for noise in (1e-7, 1e-5, 1e-4):
+        exact = 2 * 3.2e-4 * (1 - exp(-1.6 * 0.184)) / 1.6 + 2 * noise * exp(-1.6 * 0.184)
+        found = smallest_peak(STEADY, STEP, slip_noise=F(1), rate_noise=F(noise))
+        assert exact * (1 - 1e-4) < float(found.slip_rate_error) <= exact * (1 + 1e-9)
+
+
+def test_without_noise_of_one_of_both_nothing_is_hidden():
+    plain = smallest_peak(REAL, STEP)
+    assert smallest_peak(REAL, STEP, slip_noise=F(1), rate_noise=F(0)) == plain
+    assert smallest_peak(REAL, STEP, slip_noise=F(0), rate_noise=F(1)) == plain
+    assert smallest_peak(REAL, STEP, slip_noise=F(0), rate_noise=None) == plain
+
+
+@pytest.mark.parametrize(("times", "noise", "step"), [(1, 1e-6, 0.184), (1, 1e-4, 0.184), (50, 1e-2, 2.0)])
+def test_noise_is_hidden_while_friction_weakens(times, noise, step):
+    """X = 2H·h(T + τ) with σ of X, and σ₊ of the X that there would be without what friction gains."""
+    push = 3.2e-4 * times
+    s, w, _, middle, m, reach = steep(REAL)
+    found = smallest_peak(replace(REAL, amplitude=F(push)), F(step), slip_noise=F(noise), rate_noise=None)
+
+    def gained(peak, more=0.0):
+        return m * (2 * peak / step + s * reach + w * peak + more) / (middle - m * reach)
+
+    def peak(slip, hidden):
+        return 2 * push * answer_in_slip(slip, w, step + hidden)
+
+    most = peak(s, hidden_time((s, w), push, noise))
+    hidden = hidden_time((s + gained(most, push), w), push, noise)
+    exact = brentq(lambda x: peak(s - gained(x), hidden) - x, most / 4, most)
+    assert exact * (1 - 3e-4) < float(found.slip_rate_error) <= exact * (1 + 1e-9)
+    assert float(found.slip_error) == pytest.approx(reach)
+
+
+@pytest.mark.parametrize("told", [(1e-6, None), (1e-6, 1e-5), (1e-4, 2e-4)])
+def test_no_turn_that_noise_hides_moves_the_slip_rate_further(told):
+    """Of all pushes in [0, 2H] whose slip and slip rate stay within 2n and 2n′ up to the sample: a linear programme."""
+    kappa, w, span, cells = 0.4799968, 1.6, 8 * STEP, 160
+    calm = replace(STEADY, growths=REAL.growths)
+    flow = expm(np.array([[0, 1, 0], [-kappa, -w, 1], [0, 0, 0]]) * float(span / cells))
+    answers = [flow[:2, 2]]
+    for _ in range(cells - 1):
+        answers.append(flow[:2, :2] @ answers[-1])
+    answers = np.array(answers)
+    past = cells * 7 // 8  # cells before the sample
+    seen = np.zeros((past, 2, cells))
+    for k in range(past):
+        seen[k, :, : k + 1] = answers[k::-1].T
+    rows = [seen[:, i] for i, noise in enumerate(told) if noise is not None]
+    sizes = [np.full(past, 2 * noise) for noise in told if noise is not None]
+    found = linprog(
+        -answers[::-1, 1],
+        A_ub=np.vstack([*rows, *(-row for row in rows)]),
+        b_ub=np.concatenate(sizes * 2),
+        bounds=(0, 2 * 3.2e-4),
+    )
+    slip, rate = told
+    limit = smallest_peak(calm, STEP, slip_noise=F(slip), rate_noise=None if rate is None else F(rate))
+    assert -found.fun == pytest.approx(float(limit.slip_rate_error), rel=5e-3)
+
+
+def test_more_noise_and_larger_disturbances_forbid_more():
+    peaks = [smallest_peak(REAL, STEP, slip_noise=F(n, 10**8), rate_noise=None) for n in (0, 1, 100, 10**4, 10**6)]
+    rates = [peak.slip_rate_error for peak in peaks]
+    assert rates == sorted(set(rates))
+    calm = replace(STEADY, growths=REAL.growths)
+    swings = [smallest_peak(calm, STEP, slip_noise=F(n, 10**6), rate_noise=None) for n in (1, 10**2, 10**4)]
+    assert [peak.slip_rate_error for peak in swings] == sorted(peak.slip_rate_error for peak in swings)
+    loud = replace(REAL, amplitude=2 * REAL.amplitude)
+    assert smallest_peak(loud, STEP, slip_noise=F(1, 10**6), rate_noise=None).slip_rate_error > rates[2]
+
+
+@pytest.mark.parametrize("noise", [{"slip_noise": F(-1)}, {"slip_noise": F(1), "rate_noise": F(-1)}])
+def test_negative_noise_is_refused(noise):
+    with pytest.raises(ParameterError, match="bounds of noise of at least 0"):
+        smallest_peak(REAL, STEP, **noise)
+
+
+@pytest.mark.parametrize("weights", [(0.5, 0.9, 0.3), (0.2, 0.6, 0.1), (0.5, 1.0, 0.9)])
+def test_no_law_that_is_told_a_noisy_slip_is_seen_below_the_smallest_peak(weights):
+    """An observer of e1, e2 and the push, the slip told too low, against a push that turns before some sample."""
+    plant = steep(REAL)
+    s, w, area, middle, _, reach = plant
+    step, periods, push, noise = 0.184, 300, float(REAL.amplitude), 1e-6
+    limit = float(smallest_peak(REAL, STEP, slip_noise=F(noise), rate_noise=None).slip_rate_error)
+    hidden = hidden_time((s, w), push, noise)
+    whole = expm(np.array([[0, 1, 0], [s, -w, 1], [0, 0, 0]]) * step)
+    corrections = np.array([weights[0] + 0.4, weights[1] / step, weights[2] / step**2])
+
+    def law(guess, told):
+        guess = guess + corrections * (told - guess[0])
+        u = -0.5 * guess[0] / step**2 - 0.9 * guess[1] / step - guess[2]
+        return u / (area * middle), whole @ [guess[0], guess[1], guess[2] + u] + [0, 0, -u]
+
+    e, guess, peak, slips = np.zeros(2), np.zeros(3), 0.0, []
+    for _ in range(periods):
+        q, ahead = law(guess, e[0] - noise)
+        follows = fault(e, q, push, step, plant)
+        early = fault(e, q, push, step - hidden, plant)
+        turned = fault(early, q, -push, hidden, plant)  # up to the next sample, at which it is told the same
+        assert abs(follows[0] - turned[0]) < 2 * noise * 1.01
+        again, _ = law(ahead, follows[0] - noise)
+        peak = max(peak, abs(follows[1]), abs(fault(turned, again, -push, step, plant)[1]))
+        e, guess = follows, ahead
+        slips.append(e[0])
+        assert abs(e[0]) <= reach
+    left = (max(slips[50:]) - min(slips[50:])) / (250 * step)
+    assert left < 0.02 * limit
+    assert peak >= limit - left
+
+
 def escapes(task, pressure, reaction, path):
     """Whether slip passes E under the push although everything is withdrawn from the first moment on."""
     s, w, authority, pole = pushed(task)
@@ -402,14 +537,18 @@ def law_for(task, step):
     return disturbance_estimate((F(3, 5) / gain / step**2, 1 / gain / step), F(1, 10), ahead, gain)
 
 
-def contradicted(numbers):
-    """How many random faults have a guarantee, and those whose guarantee is beyond a limit."""
+def contradicted(numbers, noise=(F(0), F(0))):
+    """How many random faults have a guarantee, and those whose guarantee is beyond a limit.
+
+    Noise of slip and slip rate as shares of what the disturbance does within T_s.
+    """
     proved, wrong = 0, []
     for number in numbers:
         task, step = random_task(number)
-        found = guarantee(task, Held(law=law_for(task, step), step=step))
+        told = {"slip_noise": noise[0] * task.amplitude * step**2, "rate_noise": noise[1] * task.amplitude * step}
+        found = guarantee(task, Held(law=law_for(task, step), step=step, **told))
         if isinstance(found, Guarantee):
-            limit, claims = smallest_peak(task, step), found.claims
+            limit, claims = smallest_peak(task, step, **told), found.claims
             proved += 1
             held = limit.slip_error is None or claims.slip_error <= limit.slip_error
             least = smallest_withdrawal(task, step)
@@ -427,8 +566,15 @@ def test_no_guarantee_contradicts_a_limit(first):
     assert not wrong
 
 
+def test_none_with_noise_contradicts_a_limit_for_who_is_told_no_more():
+    proved, wrong = contradicted(range(4), (F(1, 10), F(1, 10)))
+    assert proved >= 3
+    assert not wrong
+
+
 @pytest.mark.slow
 def test_no_guarantee_of_two_hundred_random_faults_contradicts_a_limit():
-    proved, wrong = contradicted(range(200))
-    assert proved >= 100
-    assert not wrong
+    for noise in ((F(0), F(0)), (F(1, 10), F(1, 10))):
+        proved, wrong = contradicted(range(200), noise)
+        assert proved >= 100
+        assert not wrong

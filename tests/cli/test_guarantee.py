@@ -209,7 +209,7 @@ def test_the_slip_alone_with_noise_and_its_file(call, tmp_path):
         in found["guarantee"]
     )
     assert (found["measured"], found["slip_noise"], found["rate_noise"]) == ("slip", "1/1000000", "0")
-    assert F(found["slip_rate_error"]) <= F(4, 10**4)
+    assert F(139, 10**6) < F(found["limit"]["slip_rate_error"]) < F(found["slip_rate_error"]) <= F(4, 10**4)
     assert json.loads(path.read_text())["loop"]["noise"] == {"slip": "1/1000000", "rate": "0"}
     assert check_files([path], "real-fault")[str(path)][0] == "proved"
 

@@ -81,14 +81,25 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
     assert float(found["largest_diffusion_time"]["proved_up_to"]) == 833
 
 
+def test_noise_forbids_more(capsys):
+    found = []
+    for noise in ((), ("--measured", "slip", "--slip-noise", "1 um")):
+        assert run("lab-fault", "--json", *noise) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    assert (found[1]["measured"], found[1]["slip_noise"]) == ("slip", "1/1000000")
+    errors = [float(one["peak_slip_rate_error"]["impossible_beyond"]) for one in found]
+    assert errors[1] > 4 * errors[0]
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
+        (("crustal-patch", "--slip-noise", "1 um"), "no limit of slow sliding is known for noise"),
         (("crustal-patch", "--stress", "0 Pa"), "a stress above 0"),
         (("real-fault", "--stress", "1 kPa"), "stress needs friction with a state"),
     ],
 )
-def test_a_stress_that_does_not_apply_is_refused(given, said, capsys):
+def test_a_stress_or_noise_that_does_not_apply_is_refused(given, said, capsys):
     assert run(*given) == 2
     assert said in capsys.readouterr().err
 

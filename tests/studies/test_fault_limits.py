@@ -38,9 +38,10 @@ def _natural_peak(monkeypatch):
 @pytest.fixture
 def designs(monkeypatch):
     """Designs that have a guarantee up to a longest T_s and a longest delay; the pairs that were asked for."""
-    asked, longest = [], {"step": F(4, 5), "delay": F(95, 1000), "tracking": F(3, 10**4)}
+    asked, tellings, longest = [], [], {"step": F(4, 5), "delay": F(95, 1000), "tracking": F(3, 10**4)}
 
-    def designed(task, step, *, objective, delay=F(0)):
+    def designed(task, step, *, objective, delay=F(0), **told):
+        tellings.append(told)
         if objective == "tracking":
             assert (step, delay) == (rational(REAL.sampling_time), 0)
             claims = dataclasses.replace(CLAIMS, slip_rate_error=UpperBound(longest["tracking"]))
@@ -52,12 +53,13 @@ def designs(monkeypatch):
 
     monkeypatch.setattr("quakedesign.studies.fault_limits.design_held", designed)
 
-    def late(task, step):
+    def late(task, step, **told):
+        tellings.append(told)
         found = reached(lambda delay: designed(task, step, objective="peak", delay=delay), step / 2, most=7 * step)
         return found[-1] if found else None
 
     monkeypatch.setattr("quakedesign.studies.fault_limits.longest_delay", late)
-    return asked, longest
+    return asked, longest, tellings
 
 
 def test_both_sides_of_the_real_fault(designs):
@@ -90,7 +92,7 @@ def test_between_both_sides_it_says_that_neither_is_known(designs, step, said):
 
 
 def test_the_search_doubles_and_then_bisects(designs):
-    asked, _ = designs
+    asked, *_ = designs
     found = study(REAL)
     steps = [step for step, delay in asked if not delay]
     assert steps == [F(n, 1000) for n in (184, 368, 736, 1472, 1100, 918)]
@@ -100,7 +102,7 @@ def test_the_search_doubles_and_then_bisects(designs):
 
 
 def test_a_fault_that_is_sampled_too_slowly_gets_a_shorter_step(designs):
-    asked, longest = designs
+    asked, longest, _ = designs
     longest["step"] = F(3, 100)
     found = study(REAL)
     assert [step for step, _ in asked] == [F(n, 10000) for n in (1840, 920, 460, 230, 345, 288)]
@@ -110,7 +112,7 @@ def test_a_fault_that_is_sampled_too_slowly_gets_a_shorter_step(designs):
 
 
 def test_nothing_proved_at_all(designs):
-    _, longest = designs
+    _, longest, _ = designs
     longest["step"] = F(0)
     found = study(REAL)
     assert found.proved == ()
@@ -125,6 +127,44 @@ def test_what_is_printed_stays_within_80_columns_and_on_the_safe_side(designs):
     assert "below 102 µm/s" in text  # 1.0255e-4 m/s
     assert "above 11.8 m" in text  # 11.7421 m
     json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
+    plain, found = study(REAL), study(REAL, measured="slip", slip_noise="1e-6")
+    least, noisy = (one.peak_slip_rate_error for one in (plain, found))
+    assert 1.36 < noisy.impossible_beyond / least.impossible_beyond < 1.37
+    assert noisy.holds_for.endswith("told up to the sample no more than the slip within 1 µm")
+    assert found.largest_step == plain.largest_step  # even for those who know everything
+    told = {"measured": "slip", "slip_noise": F(1, 10**6), "rate_noise": F(0)}
+    assert told in designs[2]
+    assert {"measured": "slip-and-rate", "slip_noise": F(0), "rate_noise": F(0)} in designs[2]
+    assert {key: found.to_dict()[key] for key in told} == {key: str(value) for key, value in told.items()}
+    assert "slip-rate error: told no more than the slip within 1 µm up to" in " ".join(limits_lines(found))
+    assert found.smallest_peaks()[0][1] > 2 * found.smallest_peaks(told=False)[0][1]
+    assert "and for those told the slip within 1 µm" in limits_figure(found).axes[0].get_legend_handles_labels()[1]
+    assert found.smallest_peaks(told=False) == plain.smallest_peaks()
+
+
+def test_noise_of_both_is_told_and_that_of_one_hides_nothing(designs):
+    both = study(REAL, slip_noise="1e-6", rate_noise="1e-5", prove=False)
+    assert both.told.words() == "the slip within 1 µm, the slip rate within 10 µm/s"
+    plain = study(REAL, prove=False).peak_slip_rate_error
+    assert both.peak_slip_rate_error.impossible_beyond > plain.impossible_beyond
+    for told in ({"slip_noise": "1e-6"}, {"rate_noise": "1e-6"}, {"measured": "slip"}):
+        assert study(REAL, **told, prove=False).peak_slip_rate_error == plain
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({"slip_noise": -1}, "a bound of noise must be 0 or more"),
+        ({"measured": "slip", "rate_noise": 1}, "noise of the slip rate needs one that is measured"),
+        ({"measured": "rate"}, "measured must be one of"),
+    ],
+)
+def test_noise_that_cannot_be_is_refused(told, said):
+    with pytest.raises(ParameterError, match=said):
+        study(REAL, prove=False, **told)
 
 
 def test_without_a_disturbance_nothing_is_impossible():

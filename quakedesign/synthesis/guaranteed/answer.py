@@ -93,7 +93,9 @@ class Answer:
         limit = self.limit
         if limit is None or not isinstance(self.found, Guarantee):
             return []
-        step = f"{float(self.found.held.step):.6g} s"
+        held = self.found.held
+        step = f"{float(held.step):.6g} s"
+        step += " with that noise" if held.noise else ""
         both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
         rate = f"{limit.slip_rate_error:.3g} m/s"
         return [f"no controller held over T_s = {step} keeps the slip-rate error below {rate}{both}"]
@@ -116,10 +118,12 @@ class Answer:
 
     @property
     def limit(self) -> SmallestPeak | None:
-        """What no controller can do at the same T_s and delay; None for the class ``rate``."""
+        """What no controller can do at the same T_s and delay, told as much; None for the class ``rate``."""
         if not isinstance(self.found, Guarantee) or self.found.task.change is not None:
             return None
-        return smallest_peak(self.found.task, self.found.held.step, self.found.held.delay)
+        held = self.found.held
+        rate_noise = None if held.law.of_slip_alone else held.rate_noise
+        return smallest_peak(self.found.task, held.step, held.delay, slip_noise=held.slip_noise, rate_noise=rate_noise)
 
     @property
     def leaves_with_stick(self) -> bool:
