@@ -53,10 +53,8 @@ def upper(value: Fraction, digits: int = 4) -> str:
     """Decimal with so many digits, at most 15, that is not below the number."""
     bits = value.numerator.bit_length() - value.denominator.bit_length()
     exponent = bits * 30103 // 100000 - digits - 1  # of a number of any length; log10(2) = 0.30103
-    shown = -(-value // Fraction(10) ** exponent)
-    while abs(shown) >= 10**digits:
+    while abs(shown := -(-value // Fraction(10) ** exponent)) >= 10**digits:
         exponent += 1
-        shown = -(-value // Fraction(10) ** exponent)
     if abs(exponent) > 300:  # beyond what a float holds
         return f"{shown}e{exponent}" if shown else "0"
     return f"{float(f'{shown}e{exponent}'):.{digits}g}"

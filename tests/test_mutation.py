@@ -135,3 +135,9 @@ def test_single_mutants_and_kinds_are_explained():
         explanations.of(("proofs/loop.py", "need(x <= MAX_ROOTS, where)", "need(x <= MAX_ROOTS, where) → pass")) == ""
     )
     assert {explanations.of(key) for key in explanations.single} == {"equivalent"}
+
+
+def test_every_single_mutant_that_is_explained_can_be_made():
+    single = set(tool.Explanations().single)
+    made = {m.key() for path in {key[0] for key in single} for m in tool.mutants_of(tool.ROOT / path, compiled=False)}
+    assert not single - made
