@@ -7,7 +7,7 @@ law is carried like the ones of the paper (appendix, with ERRATA 19 and 20).
 """
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -25,10 +25,10 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault.radical import Radical, radical
 from quakedesign.fault.scales import Scales, power_product
 from quakedesign.rationals import fraction_of, rational
-from quakedesign.symbolic import AbsolutePower, SignedPower
+from quakedesign.symbolic.weights import size_of
 
 Form = dict[str, Fraction]
-"""Exponents of named quantities: the dimension of an expression while those of gains and states are unknown."""
+"""Exponents of `BASES`."""
 
 BASES = ("slip", "time", "output")
 """What the dimension of a gain is made of; `output` is p [Pa], or ν = p·(divisor) for a law with a divisor."""
@@ -137,32 +137,22 @@ def law_dimensions(controller: Controller) -> LawDimensions:
     """
     symbols = {name: sp.Symbol(name, positive=True) for name in controller.gain_units}
     integrals = {name: sp.Symbol(name, real=True) for name in _integral_names(controller)}
-    slip = {name: sp.Symbol(name, real=True) for name in ("x1", "e1")}
-    rate = {name: sp.Symbol(name, real=True) for name in ("x2", "e2")}
-    signals = Signals(
-        slip=slip["x1"],
-        slip_error=slip["e1"],
-        slip_rate=rate["x2"],
-        slip_rate_error=rate["e2"],
-        integrals=tuple(integrals.values()),
-    )
-    known: dict[str, Form] = {name: {"slip": Fraction(1)} for name in slip}
-    known |= {name: {"slip": Fraction(1), "time": Fraction(-1)} for name in rate}
-    twin = _with_gains(controller, symbols)
-    conditions: list[Form] = []
-    for expression, name, per_time in _equations(twin, signals, integrals):
-        left = {name: Fraction(1), "time": Fraction(-per_time)}
-        conditions.append(_minus(_form(sp.sympify(expression), known, conditions), left))
-    unknown = (*symbols, *integrals)
-    solution = _solved(conditions, unknown, controller.name)
+    slip, time, output = (sp.Dummy(base) for base in BASES)
+    x1, e1, x2, e2 = sp.symbols("x1 e1 x2 e2", real=True)
+    signals = Signals(slip=x1, slip_error=e1, slip_rate=x2, slip_rate_error=e2, integrals=tuple(integrals.values()))
+    unknown = {symbol: symbol for symbol in (*symbols.values(), *integrals.values())}
+    sizes = {**unknown, x1: slip, e1: slip, x2: slip - time, e2: slip - time}
+    twin, conditions = _with_gains(controller, symbols), list[sp.Expr]()
+    equations = [(twin.pressure(signals), output)]
+    equations += [(rate, xi - time) for xi, rate in zip(integrals.values(), twin.integral_rates(signals), strict=True)]
+    for expression, left in equations:
+        whole = sp.sympify(expression)
+        if strange := whole.free_symbols - sizes.keys():
+            names = ", ".join(sorted(map(str, strange)))
+            raise ParameterError(f"{controller.name} must depend on gains and signals only. Received {names}.")
+        conditions.append(size_of(whole, sizes, conditions) - left)
+    solution = _solved(conditions, [*unknown], [slip, time, output], controller.name)
     return LawDimensions(gains={n: solution[n] for n in symbols}, integrals={n: solution[n] for n in integrals})
-
-
-def _equations(law: Controller, signals: Signals, integrals: Mapping[str, Any]) -> Iterator[tuple[Any, str, int]]:
-    """Right-hand sides, what they equal, and over which power of time."""
-    yield law.pressure(signals), "output", 0
-    for name, rate in zip(integrals, law.integral_rates(signals), strict=True):
-        yield rate, name, 1
 
 
 def _with_gains(controller: Controller, symbols: Mapping[str, sp.Symbol]) -> Controller:
@@ -174,62 +164,15 @@ def _with_gains(controller: Controller, symbols: Mapping[str, sp.Symbol]) -> Con
     return twin
 
 
-def _form(expression: sp.Expr, known: Mapping[str, Form], conditions: list[Form]) -> Form:
-    """Dimension of an expression; what sums ask for is added to `conditions`."""
-
-    def inside(part: Any) -> Form:
-        return _form(part, known, conditions)
-
-    if expression.is_number:
-        return {}
-    if expression.is_Symbol:
-        return known.get(expression.name, {expression.name: Fraction(1)})
-    if expression.is_Mul:
-        return _sum([inside(part) for part in expression.args])
-    if expression.is_Pow or isinstance(expression, SignedPower | AbsolutePower):
-        base, power = expression.args
-        return _power(inside(base), power)
-    first, *others = (inside(part) for part in expression.args)
-    if isinstance(expression, sp.sign):
-        return {}
-    if isinstance(expression, sp.Add | sp.Max | sp.Min | sp.Abs):
-        conditions.extend(_minus(other, first) for other in others)
-        return first
-    conditions.extend((first, *others))
-    return {}
-
-
-def _power(base: Form, power: sp.Expr) -> Form:
-    if not base:
-        return {}
-    if not power.is_Rational:
-        raise ParameterError(f"an exponent in a control law must be rational. Received {power}.")
-    return {name: value * fraction_of(power) for name, value in base.items()}
-
-
-def _sum(forms: list[Form]) -> Form:
-    names = dict.fromkeys(name for form in forms for name in form)
-    return {name: sum((form.get(name, Fraction(0)) for form in forms), Fraction(0)) for name in names}
-
-
-def _minus(left: Form, right: Form) -> Form:
-    return _sum([left, {name: -value for name, value in right.items()}])
-
-
-def _solved(conditions: list[Form], unknown: tuple[str, ...], law: str) -> dict[str, Form]:
-    """Every unknown dimension in terms of `BASES`, from linear forms that vanish."""
-    columns = (*unknown, *BASES)
-    strange = {name for form in conditions for name in form} - set(columns)
-    if strange:
-        raise ParameterError(f"{law} must depend on gains and signals only. Received {', '.join(sorted(strange))}.")
-    rows = [[sp.Rational(*form.get(c, Fraction(0)).as_integer_ratio()) for c in columns] for form in conditions]
-    reduced, pivots = sp.Matrix(rows).rref()
+def _solved(conditions: list[sp.Expr], unknown: list[sp.Symbol], bases: list[sp.Symbol], law: str) -> dict[str, Form]:
+    """Every unknown dimension in terms of `BASES`, from linear expressions that vanish."""
+    reduced, pivots = sp.linear_eq_to_matrix(conditions, *unknown, *bases)[0].rref()
     if any(pivot >= len(unknown) for pivot in pivots):
         raise ParameterError(
             f"the terms of {law} do not fit together: no units of its gains make each term fit what it adds to. "
             "Check exponents, and make every constant with a unit a gain."
         )
-    free = [name for i, name in enumerate(unknown) if i not in pivots]
+    free = [symbol.name for i, symbol in enumerate(unknown) if i not in pivots]
     if free:
         raise ParameterError(
             f"the terms of {law} leave the unit of {', '.join(free)} open. Every gain must appear alone."
@@ -237,7 +180,7 @@ def _solved(conditions: list[Form], unknown: tuple[str, ...], law: str) -> dict[
     forms = {}
     for row, pivot in enumerate(pivots):
         values = {base: reduced[row, len(unknown) + i] for i, base in enumerate(BASES)}
-        forms[unknown[pivot]] = {base: -fraction_of(v) for base, v in values.items() if v}
+        forms[unknown[pivot].name] = {base: -fraction_of(v) for base, v in values.items() if v}
     return forms
 
 

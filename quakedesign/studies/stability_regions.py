@@ -49,26 +49,21 @@ class StabilityRegions:
 
     Attributes
     ----------
-    fault : Fault
     verdict : StabilityVerdict
         Of the fault itself.
-    pressure : float
-        At which the fault is [Pa].
     stiffness : numpy.ndarray
         Stiffnesses per area of both planes [Pa/m].
     own : float
         That of the fault [Pa/m].
     critical : float
-        Critical stiffness per area at the fault's effective stress [Pa/m]; nan where there is none.
+        Critical stiffness per area at the fault's effective stress [Pa/m]; not positive or nan where there is none.
     nucleation_length : float or None
         [m]; None without a critical stiffness.
     over_stress, over_pressure : Plane
         The effective normal stress σ' varies at the given pressure, or the pressure at the fault's σ'.
     """
 
-    fault: Fault
     verdict: StabilityVerdict
-    pressure: float
     stiffness: np.ndarray
     own: float
     critical: float
@@ -77,26 +72,8 @@ class StabilityRegions:
     over_pressure: Plane
 
 
-def stability_regions(
-    fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True
-) -> StabilityRegions:
-    """Regions from the symbolic stability conditions; mass, damping and friction are the fault's.
-
-    Parameters
-    ----------
-    fault : Fault
-    pressure : float
-        Injected pressure [Pa] of the fault, below its effective normal stress.
-    loading_rate : float, optional
-        Slip rate [m/s] of steady sliding; without it the law's ``operating_rate``.
-    inertia : bool
-        Whether the mass counts.
-
-    Raises
-    ------
-    ParameterError
-        When the pressure opens the fault, or the rate is outside of the law's domain.
-    """
+def stability_regions(fault: Fault, *, pressure: float, loading_rate: float | None, inertia: bool) -> StabilityRegions:
+    """Regions from the symbolic stability conditions; the arguments and errors are those of `stability`."""
     verdict = stability(fault, pressure=pressure, loading_rate=loading_rate, inertia=inertia)
     rate = float(verdict.loading_rate)
     conditions, boundary, limits = _functions(fault, rate, inertia)
@@ -119,16 +96,13 @@ def stability_regions(
             own=at,
         )
 
-    has_critical = bool(np.isfinite(critical) and critical > 0)
     return StabilityRegions(
-        fault=fault,
         verdict=verdict,
-        pressure=pressure,
         stiffness=stiffness,
         own=own,
-        critical=critical if has_critical else float("nan"),
+        critical=critical,
         nucleation_length=nucleation_length(fault, pressure=pressure, loading_rate=rate or None)
-        if has_critical
+        if 0 < critical < np.inf
         else None,
         over_stress=plane(stresses, stresses - pressure, normal),
         over_pressure=plane(pressures, normal - pressures, pressure),

@@ -33,8 +33,10 @@ def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -
     equations: list[sp.Expr] = []
     for state, rate in rates.items():
         for term in sp.Add.make_args(normal_form(rate)):
+            if any(f.has(*rates) for f in term.atoms(sp.Function) - term.atoms(SignedPower, AbsolutePower)):
+                raise ParameterError(f"{term} is not built from signed powers; it has no weight.")
             if term != 0:
-                equations.append(_weight(term, unknown, equations) - unknown[state] - degree)
+                equations.append(size_of(term, unknown, equations) - unknown[state] - degree)
     solution = sp.linsolve([e for e in equations if e != 0], *unknown.values())
     values = next(iter(solution), ())
     if not values or not all(v.is_Rational and v > 0 for v in values):
@@ -50,18 +52,30 @@ def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -
     return weights
 
 
-def _weight(e: sp.Expr, unknown: Mapping[sp.Symbol, sp.Symbol], equations: list[sp.Expr]) -> sp.Expr:
-    """Degree of a product in the unknown weights; sums inside powers add equations for their terms."""
-    if not e.has(*unknown):
-        return sp.Integer(0)
-    if e in unknown:
-        return unknown[e]
+def size_of(e: sp.Expr, sizes: Mapping[sp.Symbol, sp.Expr], equations: list[sp.Expr]) -> sp.Expr:
+    """How an expression grows with what its symbols grow with: exponents that add up in products.
+
+    What sums, extremes and arguments of functions ask of the sizes is added to `equations`, as expressions that vanish.
+
+    Parameters
+    ----------
+    e : Expr
+    sizes : mapping of Symbol to Expr
+        Linear in what is unknown; any other symbol does not grow.
+    equations : list of Expr
+    """
+    if e in sizes or not e.has(*sizes):
+        return sizes.get(e, sp.Integer(0))
+    parts = [size_of(part, sizes, equations) for part in e.args]
     if e.is_Mul:
-        return sum((_weight(factor, unknown, equations) for factor in e.args), start=sp.Integer(0))
-    if e.is_Add:
-        first, *others = (_weight(term, unknown, equations) for term in e.args)
-        equations += [first - other for other in others]
-        return first
+        return sum(parts, start=sp.Integer(0))
     if e.is_Pow or isinstance(e, SignedPower | AbsolutePower):
-        return _weight(e.args[0], unknown, equations) * e.args[1]
-    raise ParameterError(f"{e} is not built from signed powers; it has no weight.")
+        if not e.args[1].is_Rational:
+            raise ParameterError(f"an exponent must be rational. Received {e.args[1]} in {e}.")
+        return parts[0] * e.args[1]
+    if isinstance(e, sp.Add | sp.Max | sp.Min | sp.Abs):
+        equations += [parts[0] - other for other in parts[1:]]
+        return parts[0]
+    if not isinstance(e, sp.sign):
+        equations += parts
+    return sp.Integer(0)
