@@ -69,6 +69,16 @@ def test_an_automatic_multiplier_is_one_of_what_is_left_beside_squares(factor):
     assert all(not e[answer.statement.variables.index("w")] for e in answer.statement.multiplier)
 
 
+def test_a_square_in_the_multiplier_stays_where_what_is_left_needs_it():
+    quartic = (
+        "x^2*(x - w)^2 + y^2*(y - w)^2 + z^2*(z - w)^2 + 2*x*y*z*(x + y + z - 2*w)"  # Robinson's, in four variables
+    )
+    answer = prove(f"({quartic})*(x + y)^2", multiplier="(x^2 + y^2 + z^2 + w^2)^2")
+    assert answer.verdict is Positivity.SOS
+    assert answer.check()
+    assert prove(quartic).verdict is Positivity.NOT_SOS
+
+
 @pytest.mark.parametrize("text", ["x^2", "x^2*y^2", "5", "0", "(x^2 + y)^2"])
 def test_where_only_squares_are_left_no_multiplier_is_needed(text):
     answer = prove(text, multiplier="auto")
