@@ -1,13 +1,13 @@
 """Upper sums of impulse responses over the pieces of a period, and over all periods before."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
 from math import ceil
 
 from guarantee_loop import Fade, Loop
-from guarantee_numbers import BITS, Fixed, column, exponentials, fixed, sums_of_product
+from guarantee_numbers import BITS, Fixed, coarse_product, column, exponentials, fixed, sums_of_product
 from guarantee_reading import Refused, Row, need
 
 DOUBLINGS = 12  # at most 4096 periods are summed
@@ -33,13 +33,16 @@ class Flow:
     moved: set[int]
     sudden: bool
     masses: list[tuple[Fraction, Fraction]]
+    responses: dict[int, list[Fixed]] = field(default_factory=dict)
 
     def ends(self, start: int = 0) -> list[Fixed]:
-        """Impulse response from the start of a piece on, at the ends of pieces."""
-        found = [self.entry]
-        for step in self.steps[start:]:
-            found.append(step * found[-1])
-        return found
+        """Impulse response from the start of a piece on, at the ends of pieces; computed once."""
+        if start not in self.responses:
+            found = [self.entry]
+            for step in self.steps[start:]:
+                found.append(step * found[-1])
+            self.responses[start] = found
+        return self.responses[start]
 
     def slope(self, now: Fixed, i: int) -> Fixed:
         """Bound of the first derivative over a piece that begins like this."""
@@ -141,7 +144,7 @@ def past(flows: list[Flow], rows: int) -> Past:
     for _ in range(DOUBLINGS):
         width = len(columns.rows[0])
         need(2 * width * size * (size + rows) <= MAX_WORK, "the loop must forget its past sooner: it takes too long")
-        following = period * columns
+        following = coarse_product(period, columns)
         sums = [a + b for a, b in zip(sums, sums_of_product(seen, following), strict=True)]
         columns, period = columns.beside(following), period * period
         far = period * back
@@ -153,13 +156,16 @@ def past(flows: list[Flow], rows: int) -> Past:
 
 
 def slowest(period: Fixed) -> list[int]:
-    """What the slowest mode is seen along, if there is one: a row of what is left of all states after long, in size."""
+    """What the slowest mode is seen along, if there is one: a row of what is left of all states after long, in size.
+
+    That with the largest entry on the diagonal, which is the same in all units of the states.
+    """
     rows = period.rows
     for _ in range(DOUBLINGS):
         rows = [[sum(map(int.__mul__, line, entries)) for entries in zip(*rows, strict=True)] for line in rows]
         much = max(abs(v) for line in rows for v in line).bit_length() - BITS
         rows = [[v >> much if much > 0 else v << -much for v in line] for line in rows]
-    return max(rows, key=lambda line: max(map(abs, line)))
+    return rows[max(range(len(rows)), key=lambda i: abs(rows[i][i]))]
 
 
 def seen_alone(row: list[int], sums: list[int]) -> tuple[int, Fixed, Fixed]:

@@ -141,15 +141,20 @@ def in_even_units(loop: Loop, entry: Row) -> tuple[Loop, Row]:
 @lru_cache(maxsize=4)
 def even_units(table: tuple[tuple[Fraction, ...], ...]) -> Row:
     """Powers of 2 that make every row of a table u_i^-1 |t_ij| u_j about as large as its column."""
-    size = len(table)
-    units = [Fraction(1)] * size
-    for i in list(range(size)) * 16:
-        line = sum(abs(v) * units[j] / units[i] for j, v in enumerate(table[i]) if j != i)
-        under = sum(abs(table[j][i]) * units[i] / units[j] for j in range(size) if j != i)
+    sizes = [[(abs(v.numerator) << BITS) // v.denominator for v in line] for line in table]
+    powers = [0] * len(sizes)
+    for i in list(range(len(sizes))) * 16:
+        others = [j for j in range(len(sizes)) if j != i]
+        line = sum(shifted(sizes[i][j], powers[j] - powers[i]) for j in others)
+        under = sum(shifted(sizes[j][i], powers[i] - powers[j]) for j in others)
         if line and under:
-            ratio = Fraction(line / under)
-            units[i] *= Fraction(2) ** ((ratio.numerator.bit_length() - ratio.denominator.bit_length()) // 2)
-    return units
+            powers[i] += (line.bit_length() - under.bit_length()) // 2
+    return [Fraction(2) ** power for power in powers]
+
+
+def shifted(value: int, power: int) -> int:
+    """Times a power of 2."""
+    return value << power if power >= 0 else value >> -power
 
 
 def input_gains(loop: Loop) -> list[list[list[Fraction]]]:

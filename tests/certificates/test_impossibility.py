@@ -7,6 +7,7 @@ from math import acosh, cosh, exp, log, sinh, sqrt
 import mpmath
 import numpy as np
 import pytest
+from random_loops import random_task
 from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import brentq, linprog
@@ -504,26 +505,6 @@ def test_the_longest_diffusion_time_does_as_well():
 
     assert escapes(REAL, pressure, 0.184, path(1.03 * limit))
     assert not escapes(REAL, pressure, 0.184, path(0.93 * limit))
-
-
-def random_task(number):
-    random = np.random.default_rng(number)
-
-    def times(value, low, high):
-        return F(f"{float(value) * random.uniform(low, high):.4g}")
-
-    law = REAL.friction
-    least = F(f"{random.uniform(0.2, 0.33):.3f}")
-    return replace(
-        REAL,
-        shear_modulus=times(REAL.shear_modulus, 0.5, 1.5),
-        damping=times(REAL.damping, 0.2, 2),
-        normal_stress=times(REAL.normal_stress, 0.4, 1.2),
-        spreads=tuple(F(int(random.integers(0, 8)), 100) for _ in range(3)),
-        friction=replace(law, least=least, weakening=times(law.weakening, 0.3, 1.2)),
-        amplitude=times(REAL.amplitude, 0.1, 10),
-        target_slip=times(REAL.target_slip, 0.1, 1.5),
-    ), F(f"{random.uniform(0.05, 0.3):.3f}")
 
 
 def law_for(task, step):

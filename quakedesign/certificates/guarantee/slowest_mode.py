@@ -15,6 +15,9 @@ MOST_DOUBLINGS = 12
 def slowest(flows: list[Flow]) -> list[Any]:
     """What the slowest mode is seen along, if there is one: a row of what is left of all states after 2^12 periods.
 
+    That with the largest entry on the diagonal, which is the same in all units of the states: whoever else takes it
+    looks back as far, and finds the same bounds.
+
     Raises
     ------
     ParameterError
@@ -31,7 +34,7 @@ def slowest(flows: list[Flow]) -> list[Any]:
         period = arb_mat([[(v / largest).mid() for v in row] for row in period.tolist()])
     if not growth < before:
         raise unstable()
-    return list(max(period.tolist(), key=lambda row: max(map(abs, row))))
+    return list(period.tolist()[max(range(period.nrows()), key=lambda i: abs(period[i, i]))])
 
 
 def seen_alone(row: list[Any], sums: list[Any]) -> tuple[int, Any, Any]:
