@@ -25,6 +25,7 @@
 from dataclasses import replace
 from fractions import Fraction
 
+import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Markdown
@@ -107,6 +108,22 @@ fault = qd.load_fault("real-fault")
 Markdown(uncertainty_bounds(fault).table())
 
 # %% [markdown]
+# Turned round: with a given $Q$ the guarantee holds for every $R$ that leaves $Q - R\,W$ positive definite for some $w$. With $s_1 = R/w$ and $s_2 = R/(1-w)$ that
+# is a linear matrix inequality, $Q \ge \mathrm{diag}(g_1^2 s_1,\; g_2^2 s_2,\; 0,\; 0)$ and $\mathrm{diag}(s_1, s_2) \ge R\,11^\top$, to solve with cvxpy and to extend. It also has a closed form:
+# $R < (ab - c^2)/(g_1^2 b + g_2^2 a + 2 g_1 g_2 |c|)$, where $a$, $b$ and $c$ are the entries of what is left of $Q$ on $(x_1, x_2)$ for the best $\xi$.
+
+# %%
+root = np.array([[3.0, 1, 0, 1], [-1, 2, 1, 0], [0, 1, 2, 0], [1, 0, 0, 3]])
+Q, g = root.T @ root, np.array([float(v) for v in row.problem.bounds])
+R, s = cp.Variable(), cp.Variable(2)
+part = cp.diag(np.vstack([np.diag(g**2), np.zeros((2, 2))]) @ s)
+searched = cp.Problem(cp.Maximize(R), [Q - part >> 0, cp.diag(s) - R * np.ones((2, 2)) >> 0])
+searched.solve(solver=cp.CLARABEL)
+(a, c), (_, b) = Q[:2, :2] - Q[:2, 2:] @ np.linalg.solve(Q[2:, 2:], Q[2:, :2])
+closed = (a * b - c**2) / (g[0] ** 2 * b + g[1] ** 2 * a + 2 * g[0] * g[1] * abs(c))
+print(f"largest R: {searched.value:.6f} by the matrix inequality, {closed:.6f} in closed form")
+
+# %% [markdown]
 # ## The published gains
 # `quakedesign certify elqr real-fault --gains …` answers for any $K$. A premise that fails says nothing against a $K$: the published gains tolerate almost
 # 25 times the friction slope of this fault, and no quadratic $V$ could do much better, since just above a constant slope is unstable. What they do not
@@ -180,6 +197,7 @@ for example in (judged, judged_row):
     assert (example.printed.verdict, example.sound.verdict) == (Verdict.PROVED, Verdict.REFUTED)
 assert judged.unstable_at is not None and judged_row.unstable_at is None and judged_row.growth > Fraction(129, 100)
 assert repaired.proved and repaired_row.proved
+assert abs(searched.value / closed - 1) < 1e-6
 margin = printed.analysis.slope
 assert 0.99 * margin.limit < margin.certified < margin.limit
 assert (printed.facts["held"]["verdict"], free.facts["held"]["verdict"]) == ("refuted", "refuted")

@@ -84,14 +84,15 @@ class SmoothMarch:
         """
         wanted, vector, found = set(kept), np.array(start), [np.array(start)]
         longest = CHUNK
-        while vector[0] < kept[-1] and vector[self.recorder.index("diverged")] < 0:
-            vectors = self._chunk(vector, min(longest, kept[-1] - round(vector[0])))
+        while (now := self.recorder.parts(vector)).counter < kept[-1] and now.watched["diverged"] < 0:
+            vectors = self._chunk(vector, min(longest, kept[-1] - round(now.counter)))
             longest = min(longest, vectors.shape[1])
-            found += [column for column in vectors.T if round(column[0]) in wanted]
+            counters = self.recorder.parts(vectors).counter
+            found += [column for column, counter in zip(vectors.T, counters, strict=True) if round(counter) in wanted]
             vector = vectors[:, -1]
             if progress:
-                progress(vector[0] / kept[-1])
-        if found[-1][0] != vector[0]:
+                progress(counters[-1] / kept[-1])
+        if self.recorder.parts(found[-1]).counter != now.counter:
             found.append(vector)
         return np.array(found).T
 
@@ -102,7 +103,7 @@ class SmoothMarch:
         except StoppedError as error:
             if count > 1:
                 return self._chunk(vector, max(1, count // _FEWER))
-            time = vector[0] * self.recorder.step
+            time = self.recorder.parts(vector).counter * self.recorder.step
             raise SimulationError(
                 f"{self.method.name} cannot go on after t = {time:.6g} s ({error}). "
                 "Loosen rtol, or use a fixed step: method dormand-prince."
