@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from math import comb
 from typing import Any
 
 from flint import fmpq, fmpq_mat
 
+from quakedesign.errors import PolynomialError
 from quakedesign.rationals import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree
 from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds, identity_holds
@@ -20,6 +22,7 @@ from quakedesign.sos.solve.scaling import Scaled, decimal_units, scaled
 
 _STRICT = 1e-7
 _ROUNDS = 4
+_ENTRIES = 50_000_000  # of half the matrix that the solver factors, dense for every block: some 6 GB
 _ACCURACIES = (1e-9, 1e-12)
 KERNELS = ((1e-6, 1e-5), (1e-6, 1e-7), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
 
@@ -189,7 +192,13 @@ def strict_proof(asked: Statement) -> SumOfSquares | None:
 
 
 def initial_blocks(statement: Statement) -> list[Block]:
-    """Blocks after the exact reduction, split by sign symmetry; among forms only squares of the target's degree."""
+    """Blocks after the exact reduction, split by sign symmetry; among forms only squares of the target's degree.
+
+    Raises
+    ------
+    PolynomialError
+        When they are more than a solver has the memory for.
+    """
     blocks = []
     graded = statement.graded
     for chosen, weight, basis in zip(statement.products, statement.weights, reduced_bases(statement), strict=True):
@@ -197,6 +206,12 @@ def initial_blocks(statement: Statement) -> list[Block]:
             basis = tuple(b for b in basis if 2 * sum(b) + degree(weight) == statement.degree)
         for part in parity_classes(statement, basis):
             blocks.append(Block(product=chosen, weight=weight, monomials=tuple(basis[i] for i in part)))
+    sizes = [len(b.monomials) for b in blocks]
+    if sum(comb(comb(n + 1, 2) + 1, 2) for n in sizes) > _ENTRIES:
+        raise PolynomialError(
+            "Gram matrices must be small enough for a solver: one of at most 140 x 140, say. "
+            f"Received {len(sizes)} of up to {max(sizes)} x {max(sizes)}. Lower the degree."
+        )
     return blocks
 
 

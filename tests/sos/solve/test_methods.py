@@ -5,6 +5,7 @@ from fractions import Fraction
 import pytest
 from own_parts import Monomials
 
+from quakedesign.errors import PolynomialError
 from quakedesign.sos import Positivity, prove
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.proofs import Square, SumOfSquares
@@ -92,3 +93,10 @@ def test_an_empty_set_is_named():
     for answer in (prove("1", on=["x >= 1"]), prove("x - 1", on=["x >= 1"]), prove("-1", on=["x >= 0"]), prove("0")):
         assert not answer.set_is_empty
         assert not any("empty" in line for line in sentences(answer))
+
+
+def test_what_no_solver_has_the_memory_for_is_refused_at_once():
+    """It took all the memory of the machine."""
+    with pytest.raises(PolynomialError, match=r"Received 2 of up to 150 x 150\. Lower the degree"):
+        prove({(598,): 1, (0,): 1}, variables=("x",))
+    assert prove({(598,): 1}, variables=("x",)).verdict is Positivity.SOS
