@@ -71,7 +71,7 @@ MAY_IMPORT = {
 PROVING = ("controllers", "certificates", "synthesis", "loop")
 SOLVERS = {"cvxpy", "clarabel", "scs", "osqp", "ecos", "mosek", "scipy", "control", "casadi"}
 HEAVY = {
-    *("sympy", "numpy", "scipy", "cvxpy", "clarabel", "casadi", "control", "matplotlib", "pint", "pydantic"),
+    *("sympy", "numpy", "scipy", "cvxpy", "clarabel", "casadi", "control", "matplotlib", "pint"),
     *("pandas", "xarray", "h5netcdf", "flint", "jinja2", "mpmath", "dask"),
 }
 SOURCES = sorted(PACKAGE.rglob("*.py"))

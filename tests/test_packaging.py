@@ -34,3 +34,11 @@ def test_the_lock_pins_all_that_the_package_needs_and_names_no_place():
     assert len(locked) == len(pins)
     for wanted in map(Requirement, PROJECT["dependencies"]):
         assert wanted.specifier.contains(locked[canonicalize_name(wanted.name)])
+
+
+def test_every_library_that_is_needed_is_imported():
+    source = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "quakedesign").rglob("*.py"))
+    modules = {"python-flint": "flint", "docstring-parser": "docstring_parser"}
+    files = {"h5netcdf", "h5py"}  # by xarray, to which NetCDF's engine is named
+    for wanted in {Requirement(line).name for line in PROJECT["dependencies"]} - files:
+        assert re.search(rf"^\s*(from|import) {modules.get(wanted, wanted)}\b", source, re.MULTILINE), wanted
