@@ -24,6 +24,7 @@ ROCK = ("density", "shear_modulus", "length", "damping")
 CONSTANTS = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")
 PATH = ("step", "delay", "lag", "diffusion", "slip_noise")
 LAW = ("states", "update", "measured", "output", "feedback")
+REFERENCE = ("rate", "distance", "ramp")
 CLAIMS = ("log_rate", "log_state", "slip_error", "push", "asked")
 
 Range = tuple[Fraction, Fraction]
@@ -40,18 +41,19 @@ class Fault:
     rate: Fraction
     distance: Fraction
     ramp: Fraction
+    swing: Fraction
     stress: Fraction
     box: dict[str, Range]
     slips: bool
     regularised: bool
 
     def load(self) -> Fraction:
-        """Rate of the shear stress that the reference takes off."""
+        """Rate of the shear stress that sliding at the first rate takes off."""
         return self.stiffness * self.rate
 
     def drift(self) -> Fraction:
         """How fast the pressure that is needed may leave the plan."""
-        return max(abs(self.load() / mu - self.ramp) for mu in self.box["coefficient"])
+        return (1 + self.swing) * max(abs(self.load() / mu - self.ramp) for mu in self.box["coefficient"])
 
     def normal(self, push: Fraction) -> Range:
         """Range of the effective normal stress, the pressure up to `push` off."""
@@ -85,12 +87,15 @@ def read_fault(document: dict[str, Any]) -> Fault:
         low, high = row(given[name], name, 2)
         need(0 < low <= high, f"{name} must have two ends that are ordered and above 0")
         box[name] = low, high
-    rate, distance, ramp = numbers(document["reference"], "reference", "rate", "distance", "ramp").values()
+    swings = ["swing"] if type(document["reference"]) is dict and "swing" in document["reference"] else []
+    rate, distance, ramp, *swing = numbers(document["reference"], "reference", *REFERENCE, *swings).values()
+    need(all(0 < v < 1 for v in swing), "swing must be above 0 and below 1 where it is told")
     stress = number(document["stress"], "stress")
     need(min(rho, modulus, size, rate) > 0, "density, modulus, length and rate must be > 0")
     need(min(eta, distance, ramp, stress) >= 0, "damping, distance, ramp and stress must be >= 0")
     kind = "state_law" in told, "regularised" in told
-    return Fault(given["name"], rho * size, modulus / size, eta / size**2, rate, distance, ramp, stress, box, *kind)
+    plan = rate, distance, ramp, sum(swing, Fraction(0)), stress
+    return Fault(given["name"], rho * size, modulus / size, eta / size**2, *plan, box, *kind)
 
 
 def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
@@ -197,6 +202,10 @@ class Cell:
         fast = Fraction(5, 2) / path.diffusion if path.diffusion > 0 else 1 / path.lag
         return fast * (self.claims["asked"] + drift * late + self.claims["push"]) + drift
 
+    def fastest_pull(self) -> Fraction:
+        """Bound of K|x'|."""
+        return self.fault.load() * (self.grown - 1 + self.fault.swing)
+
     def fastest_state(self) -> Fraction:
         """Bound of |z'|."""
         if self.fault.slips:
@@ -215,8 +224,9 @@ class Cell:
         """Stress with all that the mass may add."""
         fault, claims, push = self.fault, self.claims, self.fastest_push()
         bent = self.a[1] * claims["log_rate"] + self.b[1] * claims["log_state"]
-        moved = (fault.load() / self.mu[0] + push) * bent + self.normal[1] * self.b[1] * self.fastest_state()
-        moved += fault.load() * (self.grown - 1) + self.mu[1] * push
+        needed = fault.load() * (1 + fault.swing) / self.mu[0]
+        moved = (needed + push) * bent + self.normal[1] * self.b[1] * self.fastest_state()
+        moved += self.fastest_pull() + self.mu[1] * push
         return (
             fault.stress
             + self.rounding()
@@ -226,7 +236,7 @@ class Cell:
     def soon(self, time: Fraction) -> Row:
         """How far y, cy + c_z z and ay + bz may move within this time, the stress aside."""
         state = self.fastest_state()
-        change = self.fault.load() * (self.grown - 1) + self.weakening * state
+        change = self.fastest_pull() + self.weakening * state
         change += middle(self.mu) * self.fastest_push()
         y, z = change * time / self.strength, state * time
         return [
@@ -255,6 +265,7 @@ def around(loop: Loop, cell: Cell) -> Loop:
     stress = entry(fault.rate * c / cell.strength, -speed * cy / cell.strength)
     inputs = [stress, entry(fault.rate, Fraction(0) if fault.slips else -speed), entry(Fraction(0), -speed)]
     inputs += [loop.inputs[1]] if fault.drift() else []
+    inputs += [entry(-fault.rate, Fraction(0))] if fault.swing else []
     inputs += [loop.inputs[2]] if cell.path.noise else []
     inputs += [[middle(cell.mu) * v for v in stress]] if loop.fade else []
     outputs = [y, ageing, strong, z, unit_rows[0], push, loop.outputs[-1], *loop.outputs[3:-1]]
@@ -306,8 +317,7 @@ def shares_of(loop: Loop, cell: Cell) -> tuple[Row, list[Row]]:
     if cell.fault.slips:
         state = [zero, half(cell.states) / middle(cell.states), *[zero] * (many - 2)]
     own, shares = [cell.stress(), zero, zero], [stress, [bent, *[zero] * (many - 1)], state]
-    drift, noise = cell.fault.drift(), cell.path.noise
-    for size in [v for v in (drift, noise) if v]:
+    for size in [v for v in (cell.fault.drift(), cell.fault.swing, cell.path.noise) if v]:
         own.append(size)
         shares.append([zero] * many)
     if loop.fade:
@@ -368,6 +378,9 @@ def statement(
     when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s"
     when += f", rock of distance^2/diffusivity = {loop['diffusion']} s"
     off = f", measured slip within {loop['slip_noise']} m of the true one" if loop["slip_noise"] != "0" else ""
+    along = (
+        f", along any reference whose rate stays within (1 +- {lower(fault.swing)}) times that" if fault.swing else ""
+    )
     peak = fault.rate * power_of_e(claims["log_rate"])
     highest = fault.stiffness * fault.distance / fault.box["coefficient"][0] + claims["push"]
     return [
@@ -377,7 +390,7 @@ def statement(
         f"with inertia, every constant {', '.join(ranges)}; {cells} cells",
         f"law with {len(loop['states'])} states of the slip alone, {when}{off}",
         f"disturbance: any shear stress of at most {lower(fault.stress)} Pa; from steady sliding at "
-        f"{exact(fault.rate)} m/s over {lower(fault.distance)} m; small gain {upper(small)}",
+        f"{exact(fault.rate)} m/s over {lower(fault.distance)} m{along}; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(peak)} m/s: |ln(slip rate/first rate)| <= "
         f"{upper(claims['log_rate'])}",
         f"|slip - reference| <= {upper(claims['slip_error'])} m, |ln(state*first rate/critical_slip)| <= "

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from quakedesign.fault.parameters import Fault as Fault
     from quakedesign.fault.parameters import require_fault as require_fault
     from quakedesign.fault.reference import Reference as Reference
+    from quakedesign.fault.reference import SlidingReference as SlidingReference
     from quakedesign.fault.scales import Scales as Scales
     from quakedesign.fault.scaling import scaled_fault as scaled_fault
     from quakedesign.fault.scenario import load_fault as load_fault

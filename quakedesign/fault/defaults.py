@@ -59,7 +59,7 @@ def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[s
     parts : mapping
         Arguments of `Fault`, those of the task and perhaps the damping excepted.
     task : mapping
-        target_slip [m], operation_time [s], sampling_time [s], as far as given.
+        target_slip [m], operation_time [s], ramp [-], sampling_time [s], as far as given.
     said : tuple of str
         What was assumed before.
 
@@ -87,7 +87,7 @@ def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[s
     if "operation_time" not in task:
         longest = _cut(PERIODS / fault.natural_frequency)
         assumed.append(f"operation time {longest:g} s, about as many natural periods as for the paper's faults")
-    reference = Reference(target_slip=target, operation_time=longest)
+    reference = Reference(target_slip=target, operation_time=longest, ramp=task.get("ramp"))
     step = task.get("sampling_time") or _step(fault, reference, assumed)
     return Fault(
         **dict(parts) | {"damping": fault.damping, "reference": reference, "sampling_time": step},

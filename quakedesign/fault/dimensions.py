@@ -46,6 +46,7 @@ PLANT_UNITS: Mapping[str, str] = {
     "sampling_time": "s",
     "reference.target_slip": "slip_m",
     "reference.operation_time": "s",
+    "reference.ramp": "slip_m/slip_m",
     "disturbance.constant": "slip_m/s^2",
     "disturbance.amplitude": "slip_m/s^2",
     "disturbance.frequency": "rad/s",

@@ -82,6 +82,11 @@ class Fault:
         with problems.collected():
             require_ordinary(**{name: getattr(self.friction, name) for name in self.friction.quantities()})
         problems.refuse()
+        if self.reference.ramp is not None and not self.friction.state_names:
+            raise ParameterError(
+                f"a ramp beside a constant rate needs friction with a state. Received {self.reference.ramp!r} with "
+                f"{self.friction.name}, whose reference is a smooth ramp from rest to rest. Leave it out."
+            )
         if self.reference.operation_time < 1000 * self.sampling_time:
             raise ParameterError(
                 f"sampling_time must be at most a thousandth of the operation time "

@@ -1,6 +1,7 @@
 """The slip that the controller shall follow."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError
@@ -22,13 +23,21 @@ class Reference:
         d_max [m], positive.
     operation_time : float
         t_op [s], positive.
+    ramp : float, optional
+        Of friction with a state, which slides all the time: share of the slip that follows the smooth ramp, above 0 and
+        below 1; the rest comes at a constant rate. None: all of it at a constant rate.
     """
 
     target_slip: float
     operation_time: float
+    ramp: float | None = None
 
     def __post_init__(self) -> None:
         require_positive(target_slip=self.target_slip, operation_time=self.operation_time)
+        if self.ramp is not None and not 0 < self.ramp < 1:
+            raise ParameterError(
+                f"ramp must be above 0 and below 1. Received {self.ramp!r}. Leave it out for a constant rate."
+            )
         require_ordinary(0, target_slip=self.target_slip)
         require_ordinary(operation_time=self.operation_time)
 
@@ -57,3 +66,47 @@ class Reference:
     def largest_rate(self) -> float:
         """Largest r' [m/s]: 15/8 of the mean, at half of the operation time."""
         return 15 / 8 * self.target_slip / self.operation_time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingReference:
+    """Slip r(t) = d_max((1 − λ)t/t_op + λ·shape(t/t_op)) of a fault that slides at r′(0) at first and at the end.
+
+    Attributes
+    ----------
+    task : Reference
+        With d_max, t_op and λ, its ramp; 0 without one.
+    """
+
+    task: Reference
+
+    @property
+    def _shares(self) -> tuple[Fraction, Fraction]:
+        """1 − λ and λ."""
+        share = rational(self.task.ramp or 0)
+        return 1 - share, share
+
+    @property
+    def first_rate(self) -> Fraction:
+        """V = r′(0) [m/s], the smallest r′."""
+        return rational(self.task.target_slip) / rational(self.task.operation_time) * self._shares[0]
+
+    @property
+    def swing(self) -> Fraction:
+        """w [-]: r′ lies between V and V(1 + w)."""
+        steady, share = self._shares
+        return Fraction(15, 8) * share / steady
+
+    def slip(self, time: Any) -> Any:
+        """r [m] at times [s] from 0 on, number or array; V goes on behind t_op."""
+        steady, share = map(float, self._shares)
+        stage = time / self.task.operation_time
+        ended = (stage < 1) * stage + (stage >= 1)
+        return self.task.target_slip * (steady * stage + share * self.task.shape(ended))
+
+    def rate(self, time: Any) -> Any:
+        """r′ [m/s] at times [s], as `slip`."""
+        steady, share = map(float, self._shares)
+        stage = time / self.task.operation_time
+        ramping = 30 * stage**2 * (1 - stage) ** 2 * (stage < 1)
+        return self.task.target_slip / self.task.operation_time * (steady + share * ramping)

@@ -27,7 +27,7 @@ PLANT = {
     "damping": "kg/s",
     "effective_normal_stress": "Pa",
 }
-TASK = {"target_slip": "m", "operation_time": "s", "sampling_time": "s"}
+TASK = {"target_slip": "m", "operation_time": "s", "ramp": "", "sampling_time": "s"}
 DISTURBANCE = {
     "constant": "m/s^2",
     "amplitude": "m/s^2",

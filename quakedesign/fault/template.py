@@ -24,6 +24,7 @@ _EXAMPLES: dict[str, str | float] = {
     "effective_normal_stress": "25 MPa",
     "target_slip": "5 cm",
     "operation_time": "2 days",
+    "ramp": 0.1,
     "sampling_time": "10 ms",
     "constant": "0 m/s^2",
     "amplitude": "1e-4 m/s^2",
@@ -48,6 +49,7 @@ _LEFT_OUT = {
     "damping": "radiation of shear waves, G A/(2 c_s), if left out",
     "target_slip": "the next rest slip if left out",
     "operation_time": "about as many natural periods as for the paper's faults if left out",
+    "ramp": "all of it at a constant rate if left out",
     "sampling_time": "at least ten samples while an error grows e-fold, with a state near D_c/(20 V), if left out",
 }
 
@@ -117,6 +119,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
     """
     friction = friction_law(law)
     asks = set() if law in _COME_TO_REST else {"target_slip"}
+    task = {key: unit for key, unit in TASK.items() if friction.state_names or key != "ramp"}
     lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []
     lines += [
         "# A fault for quakedesign. Every number is an example: put in your own, each with its unit. What begins with",
@@ -134,7 +137,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
         *_asked(_law_units(friction), _described(friction), _optional(friction)),
         "",
         f"{'' if asks else '# '}[task]  # what the fault shall do: slip slowly from rest to rest",
-        *_asked(TASK, _task_described(), set(TASK) - asks),
+        *_asked(task, _task_described(), set(TASK) - asks),
         "",
         "# [disturbance]  # acceleration that nobody measures; the bound that guarantees are for",
         *_asked(DISTURBANCE, _described(Disturbance), DISTURBANCE),

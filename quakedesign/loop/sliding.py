@@ -75,8 +75,8 @@ def sliding_loop(
     """The error loop about sliding at V, with the order of events and the path of the pressure of `held_loop`.
 
     States: the slip error x [m] and z [-] in place of e1 and e2; pressures in Pa. Inputs: ``stress`` e [Pa], ``rate`` f
-    [-] in x′ = V(cy + f) and, of ageing, in z′ = −ρ(cy + c_z·z + f), ``state`` h [-] in z′ = … − ρh, and the ``drift``
-    dp*/dt [Pa/s].
+    [-] in x′ = V(cy + f) and, of ageing, in z′ = −ρ(cy + c_z·z + f), ``state`` h [-] in z′ = … − ρh, the ``drift``
+    dp*/dt [Pa/s], and ``reference``, by how much of V the reference is faster [-], in x′ = … − V·it.
     Outputs: ``slip_error`` x [m], ``log_rate`` y, ``log_state`` z, ``ageing`` c_y·y + c_z·z, ``strength`` a·y + b·z,
     ``push`` q [Pa], ``asked`` [Pa], what arrived at the valve less what p* needs, and with a layer ``left_out`` [Pa].
     Those of y and q come without what e and what the layer leaves out add to them at once (`at_once`).
@@ -110,6 +110,7 @@ def sliding_loop(
             "rate": unit_row(size, by_rate),
             "state": unit_row(size, {1: -model.state_rate}),
             "drift": loop.inputs["drift"],
+            "reference": unit_row(size, {0: -model.rate}),
         },
         outputs={
             "slip_error": unit_row(size, {0: _ONE}),

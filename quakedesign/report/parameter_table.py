@@ -17,6 +17,7 @@ _SYMBOLS = {
     "effective_normal_stress": r"\sigma'_n",
     "target_slip": "d_{max}",
     "operation_time": "t_{op}",
+    "ramp": r"\lambda_r",
     "sampling_time": "T_s",
     "mass": "m",
     "stiffness": "k",

@@ -127,7 +127,7 @@ def _of_sliding(claim: SlidingGuarantee) -> dict[str, Any]:
             **({"state_law": task.state_law} if task.state_law != "ageing" else {}),
             **({"regularised": True} if task.regularised else {}),
         },
-        "reference": _exactly(task, _SLIDING_REFERENCE),
+        "reference": _exactly(task, (*_SLIDING_REFERENCE, *(("swing",) if task.swing else ()))),
         "stress": str(task.stress),
         "loop": {
             **_exactly(claim.held, _SLIDING_TIMES),
@@ -245,7 +245,10 @@ def _sliding_task(raw: dict[str, Any]) -> SlidingTask:
     fault = with_keys(raw["fault"], {"name", *_ROCK, *AXES, *more})
     for name, value in more.items():
         need(json.dumps(value) == json.dumps(told[name]), f"{name} must be {json.dumps(told[name])} where told")
-    more |= {name: read_rational(fault[name]) for name in _ROCK} | read_exactly(raw["reference"], _SLIDING_REFERENCE)
+    swings = ("swing",) if isinstance(raw["reference"], dict) and "swing" in raw["reference"] else ()
+    more |= {name: read_rational(fault[name]) for name in _ROCK}
+    more |= read_exactly(raw["reference"], (*_SLIDING_REFERENCE, *swings))
+    need(not swings or more["swing"] > 0, "swing must be positive where it is told")
     ranges = {name: read_ends(fault[name], name) for name in AXES}
     return SlidingTask(name=_name(fault), ranges=ranges, stress=read_rational(raw["stress"]), **more)
 

@@ -6,7 +6,7 @@ import sympy as sp
 
 from quakedesign.certificates.slow_sliding.task import AXES, SlidingTask
 from quakedesign.errors import UnsupportedError
-from quakedesign.fault import Fault
+from quakedesign.fault import Fault, SlidingReference
 from quakedesign.loop import StateLaw
 from quakedesign.rationals import fraction_of, rational
 
@@ -17,17 +17,18 @@ _LAWS: dict[str, tuple[StateLaw, bool]] = {
 }
 """Law of the state, unless the friction tells one itself, and whether friction is regularised."""
 _DIGITS = 12
+_LARGEST_RAMP = Fraction(8, 23)
 
 
 def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingTask:
-    """The task of a fault at its mean rate V, target slip over operation time, under a stress of at most `stress` [Pa].
+    """The task of a fault that slides at V, the first rate of its reference, under a stress of at most `stress` [Pa].
 
     The ranges of a, b and D are their values and `spread` of them to both sides [-]; that of μ* follows from a − b.
 
     Raises
     ------
     UnsupportedError
-        For friction without a state, or whose state feels the normal stress.
+        For friction without a state, or whose state feels the normal stress, and for a ramp from 8/23 on.
     """
     if fault.friction.name not in _LAWS or fault.friction.stress_sensitivity:  # type: ignore[attr-defined]
         sensitivity = getattr(fault.friction, "stress_sensitivity", 0)
@@ -40,7 +41,13 @@ def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0))
     if getattr(fault.friction, "evolution", "") == "slip":
         state_law = "slip"
     law = fault.friction.exact()
-    rate = rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
+    reference = SlidingReference(task=fault.reference)
+    if reference.swing >= 1:
+        raise UnsupportedError(
+            f"a guarantee of slow sliding needs a ramp below {_LARGEST_RAMP}, with which the rate of the reference "
+            f"doubles. Received {fault.reference.ramp:g}. Make it smaller, or simulate it."
+        )
+    rate = reference.first_rate
     named = {axis: rational(getattr(fault.friction, axis)) for axis in AXES[:3]}
     steady = law.steady_coefficient(sp.Rational(rate.numerator, rate.denominator))
     middle = _near(steady)
@@ -61,6 +68,7 @@ def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0))
         distance=rational(fault.reference.target_slip),
         ramp=stiffness * rate / middle,
         stress=stress,
+        swing=reference.swing,
         state_law=state_law,
         regularised=regularised,
     )

@@ -3,23 +3,25 @@
 **Plant.** Per unit of area, with v = Ve^y, θ = (D/V)e^z, the slip error x, the pressure error q = p − p* and N = σ′ −
 p,
 
-    mVe^y·y′ = s − ŝ,    ŝ = N(ay + bz) + HV(e^y − 1) + Kx − μ*q,    x′ = V·f,    z′ = −ρ(f + g),
+    mVe^y·y′ = s − ŝ,    ŝ = N(ay + bz) + HV(e^y − 1) + Kx − μ*q,    x′ = V(f − ω),    z′ = −ρ(f + g),
 
-f = e^y − 1, g = 1 − e^{−z}, ρ = V/D: the balance of forces, of which the steady one, with Nμ* + HV + KVt, is taken
-off, and the ageing law. The slip law has z′ = −ρe^y(y + z) in its place. Everything is 0 at first; a, b, D, μ* and σ′
-are constants.
+f = e^y − 1, g = 1 − e^{−z}, ρ = V/D: the balance of forces, of which the steady one, with Nμ* + HV + Kr, is taken off,
+and the ageing law. The slip law has z′ = −ρe^y(y + z) in its place. Everything is 0 at first; a, b, D, μ* and σ′ are
+constants. The slip error is that from a reference r with r′ = V(1 + ω), |ω| ≤ W < 1 of any course, r = Vt without a
+swing W, and p* = Kr/μ*, so that |p*′| ≤ KV(1 + W)/μ*; 0 ≤ r, which rises to the distance. Rate and state are those
+beside V and D/V all the same: V does not follow r′.
 
 **Regularised friction** is larger than a·ln(2s), 2s = 2sinh(μ*/a)·e^{y + bz/a}, by at most a/(4s²), as arsinh s =
 ln(2s) + ln((1 + √(1 + 1/s²))/2). With m = μ* − aY − bZ, 2m/a ≥ 1, this is below 4a·e^{−2m/a} =: ε, for (1 −
 e^{−2μ*/a})^{−2} < 4. So it is the logarithmic one under a shear stress that is larger by N_max·ε, far below 1 Pa.
 
 **Inertia.** Let |y| ≤ Y, |z| ≤ Z, |q| ≤ Q so far. Then ŝ′ = λ(s − ŝ) + r with λ = (Na + HVe^y)/(mVe^y) ≥ λ₀ =
-N_min·a/(mVe^Y) and r = N′(ay + bz) + Nbz′ + Kx′ − μ*q′. Where |ŝ| > S + sup|r|/λ₀ it falls, so |ŝ| ≤ S + sup|r|/λ₀:
-the fault with its mass is one without it (ŝ in place of s) under a stress that is larger by sup|r|/λ₀, some Pa. Its r
-has |N′| ≤ KV/μ* + |q′|, |z′| ≤ ζ, ζ the larger of ρ(e^Y − e^{−Z}) and ρ(e^Z − e^{−Y}), of the slip law ρe^Y(Y + Z),
-and |x′| ≤ V(e^Y − 1). The pressure in the fault is that of the well, u beside the plan, through filters 1/(1 +
-s/λ_n), of which one has the rate λ: so q′ = λ(h − w) − δ′, w what comes out, h what goes into it, δ = p* − plan, |δ′|
-≤ d. Filters are means over the past, E late in all, so with |u − δ| ≤ U also |h − δ| ≤ U + dE, and |w − δ| = |q| ≤ Q:
+N_min·a/(mVe^Y) and r = N′(ay + bz) + Nbz′ + Kx′ − μ*q′. Where |ŝ| > S + sup|r|/λ₀ it falls, so |ŝ| ≤ S + sup|r|/λ₀: the
+fault with its mass is one without it (ŝ in place of s) under a stress that is larger by sup|r|/λ₀, some Pa. Its r has
+|N′| ≤ KV(1 + W)/μ* + |q′|, |z′| ≤ ζ, ζ the larger of ρ(e^Y − e^{−Z}) and ρ(e^Z − e^{−Y}), of the slip law ρe^Y(Y + Z),
+and |x′| ≤ V(e^Y − 1 + W). The pressure in the fault is that of the well, u beside the plan, through filters 1/(1 +
+s/λ_n), of which one has the rate λ: so q′ = λ(h − w) − δ′, w what comes out, h what goes into it, δ = p* − plan, |δ′| ≤
+d. Filters are means over the past, E late in all, so with |u − δ| ≤ U also |h − δ| ≤ U + dE, and |w − δ| = |q| ≤ Q:
 |q′| ≤ λ(U + dE + Q) + d. For rock λ = π²/(4τ) < 5/(2τ) and E = τ/2, with the lag ℓ before it E = τ/2 + ℓ; for a lag
 alone λ = 1/ℓ, E = ℓ.
 
@@ -32,13 +34,13 @@ alone λ = 1/ℓ, E = ℓ.
 
 so |e| ≤ sup|ŝ| + δN|a₀y + b₀z| + N_max(δa|y| + δb|z|) + HVδ|y| + δμ|q|, |φ| ≤ δ|y| and, with r = sup|ρ/ρ₀ − 1|, |h| ≤
 r|cy + c_z·z| + rδ|y| + (1 + r)δ_z|z|. Of the slip law (ρ/ρ₀)e^y lies between (1 − r)e^{−Y} and (1 + r)e^Y, c_z its
-middle and δ_z half the range, and with z′ = −ρ₀c_z(y + z) − ρ₀h, into which φ does not come, |h| ≤ δ_z|y + z|. Noise
-of the measured slip, the drift of p* from the plan and what the modes of a layer leave out, R, are inputs as in
-`guarantee.theorem`: q has R more than the loop's, and y and what is made of it what e and μ₀R add to them at the same
-instant, R no more than its weight at the beginning of a part of the period.
+middle and δ_z half the range, and with z′ = −ρ₀c_z(y + z) − ρ₀h, into which φ does not come, |h| ≤ δ_z|y + z|. ω is an
+input of its own. Noise of the measured slip, the drift of p* from the plan and what the modes of a layer leave out, R,
+are inputs as in `guarantee.theorem`: q has R more than the loop's, and y and what is made of it what e and μ₀R add to
+them at the same instant, R no more than its weight at the beginning of a part of the period.
 
 **After a step.** R is largest at once, where the fault has not felt the step yet. With the middle N₀a₀ + HVc = B, By
-= X + e and |X′| ≤ KV(e^Y − 1) + N₀b₀ζ + μ₀q̇, |z′| ≤ ζ, |q′| ≤ q̇ as above. So as long as θ after a step αy + βz is
+= X + e and |X′| ≤ KV(e^Y − 1 + W) + N₀b₀ζ + μ₀q̇, |z′| ≤ ζ, |q′| ≤ q̇ as above. So as long as θ after a step αy + βz is
 at most what it was before, with what e adds now, and θ(α|X′|/B + βζ): in the parts of the period that begin before R
 has faded to a sixteenth y, ay + bz and cy + c_z·z have the gains of the part that ends with the step, and that
 constant of the first instant of the others more.
@@ -167,7 +169,7 @@ def follows(bounds: Mapping[str, Any], claims: SlidingClaims) -> bool:
 
 
 def loop_of(held: Held, model: SlidingModel, task: SlidingTask) -> PeriodicLoop:
-    """The nominal loop; without the drift where the plan is exact.
+    """The nominal loop; without the drift where the plan is exact, and without a reference where its rate is V.
 
     Raises
     ------
@@ -181,9 +183,15 @@ def loop_of(held: Held, model: SlidingModel, task: SlidingTask) -> PeriodicLoop:
         )
     times = {"delay": held.delay, "lag": held.lag, "diffusion": held.diffusion}
     loop = sliding_loop(held.law, model, held.step, **times, noisy=held.noise)
-    if not task.drift:
-        del loop.inputs["drift"]
+    for name, size in _moving(task).items():
+        if not size:
+            del loop.inputs[name]
     return loop
+
+
+def _moving(task: SlidingTask) -> dict[str, Fraction]:
+    """Bounds of what comes of the reference, by its inputs of the loop."""
+    return {"drift": task.drift, "reference": task.swing}
 
 
 def model_of(task: SlidingTask, claims: SlidingClaims) -> SlidingModel | None:
@@ -238,9 +246,8 @@ def channels_of(task: SlidingTask, held: Held, claims: SlidingClaims, loop: Peri
         Channel(name="rate", own=_ZERO, shares={"log_rate": bent}),
         Channel(name="state", own=_ZERO, shares=state),
     ]
-    if "drift" in loop.inputs:
-        channels.append(Channel(name="drift", own=task.drift, shares={}))
-    channels += [Channel(name=name, own=size, shares={}) for name, size in held.noise.items()]
+    beside = {name: size for name, size in _moving(task).items() if size} | held.noise
+    channels += [Channel(name=name, own=size, shares={}) for name, size in beside.items()]
     if loop.fading:
         channels.append(Channel(name="left_out", own=_ZERO, shares={"left_out": _ONE}))
     return tuple(channels)
@@ -251,8 +258,8 @@ def inertia(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fraction:
     low, high = task.normal_stress(claims.push)
     (a_low, a), (_, b), (_, mu) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
     grown, moved = exponential(claims.log_rate), _fastest_push(task, held, claims)
-    rest = (task.fastest_rise + moved) * (a * claims.log_rate + b * claims.log_state)
-    rest += high * b * _fastest_state(task, claims) + task.stiffness * task.rate * (grown - 1) + mu * moved
+    rest = (task.pressure_per_slip * task.fastest + moved) * (a * claims.log_rate + b * claims.log_state)
+    rest += high * b * _fastest_state(task, claims) + _fastest_pull(task, claims) + mu * moved
     return rest * task.inertia * task.rate * grown / (low * a_low)
 
 
@@ -277,6 +284,11 @@ def _fastest_push(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fract
     return speed * (claims.asked + task.drift * late + claims.push) + task.drift
 
 
+def _fastest_pull(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+    """Bound of K|x′| [Pa/s]."""
+    return task.stiffness * task.rate * (exponential(claims.log_rate) - 1 + task.swing)
+
+
 def _fastest_state(task: SlidingTask, claims: SlidingClaims) -> Fraction:
     """Bound ζ of |z′| [1/s]."""
     grown, aged = exponential(claims.log_rate), exponential(claims.log_state)
@@ -290,8 +302,9 @@ def _moved(
 ) -> dict[str, Fraction]:
     """How far y and what is made of it can move within a time [s], but for what the stress adds at once."""
     of_state = _fastest_state(task, claims)
-    change = task.stiffness * task.rate * (exponential(claims.log_rate) - 1)
-    change += model.weakening * of_state + model.coefficient * _fastest_push(task, held, claims)
+    change = (
+        _fastest_pull(task, claims) + model.weakening * of_state + model.coefficient * _fastest_push(task, held, claims)
+    )
     y, z = change / model.strength * time, of_state * time
     return {
         "log_rate": y,

@@ -68,7 +68,7 @@ class SlidingGuarantee:
     def pressures(self) -> tuple[LowerBound, UpperBound]:
         """Least and largest pressure in the fault [Pa]."""
         task, push = self.task, self.claims.push
-        return LowerBound(-push), UpperBound(task.fastest_rise / task.rate * task.distance + push)
+        return LowerBound(-push), UpperBound(task.pressure_per_slip * task.distance + push)
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts, SI."""
@@ -90,10 +90,10 @@ class SlidingGuarantee:
         low, high = self.pressures
         return (
             f"from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, for every shear stress disturbance "
-            f"of at most {LowerBound(task.stress).quantity('Pa')}, {_box(task)}: the slip rate never exceeds "
-            f"{ratio:.4g} V = {self.peak_slip_rate:.3g} m/s while the reference goes {float(task.distance):.4g} m, the "
-            f"slip stays within {claims.slip_error:.3g} m of it, the pressure in the fault between "
-            f"{low.quantity('Pa')} and {high.quantity('Pa')} ({', '.join(['with inertia', *_friction(task)])})"
+            f"of at most {LowerBound(task.stress).quantity('Pa')}, {_along(task)}{_box(task)}: the slip rate never "
+            f"exceeds {ratio:.4g} V = {self.peak_slip_rate:.3g} m/s {self.lasts}, the slip stays within "
+            f"{claims.slip_error:.3g} m of it, the pressure in the fault between {low.quantity('Pa')} and "
+            f"{high.quantity('Pa')} ({', '.join(['with inertia', *_friction(task)])})"
         )
 
 
@@ -104,6 +104,12 @@ def _path(held: Held) -> str:
     said += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
     noise = LowerBound(held.slip_noise)
     return said + (f", with any noise of at most {noise:.6g} m in the measured slip" if held.slip_noise else "")
+
+
+def _along(task: SlidingTask) -> str:
+    """The references, where there is more than one."""
+    slow, fast = UpperBound(1 - task.swing), LowerBound(1 + task.swing)
+    return f"every reference whose rate stays between {slow:.6g} V and {fast:.6g} V, " if task.swing else ""
 
 
 def _friction(task: SlidingTask) -> list[str]:

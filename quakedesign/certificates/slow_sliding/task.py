@@ -3,7 +3,8 @@
 Per unit of area: mass m = ρL, stiffness K = G/L, damping H = η/L². The friction coefficient is that of sliding at V,
 μ*, plus a·ln(v/V) + b·ln(θV/D), or its regularised form, a·arsinh(sinh(μ*/a)·exp((a·ln(v/V) + b·ln(θV/D))/a)); the
 state follows the ageing law, θ′ = 1 − vθ/D, or the slip law, θ′ = −(vθ/D)·ln(vθ/D). The fault slides at V at first,
-without pressure, its far end at rest. Along r = Vt it then needs p* = KVt/μ*, of which the plan brings ``ramp``·t.
+without pressure, its far end at rest. Along a reference r from 0, whose rate stays within V(1 ± ``swing``), it then
+needs p* = Kr/μ*, of which the plan brings ``ramp``·r/V. Without a swing r = Vt.
 """
 
 from collections.abc import Mapping
@@ -31,7 +32,9 @@ class SlidingTask:
     ranges : mapping of str to (Fraction, Fraction)
         By the names of `AXES`.
     rate, distance, ramp : Fraction
-        V [m/s], how far the reference goes [m], and how fast the planned pressure rises [Pa/s].
+        V [m/s], how far the reference goes [m], and how fast the planned pressure rises along Vt [Pa/s].
+    swing : Fraction
+        How far the rate of the reference may be from V, over V [-], below 1; 0 for a constant rate.
     stress : Fraction
         Bound of the shear stress disturbance [Pa].
     state_law : str
@@ -54,17 +57,19 @@ class SlidingTask:
     distance: Fraction
     ramp: Fraction
     stress: Fraction
+    swing: Fraction = Fraction(0)
     state_law: StateLaw = "ageing"
     regularised: bool = False
 
     def __post_init__(self) -> None:
         ends = [self.ranges[axis] for axis in AXES] if set(self.ranges) == set(AXES) else []
         positive = (self.density, self.shear_modulus, self.length, self.rate, *(low for low, _ in ends))
-        ordered = len(ends) == len(AXES) and all(low <= high for low, high in ends)
+        ordered = len(ends) == len(AXES) and all(low <= high for low, high in ends) and 0 <= self.swing < 1
         if not ordered or min(positive) <= 0 or min(self.damping, self.distance, self.ramp, self.stress) < 0:
             raise ParameterError(
                 f"slow sliding needs ordered ranges of {', '.join(AXES)} above 0, density, modulus, length and rate "
-                f"above 0, damping, distance, ramp and stress not below. Received others for {self.name}."
+                "above 0, damping, distance, ramp and stress not below, a swing from 0 to below 1. Received others for "
+                f"{self.name}."
             )
         require_known(self.state_law, get_args(StateLaw), "state_law")
 
@@ -84,16 +89,22 @@ class SlidingTask:
         return self.damping / self.length**2
 
     @property
-    def fastest_rise(self) -> Fraction:
-        """Largest dp*/dt [Pa/s]."""
-        return self.stiffness * self.rate / self.ranges["coefficient"][0]
+    def fastest(self) -> Fraction:
+        """Largest rate of the reference [m/s]."""
+        return self.rate * (1 + self.swing)
+
+    @property
+    def pressure_per_slip(self) -> Fraction:
+        """Largest dp*/dr [Pa/m]."""
+        return self.stiffness / self.ranges["coefficient"][0]
 
     @property
     def drift(self) -> Fraction:
         """How fast p* may leave the plan [Pa/s]."""
-        return max(abs(self.stiffness * self.rate / mu - self.ramp) for mu in self.ranges["coefficient"])
+        along = max(abs(self.stiffness * self.rate / mu - self.ramp) for mu in self.ranges["coefficient"])
+        return along * (1 + self.swing)
 
     def normal_stress(self, push: Fraction) -> Range:
         """N = σ′ − p [Pa] along the reference, with |p − p*| up to `push` [Pa]."""
         low, high = self.ranges["normal_stress"]
-        return low - self.fastest_rise / self.rate * self.distance - push, high + push
+        return low - self.pressure_per_slip * self.distance - push, high + push

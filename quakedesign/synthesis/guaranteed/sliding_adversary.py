@@ -41,10 +41,11 @@ class WorstSliding:
 def worst_sliding(claim: SlidingGuarantee) -> WorstSliding:
     """Adversarial stresses at the corners of the box of a, b and D_c, on the plant without inertia.
 
-    For every corner and every piece at which a course may end, the stress is at its ends as the impulse response of the
-    loop, linearised, says, which is the worst for the linear loop; what it comes to is seen on the exponentials
-    themselves, with four Runge–Kutta steps a part of the period. The stress may jump at every end of a piece. The
-    normal stress is that at the start; noise is none. A rate below V counts by its logarithm as one above it.
+    For every corner and every piece at which a course may end, the stress, and the rate of the reference within its
+    swing, are at their ends as the impulse response of the loop, linearised, says, which is the worst for the linear
+    loop; what it comes to is seen on the exponentials themselves, with four Runge–Kutta steps a part of the period.
+    Both may jump at every end of a piece. The normal stress is that at the start; noise is none. A rate below V counts
+    by its logarithm as one above it.
     """
     rate, slip = search_once(lambda: _searched(claim), "worst sliding", claim)
     return WorstSliding(log_rate=rate, slip_error=slip)
@@ -54,7 +55,7 @@ def _searched(claim: SlidingGuarantee) -> list[float]:
     found = [[0.0, 0.0]]
     for corner in corners(claim.task):
         plant = SlidingPieces(claim, corner)
-        found += [plant.largest(stress).tolist() for stress in courses(claim, plant)]
+        found += [plant.largest(*course).tolist() for course in courses(claim, plant)]
     return [max(values) for values in zip(*found, strict=True)]
 
 
@@ -65,20 +66,20 @@ def corners(task: SlidingTask) -> list[SlidingTask]:
     return [replace(task, ranges={**task.ranges, **point}) for point in points]
 
 
-def courses(claim: SlidingGuarantee, plant: "SlidingPieces") -> Iterator[np.ndarray]:
-    """Stresses [Pa] for every piece, shape (pieces, courses): worst for the linear loop, of ln(v/V) and of the slip."""
+def courses(claim: SlidingGuarantee, plant: "SlidingPieces") -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Stresses [Pa] and r′/V − 1 [-] for every piece, shape (pieces, courses): worst for the linear loop."""
     for slope in _SLOPES:
         loop, maps = plant.linear(slope)
         aims = np.array([np.array(loop.outputs["log_rate"], dtype=float), np.eye(len(loop.states))[0]])
         count = len(maps)
-        signs = np.ones((_remembered(maps) * count, 2 * count))
+        signs = np.ones((2, _remembered(maps) * count, 2 * count))
         for last in range(count):
             costates = aims
-            for number in range(len(signs) - count + last, -1, -1):
-                step, push, jump = maps[number % count]
-                signs[number, [2 * last, 2 * last + 1]] = np.sign(costates @ push)
+            for number in range(signs.shape[1] - count + last, -1, -1):
+                step, pushes, jump = maps[number % count]
+                signs[:, number, [2 * last, 2 * last + 1]] = np.sign(costates @ pushes).T
                 costates = costates @ step @ jump
-        yield float(claim.task.stress) * signs
+        yield float(claim.task.stress) * signs[0], float(claim.task.swing) * signs[1]
 
 
 def _remembered(maps: list[tuple[Any, Any, Any]]) -> int:
@@ -104,7 +105,7 @@ class SlidingPieces:
         self._friction = float(corner.ranges["direct_effect"][0]), float(corner.ranges["evolution_effect"][0])
 
     def linear(self, slope: float) -> tuple[PeriodicLoop, list[tuple[Any, Any, Any]]]:
-        """Linear loop, and of every piece e^{Ah}, what a constant stress of 1 Pa adds, and the jump before it."""
+        """Linear loop, and of every piece e^{Ah}, what 1 Pa of stress and r′ = 2V add, and the jump before it."""
         model: Any = model_of(self._corner, self._claim.claims)
         steep = Fraction(slope).limit_denominator(1000)
         strength = Fraction(self._strength) + self._corner.radiation * self._corner.rate * steep
@@ -116,41 +117,42 @@ class SlidingPieces:
             weakening=Fraction(self._weakening).limit_denominator(10**9),
         )
         loop = loop_of(self._claim.held, plain, self._corner)
-        flow, push = np.array(loop.flow, dtype=float), np.array(loop.inputs["stress"], dtype=float)
-        return loop, [(*_held(flow, push, length), jump) for length, jump in _parts(loop)]
+        flow, pushes = np.array(loop.flow, dtype=float), np.zeros((len(loop.states), 2))
+        pushes[:, 0], pushes[0, 1] = np.array(loop.inputs["stress"], dtype=float), -self._rate
+        return loop, [(*_held(flow, pushes, length), jump) for length, jump in _parts(loop)]
 
-    def largest(self, stress: np.ndarray) -> np.ndarray:
-        """Largest |ln(v/V)| and slip error [m] of courses, shape (pieces, courses)."""
+    def largest(self, stress: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+        """Largest |ln(v/V)| and slip error [m] of courses of the stress [Pa] and of r′/V − 1, (pieces, courses)."""
         parts, size = _parts(self._loop), len(self._loop.states)
         flow, row = np.array(self._loop.flow, dtype=float)[2:, 2:], np.array(self._loop.outputs["push"], float)[2:]
         halves = [expm(flow * length / 2) for length, _ in parts]
         state, found = np.zeros((size, stress.shape[1])), np.zeros(2)
-        for number, pushed in enumerate(stress):
+        for number, (pushed, faster) in enumerate(zip(stress, ahead, strict=True)):
             length, jump = parts[number % len(parts)]
             state = jump @ state
             half = halves[number % len(parts)]
             middle = half @ state[2:]
             after = half @ middle
             pressures = [row @ v for v in (state[2:], middle, after)]
-            moved = self._step(state[:2], pressures, pushed, length)
+            moved = self._step(state[:2], pressures, pushed, faster, length)
             state = np.vstack([moved, after])
             reached = [self.log_rate(moved, pressures[2], end) for end in (pushed, -pushed)]
             found = np.maximum(found, [np.max(np.abs(reached)), np.max(np.abs(moved[0]))])
         return found
 
-    def _step(self, now: Any, pressures: list[Any], stress: Any, length: float) -> Any:
+    def _step(self, now: Any, pressures: list[Any], stress: Any, ahead: Any, length: float) -> Any:
         """Slip error and log state after a piece."""
-        first = self._rates(now, pressures[0], stress)
-        second = self._rates(now + length / 2 * first, pressures[1], stress)
-        third = self._rates(now + length / 2 * second, pressures[1], stress)
-        fourth = self._rates(now + length * third, pressures[2], stress)
+        first = self._rates(now, pressures[0], stress, ahead)
+        second = self._rates(now + length / 2 * first, pressures[1], stress, ahead)
+        third = self._rates(now + length / 2 * second, pressures[1], stress, ahead)
+        fourth = self._rates(now + length * third, pressures[2], stress, ahead)
         return now + length / 6 * (first + 2 * second + 2 * third + fourth)
 
-    def _rates(self, now: Any, pressure: Any, stress: Any) -> Any:
+    def _rates(self, now: Any, pressure: Any, stress: Any, ahead: Any) -> Any:
         y = self.log_rate(now, pressure, stress)
         slips = self._corner.state_law == "slip"
         aged = self._ageing * (-np.exp(y) * (y + now[1]) if slips else np.expm1(-now[1]) - np.expm1(y))
-        return np.array([self._rate * np.expm1(y), aged])
+        return np.array([self._rate * (np.expm1(y) - ahead), aged])
 
     def log_rate(self, now: Any, pressure: Any, stress: Any) -> Any:
         """ln(v/V) of slip error [m], log state, pressure error [Pa] and stress [Pa], by Newton's method."""
@@ -173,9 +175,9 @@ def _parts(loop: PeriodicLoop) -> list[tuple[float, np.ndarray]]:
     return found
 
 
-def _held(flow: np.ndarray, push: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
-    size = len(flow)
-    whole = np.zeros((size + 1, size + 1))
-    whole[:size, :size], whole[:size, size] = flow, push
+def _held(flow: np.ndarray, pushes: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
+    size, count = pushes.shape
+    whole = np.zeros((size + count, size + count))
+    whole[:size, :size], whole[:size, size:] = flow, pushes
     found: Any = expm(whole * length)
-    return found[:size, :size], found[:size, size]
+    return found[:size, :size], found[:size, size:]

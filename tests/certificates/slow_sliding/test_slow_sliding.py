@@ -56,7 +56,7 @@ def task(half="0.02", stress=25000, **changes):
     given = {
         "name": "a patch", "density": F(2700), "shear_modulus": F(30 * 10**9), "length": F(5000),
         "damping": F(5 * 10**14), "ranges": ranges, "rate": RATE, "distance": F("0.01"), "ramp": F(12),
-        "stress": F(stress),
+        "stress": F(stress), "swing": F(0),
     }  # fmt: skip
     return SlidingTask(**(given | changes))
 
@@ -165,6 +165,9 @@ def test_the_pressure_that_is_needed_leaves_the_plan_and_lowers_the_normal_stres
     assert one.drift == cell.fault.drift() == F(drift)
     normal = 40 * 10**6 - 120000 - 380000, 50 * 10**6 + 380000
     assert one.normal_stress(F(380000)) == cell.normal == normal
+    swinging = replace(one, swing=F(1, 5))
+    assert swinging.drift == alone(swinging).fault.drift() == F(6, 5) * F(drift)
+    assert swinging.normal_stress(F(380000)) == alone(swinging).normal == normal
 
 
 FRICTION = {
@@ -185,9 +188,10 @@ PATHS = [
 
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("friction", FRICTION.values(), ids=FRICTION)
-def test_both_checkers_state_the_same_loop_exactly(path, friction):
+@pytest.mark.parametrize("swing", [F(0), F(1, 5)])
+def test_both_checkers_state_the_same_loop_exactly(path, friction, swing):
     """Flow, inputs, outputs, what bounds the inputs and what may move after a step; with a rock that damps much."""
-    one = task(ranges=UNSURE, ramp=F(14), damping=F(5 * 10**20), **friction)
+    one = task(ranges=UNSURE, ramp=F(14), damping=F(5 * 10**20), swing=swing, **friction)
     held = Held(law=STIFF, step=F(200), **path)
     cell, model = alone(one, held), small_gain.model_of(one, claims())
     plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, task=one, held=held)))["loop"])
@@ -195,7 +199,9 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction):
     assert [list(row) for row in ours.flow] == theirs.flow
     assert [list(row) for row in ours.inputs.values()] == theirs.inputs[: len(ours.inputs)]
     assert [list(ours.outputs[name]) for name, _ in zip(OUTPUTS, theirs.outputs, strict=False)] == theirs.outputs
-    assert [list(fading.entry) for fading in ours.fading.values()] == theirs.inputs[4 + bool(held.slip_noise) :]
+    assert [list(fading.entry) for fading in ours.fading.values()] == theirs.inputs[
+        4 + bool(held.slip_noise) + bool(swing) :
+    ]
     channels, (own, shares) = small_gain.channels_of(one, held, claims(), ours), standalone.shares_of(theirs, cell)
     assert [channel.own for channel in channels] == own
     assert [[c.shares.get(name, 0) for name in OUTPUTS[: len(theirs.outputs)]] for c in channels] == shares
@@ -208,7 +214,7 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction):
 @pytest.mark.parametrize("friction", FRICTION.values(), ids=FRICTION)
 def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
     """Exactly, of gains that are made up: what adds at once, what a step does, small gain and bounds."""
-    one, held = task(ranges=UNSURE, ramp=F(14), **friction), Held(law=STIFF, step=F(200), **path)
+    one, held = task(ranges=UNSURE, ramp=F(14), swing=F(1, 5), **friction), Held(law=STIFF, step=F(200), **path)
     ours = small_gain.loop_of(held, small_gain.model_of(one, claims()), one)
     phases, names = small_gain.after_a_step(ours), (*ours.inputs, *held.noise, *ours.fading)
 
@@ -227,6 +233,7 @@ def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
     plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, held=held)))["loop"])
     theirs, small = standalone.bounds(plain, alone(one, held))
     found = small_gain.bounds_from(one, held, claims(), ours, made_up, phases)
+    assert set(names) >= {"drift", "reference"}
     assert {name: found[name] for name in theirs} == theirs
     assert small <= found["small_gain"] <= small * (1 + F(1, 10**5))
     assert asked == [(name, name in held.noise, name in ours.fading) for name in names]
@@ -437,6 +444,12 @@ def test_both_checkers_add_the_inertia_of_the_balance_of_forces(path):
     rest += 7.2 * math.expm1(0.5) + 0.6 * moved
     light = (40e6 - 0.12e6 - 0.38e6) * 0.009 / (2700 * 5000 * 1.2e-6 * math.exp(0.5))
     assert float(found) == pytest.approx(rest / light, rel=1e-9)
+    swinging = replace(one, swing=F(1, 5))
+    later = 0.2 * 2 * (1 + speed * (rock / 2 + lag))
+    rest += (0.2 * 7.2 / 0.5 + later) * (0.012 * 0.5 + 0.017 / 18) + 7.2 * 0.2 + 0.6 * later
+    more = small_gain.inertia(swinging, held, claims())
+    assert alone(swinging, held).stress() == swinging.stress + more
+    assert float(more) == pytest.approx(rest / light, rel=1e-9)
 
 
 def test_the_state_that_ages_fastest_counts():
@@ -526,6 +539,62 @@ def test_no_more_than_64_cells_are_read():
         cells(many, (*cuts, None))
     with pytest.raises(checker.Refused):
         standalone.read_cells(entries, dict(many.ranges))
+
+
+SWINGING = replace(
+    CLAIM,
+    task=task("0.002", stress=2000, swing=F(1, 20)),
+    claims=claims("1/5", "1/15", "1/50000", 210000, 210000),
+)
+
+
+def test_a_guarantee_along_references_of_a_swing_is_proved_by_both_checkers_and_survives_its_file():
+    text = guarantee_text(SWINGING)
+    assert json.loads(text)["reference"]["swing"] == "1/20"
+    assert parse_guarantee(text) == SWINGING
+    assert SWINGING.check() is Verdict.PROVED
+    assert "every reference whose rate stays between 0.95 V and 1.05 V, for all constant a" in SWINGING.sentence()
+    statement = checker.check(text).statement
+    assert any("along any reference whose rate stays within (1 +- 0.05) times that" in line for line in statement)
+
+
+@pytest.mark.parametrize("swing", ["0", "1", "-1/10", "11/10", 1, None])
+def test_a_swing_that_is_none_or_stops_the_reference_is_refused_by_both(swing):
+    raw = json.loads(guarantee_text(SWINGING))
+    raw["reference"]["swing"] = swing
+    with pytest.raises(checker.Refused):
+        checker.check(json.dumps(raw))
+    with pytest.raises(CertificateError):
+        parse_guarantee(json.dumps(raw))
+
+
+def test_the_task_of_a_fault_has_the_rates_of_its_ramp():
+    patch = load_fault("crustal-patch")
+    ramped = replace(patch, reference=replace(patch.reference, ramp=0.05))
+    found, plain = sliding_task(ramped, F(1000)), sliding_task(patch, F(1000))
+    assert found.rate == F(95, 100) * plain.rate
+    assert found.fastest == plain.rate * F(104375, 100000)  # 1 - 0.05 + 15/8 of 0.05, at half of the time
+    assert (found.distance, plain.swing) == (plain.distance, 0)
+    with pytest.raises(UnsupportedError, match="a ramp below 8/23"):
+        sliding_task(replace(patch, reference=replace(patch.reference, ramp=0.35)), F(1000))
+
+
+def test_what_is_proved_of_one_swing_is_not_proved_of_a_larger_one():
+    raw = json.loads(guarantee_text(SWINGING))
+    raw["reference"]["swing"] = "1/2"
+    assert parse_guarantee(json.dumps(raw)).check() is Verdict.UNDECIDED
+    with pytest.raises(checker.Refused, match="must follow from all claims"):
+        checker.check(json.dumps(raw))
+
+
+def test_a_rate_that_is_off_for_ever_is_followed():
+    """The nominal loop settles at y = ω/c without a slip error, so that the gain of y is at least 1/c."""
+    still = task("0", stress=0, swing=F(1, 10), distance=F(0))
+    model = small_gain.model_of(still, claims())
+    loop = small_gain.loop_of(LAGGED, model, still)
+    assert loop.inputs["reference"] == (-RATE, *[0] * (len(loop.states) - 1))
+    found = small_gain.norms(loop)
+    assert 1 / model.slope < max(found["log_rate", "reference"]) < 3 / model.slope
 
 
 CHANGES = {
