@@ -43,8 +43,8 @@ class ActuatorOptions:
         """Values in SI units, by the names of the options."""
         return dict(vars(self))
 
-    def build(self, step: float) -> Actuator:
-        """Stages of an actuator in the order of the signal, for a sampling period [s].
+    def build(self, step: float, seed: int = 0) -> Actuator:
+        """Stages of an actuator in the order of the signal, for a sampling period [s] and a seed of the jitter.
 
         Raises
         ------
@@ -52,7 +52,12 @@ class ActuatorOptions:
             For values that a stage refuses, or for a part of a stage that is not there.
         """
         chosen = (_stage(stage, self.told(), step) for stage in stages().values() if stage.options)
-        return Actuator(stages=tuple(stage for stage in chosen if stage is not None))
+        chain = Actuator(stages=tuple(stage for stage in chosen if stage is not None))
+        if not self.told()["jitter"]:
+            return chain
+        from quakedesign.simulation.campaign.reseeding import reseeded
+
+        return reseeded(chain, seed)
 
 
 def _stage(stage: type[Stage], told: Mapping[str, Any], step: float) -> Stage | None:
@@ -84,12 +89,15 @@ class EstimateOptions:
         n_d; the paper prints 2, for which a held pressure has no λ_d.
     filter_order
         n_f of the differentiator.
+    differentiator_steps
+        Of it inside the controller, for every reading.
     """
 
     averaging: Whole = 1
     differentiator_bound: str | None = None
     differentiator_order: Whole = 1
     filter_order: Whole = 0
+    differentiator_steps: Whole = 1
 
     @property
     def bound(self) -> float | None:
@@ -117,11 +125,14 @@ class SensorOptions(EstimateOptions):
         The same of the slip rate, where it is measured, such as '1 um/s'.
     bandwidth
         Of the transducer in front of a differentiator, such as '100 Hz'.
+    slip_quantum
+        Steps in which that transducer reads, such as '0.15 um'.
     """
 
     slip_noise: Metres = 0.0
     rate_noise: MetresPerSecond = 0.0
     bandwidth: Hertz | None = None
+    slip_quantum: Metres = 0.0
 
     def build(self, step: float, seed: int = 0) -> "Sensor":
         """Measurement or sensor for a sampling period [s] and a seed of the noise; raises `ParameterError`."""
@@ -136,4 +147,6 @@ class SensorOptions(EstimateOptions):
             order=self.differentiator_order,
             bandwidth=math.inf if self.bandwidth is None else self.bandwidth,
             averaging=self.averaging,
+            quantum=self.slip_quantum,
+            inner_steps=self.differentiator_steps,
         )

@@ -53,7 +53,7 @@ def simulate(
     authority
         B0 of a sampled scheme in m^2/kg; guarantee says weight and authority of the sliding modes that it proves.
     seed
-        Of the noise.
+        Of noise and jitter.
     out
         NetCDF file to write.
     """
@@ -71,7 +71,7 @@ def simulate(
     chosen, load = law.choose(loaded), run.load()
     way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
     period = loaded.sampling_time if step is None else step
-    chain, told = actuator.build(period), sensors.build(period, seed)
+    chain, told = actuator.build(period, seed), sensors.build(period, seed)
     with progress() as tell:
         tell("compiling", 0.0)
         trajectory, premises = run_single(

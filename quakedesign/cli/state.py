@@ -20,6 +20,8 @@ _GROUP = Group("Friction with a state (rate-and-state)")
 _BOTH = {"duration": "duration", "plant": "plant", "method": "method"}
 _FREE = {"drift": "loading_rate", **_BOTH}
 _HELD = {"step": "step", "lag": "lag", "diffusion": "diffusion", **_BOTH}
+_PUMP = ("delay", "jitter", "quantum", "saturation", "withdrawal", "rate_limit")
+_READING = {"slip_noise": "deviation", "bandwidth": "bandwidth", "slip_quantum": "quantum", "seed": "seed"}
 _AROUND = ("fault", "controller", "gains", "state", "out", "force", "json")
 
 
@@ -94,7 +96,7 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
     trajectory: Recording
     if "controller" in changed:
         _require_designed(asked)
-        held = run_held(fault, **_told(fault, changed, _HELD), **options["state"].of_control())
+        held = run_held(fault, **_instruments(fault, changed, options), **options["state"].of_control())
         trajectory, answer, lines = held.trajectory, held.to_dict(), sliding_run_lines
     else:
         free = run_state(fault, **_told(fault, changed, _FREE), **options["state"].of_free())
@@ -154,13 +156,25 @@ class SpreadOptions:
         return designed.controller, told | ({} if self.stress_period is None else {"stress_period": self.stress_period})
 
 
-def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str]) -> dict[str, Any]:
+def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
+    """What a controlled run was asked for, the pump and the transducer made of their options."""
+    from quakedesign.loop.sensing import Transducer
+
+    others = {name: value for name, value in changed.items() if name not in (*_PUMP, *_READING)}
+    told = _told(fault, others, _HELD, (*_PUMP, *_READING))
+    chain = options["actuator"].build(told.get("step", fault.sampling_time), options["seed"])
+    reading: dict[str, Any] = {_READING[name]: value for name, value in changed.items() if name in _READING}
+    transducer = Transducer(**reading) if set(reading) - {"seed"} else None
+    return told | {"stages": chain.sampled, "transducer": transducer}
+
+
+def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: tuple[str, ...] = ()) -> dict[str, Any]:
     """What was asked for, by the name that a run has for it; refuses what does not apply."""
     if foreign := [name for name in changed if name not in (*taken, *_AROUND)]:
         kind = f"friction with a state {'with' if taken is _HELD else 'without'} control"
         raise ParameterError(
             f"{', '.join(foreign)}: not for {kind}. Received {fault.friction.name}. "
-            f"Leave out what is not among {', '.join(taken)} and the options of friction with a state."
+            f"Leave out what is not among {', '.join((*taken, *more))} and the options of friction with a state."
         )
     return {taken[name]: value for name, value in changed.items() if name in taken}
 

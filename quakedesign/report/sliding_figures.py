@@ -51,7 +51,7 @@ def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
     slip.legend(loc="lower right", fontsize=SMALL)
     rate.set_yscale("log")
     _filled(rate, time, run.slip_rate, shade)
-    rate.axhline(speed[0], color="black", linestyle=":", linewidth=1, label="reference")
+    rate.plot(time, speed, color="black", linestyle=":", linewidth=1, label="reference")
     if entry.guaranteed is not None:
         rate.axhline(
             float(entry.guaranteed.peak_slip_rate), color="black", linestyle="--", label="never exceeded, proved"

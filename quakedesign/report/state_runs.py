@@ -59,12 +59,13 @@ def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
     """Lines for people, from `HeldRun.to_dict`: outcome, errors, pressure; no guarantee."""
     outcome, found = answer["outcome"], answer["metrics"]
     least, largest = (p / 1e6 for p in answer["pressure"])
-    path = f", through a lag of {answer['lag']:.4g} s" if answer["lag"] else ""
+    path = "".join(f", through a {name.replace('_', ' ')}" for name in answer["stages"])
+    path += f", through a lag of {answer['lag']:.4g} s" if answer["lag"] else ""
     path += f", through rock of L^2/D = {answer['diffusion']:.4g} s" if answer["diffusion"] else ""
     shaken = f", under a shear stress of up to {answer['stress'] / 1e3:.4g} kPa" if answer["stress"] else ""
     return [
         f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.4g} m/s, the reference's is "
-        f"{answer['reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
+        f"{answer['largest_reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
         f"held over {answer['step']:.4g} s{path}{shaken}, for {_time(answer['duration'])}; without control errors grow "
         f"by {answer['growth_rate']:.3g} 1/s",
         f"|ln(V/V_r)| at most {found['max_log_rate']:.3g}, slip error at most {found['max_slip_error']:.3g} m",

@@ -11,7 +11,7 @@ from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.checks import require_nonnegative
 from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, own_way
-from quakedesign.loop.sensing import Sensor
+from quakedesign.loop.sensing import Sensor, Transducer
 from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.memoryless_earthquake import natural_peak
@@ -44,7 +44,7 @@ def simulate(
     checkpoint: str | Path | None = None,
     substeps: int = 1,
     actuator: Actuator | None = None,
-    measurement: Sensor | None = None,
+    measurement: Sensor | Transducer | None = None,
     initial_slip: float = 0.0,
     initial_slip_rate: float = 0.0,
     tide: Tide | None = None,
@@ -53,7 +53,7 @@ def simulate(
 
     A fault whose friction has a state starts in steady sliding at the mean rate of its task and is held there by a law
     of samples that is told the slip alone, as `design` gives it, in its own scheme and step; of what stands below it
-    takes the parameters up to `progress`, plant, variation, actuator (lag and rock) and tide.
+    takes the parameters up to `progress`, plant, variation, actuator, measurement (a transducer) and tide.
 
     Parameters
     ----------
@@ -99,10 +99,11 @@ def simulate(
         Steps of the integrator per `step`, for a named scheme that samples.
     actuator : Actuator, optional
         What lies between the pressure that is asked for and that in the fault, for a named scheme that samples. Of
-        friction with a state a lag, rock, or both; those which the law is designed for unless given.
-    measurement : Measurement or Sensor, optional
+        friction with a state stages that act once a sample, then a lag, rock, or both; those two which the law is
+        designed for unless given.
+    measurement : Measurement, Sensor or Transducer, optional
         Noise of what the controller sees, or a sensor that tells it estimates from the slip alone, for a named scheme
-        that samples.
+        that samples. Of friction with a state the transducer that the slip is read with.
     initial_slip, initial_slip_rate : float
         x1 [m] and x2 [m/s] at the start, zero or positive. The reference starts at zero all the same.
     tide : Tide, optional
@@ -128,10 +129,10 @@ def simulate(
     asked = dict(locals())
     if require_fault(fault).friction.state_names:
         return _held_in_sliding(**asked)
-    if tide is not None or isinstance(variation, SlidingVariation):
+    if tide is not None or isinstance(variation, SlidingVariation) or isinstance(measurement, Transducer):
         raise ParameterError(
-            f"a tide and a sliding variation need friction with a state. Received {fault.friction.name}. Give a load "
-            "or a variation."
+            "a tide, a sliding variation and a transducer alone need friction with a state. Received "
+            f"{fault.friction.name}. Give a load, a variation or a measurement."
         )
     scheme, step, own = own_way(controller, scheme, step, "continuous")
     setting = Setting.of(fault, step, duration, samples, settled_from)
@@ -150,7 +151,7 @@ def simulate(
 
 
 _OF_SLIDING = ("duration", "samples", "settled_from", "progress", "variation", "tide")
-_READ = ("fault", "controller", "scheme", "step", "method", "plant", "actuator")
+_READ = ("fault", "controller", "scheme", "step", "method", "plant", "actuator", "measurement")
 
 
 def _held_in_sliding(**asked: Any) -> SlidingRun:
@@ -158,14 +159,17 @@ def _held_in_sliding(**asked: Any) -> SlidingRun:
     usual = {name: option.default for name, option in signature(simulate).parameters.items()}
     changed = {name: value for name, value in asked.items() if value is not usual[name] and value != usual[name]}
     fault, controller, variation = asked["fault"], asked["controller"], asked["variation"]
+    transducer = asked["measurement"]
     law, meant = (controller.of_slip, controller.sampling) if controller else (None, None)
     foreign = [name for name in changed if name not in (*_OF_SLIDING, *_READ)]
     foreign += ["variation"] if isinstance(variation, Variation) else []
+    foreign += [] if isinstance(transducer, Transducer | None) else ["measurement"]
     if law is None or meant is None or foreign:
         raise ParameterError(
             f"friction with a state is held by a law of samples, as design gives it, with {', '.join(_OF_SLIDING)} (a "
-            f"SlidingVariation), method, plant and actuator. Received {', '.join(foreign) or repr(controller)} with "
-            f"{fault.friction.name}. Without a controller use simulate_state."
+            f"SlidingVariation), method, plant, actuator and a Transducer as measurement. Received "
+            f"{', '.join(foreign) or repr(controller)} with {fault.friction.name}. Without a controller use "
+            "simulate_state."
         )
     own_way(controller, asked["scheme"], asked["step"])
     require_known(asked["plant"], PLANTS, "plant of a fault with a state", UnknownNameError)
@@ -177,6 +181,8 @@ def _held_in_sliding(**asked: Any) -> SlidingRun:
         meant.step,
         lag=path.lag,
         diffusion=path.diffusion,
+        stages=path.stages,
+        transducer=transducer,
         inertia=PLANTS[asked["plant"]],
         method=changed.get("method", "cvodes"),
         **told,

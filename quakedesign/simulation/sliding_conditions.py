@@ -1,10 +1,12 @@
 """Around a fault in slow sliding: what pushes it, what its law does not know, and what the pressure goes through."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from quakedesign.controllers import Sampling
@@ -12,7 +14,8 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_nonnegative, require_positive
 from quakedesign.loop import Layer
-from quakedesign.loop.actuators import Actuator, Diffusion, Lag
+from quakedesign.loop.actuators import Actuator, Delay, Diffusion, Lag, SampledStage
+from quakedesign.loop.sensing import Transducer
 from quakedesign.rationals import rational
 from quakedesign.simulation.state_plants import SpringSlider
 
@@ -82,36 +85,41 @@ class SlidingVariation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressurePath:
-    """What a held pressure goes through before it is in the fault: a lag of pump and pipe, then rock.
+    """What a pressure goes through before it is in the fault: a pump, then a lag of pump and pipe, then rock.
 
     Attributes
     ----------
     lag, diffusion : Fraction
         Time constant and L²/D [s], not negative; 0 for none.
+    stages : tuple of SampledStage
+        What happens to it once a sample, before it is held. All but a delay see the pump's whole pressure, the planned
+        one included; what is planned is known ahead, so that it is not late.
     """
 
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
+    stages: tuple[SampledStage, ...] = ()
 
     @classmethod
     def of(cls, meant: Sampling, actuator: Actuator | None) -> "PressurePath":
-        """That of an actuator of these two stages, or, without one, that which a law of samples is meant for.
+        """That of an actuator; without a lag and rock in it that which a law of samples is meant for.
 
         Raises
         ------
         ParameterError
         """
-        if actuator is None or not actuator.stages:
-            return cls(lag=meant.lag, diffusion=meant.diffusion)
-        kinds = [type(stage) for stage in actuator.stages]
-        if kinds not in ([Lag], [Diffusion], [Lag, Diffusion]):
+        stages, flowing = (actuator.sampled, actuator.flowing) if actuator else ((), ())
+        if not flowing:
+            return cls(lag=meant.lag, diffusion=meant.diffusion, stages=stages)
+        if [type(stage) for stage in flowing] not in ([Lag], [Diffusion], [Lag, Diffusion]):
             raise ParameterError(
                 "the pressure of slow sliding goes through a lag, rock, or both. Received "
-                f"{', '.join(stage.name for stage in actuator.stages)}. Leave out the others."
+                f"{', '.join(stage.name for stage in flowing)}. Leave out the others."
             )
-        told = {stage.name: stage for stage in actuator.stages}
+        told = {stage.name: stage for stage in flowing}
         lag, rock = told.get("lag"), told.get("diffusion")
         return cls(
+            stages=stages,
             lag=rational(lag.time_constant) if isinstance(lag, Lag) else Fraction(0),
             diffusion=rational(rock.time) if isinstance(rock, Diffusion) else Fraction(0),
         )
@@ -132,3 +140,66 @@ class PressurePath:
         own *= 1 - 1e-9 if np.any(np.abs(rates / own - 1) < 1e-9) else 1
         behind = shares * own / (own - rates)
         return np.append(rates, own), np.append(behind, 1 - sum(behind))
+
+
+class Instruments:
+    """A transducer and a pump between samples of one run, with their memories.
+
+    Attributes
+    ----------
+    step : float
+        T_s [s].
+    """
+
+    def __init__(self, step: float, reading: Any, late: Any, pumped: Any) -> None:
+        self.step = step
+        self._reading, self._late, self._pumped = reading, late, pumped
+
+    @classmethod
+    def of(cls, path: PressurePath, transducer: Transducer | None, step: float) -> "Instruments":
+        """Before the first sample."""
+        late = [stage for stage in path.stages if isinstance(stage, Delay)]
+        others = [stage for stage in path.stages if not isinstance(stage, Delay)]
+        return cls(step, _remembering(_read(transducer, step)), *(_remembering(_held(s, step)) for s in (late, others)))
+
+    def read(self, slip: float) -> float:
+        """Slip [m] that is told."""
+        return float(self._reading(slip))
+
+    def pump(self, asked: float, planned: float) -> float:
+        """Pressure [Pa] beside a planned one that is held, of what is asked for beside it."""
+        return float(self._pumped(float(self._late(asked)) + planned)) - planned
+
+
+def _read(transducer: Transducer | None, step: float) -> Any:
+    """CasADi Function (memory, slip) → reading, memory, and the memory at first; None without a transducer."""
+    if transducer is None:
+        return None
+    memory, slip = ca.SX.sym("memory", len(transducer.start)), ca.SX.sym("slip")
+    seen, after = transducer.pass_on([*map(ca.SX, transducer.numbers(step))], ca.vertsplit(memory), slip)
+    return ca.Function("reading", [memory, slip], [seen, ca.vertcat(*after)]), transducer.start
+
+
+def _held(stages: Sequence[SampledStage], step: float) -> Any:
+    """The same of a pressure and what is held of it; None without stages."""
+    if not stages:
+        return None
+    chain, start = Actuator(stages=tuple(stages)), tuple(v for stage in stages for v in stage.start)
+    numbers = [ca.SX(v) for stage in stages for v in stage.numbers]
+    memory, asked = ca.SX.sym("memory", len(start)), ca.SX.sym("asked")
+    held, _, after = chain.hold(numbers, ca.vertsplit(memory), asked, step)
+    return ca.Function("held", [memory, asked], [held, ca.vertcat(*after)]), start
+
+
+def _remembering(element: Any) -> Any:
+    """Number → number of such a Function, which keeps its memory; as it is without one."""
+    if element is None:
+        return float
+    function, start = element
+    memory = [ca.DM(start)]
+
+    def passed_on(value: float) -> Any:
+        found, memory[0] = function(memory[0], value)
+        return found
+
+    return passed_on

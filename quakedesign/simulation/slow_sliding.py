@@ -1,7 +1,7 @@
 """A controlled fault with rate-and-state friction: sampled, held, through rock, with a stiff solver between samples."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from fractions import Fraction
 from time import perf_counter
@@ -11,16 +11,18 @@ import casadi as ca
 import numpy as np
 
 from quakedesign.errors import ParameterError, require_known
-from quakedesign.fault import Fault
+from quakedesign.fault import Fault, SlidingReference
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop import LinearLaw
+from quakedesign.loop.actuators import SampledStage
+from quakedesign.loop.sensing import Transducer
 from quakedesign.simulation.integrators import adaptive_integrators
 from quakedesign.simulation.integrators.adaptive import StoppedError
 from quakedesign.simulation.metrics import Metrics
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.run import library_versions
 from quakedesign.simulation.setting import Setting
-from quakedesign.simulation.sliding_conditions import PressurePath, SlidingVariation, Tide
+from quakedesign.simulation.sliding_conditions import Instruments, PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.slip_events import dynamic_rate
 from quakedesign.simulation.state_plants import SpringSlider
 from quakedesign.simulation.trajectory import Trajectory
@@ -66,6 +68,8 @@ def simulate_sliding(
     *,
     lag: Fraction = Fraction(0),
     diffusion: Fraction = Fraction(0),
+    stages: Sequence[SampledStage] = (),
+    transducer: Transducer | None = None,
     tide: Tide | None = None,
     variation: SlidingVariation | None = None,
     duration: float | None = None,
@@ -75,11 +79,11 @@ def simulate_sliding(
     method: str = "cvodes",
     progress: Callable[[float], None] = lambda _: None,
 ) -> SlidingRun:
-    """Let a fault slip at its mean rate V, target slip over operation time, from steady sliding at V.
+    """Let a fault slip along r of `SlidingReference`, from steady sliding at its first rate V.
 
-    The far end rests. The pressure p_n that the nominal fault needs for it grows by kV/(μ*A) a second and reaches the
-    fault as it is; the law sees the slip error at every sample, and what it asks for is held and goes through the lag
-    and the rock.
+    The far end rests. The pressure that the nominal fault needs at V at the slip r, kr/(μ*A), is planned ahead and
+    reaches the fault as it is; the law sees the slip error at every sample, and what it asks for is held and goes
+    through the lag and the rock.
 
     Parameters
     ----------
@@ -89,8 +93,10 @@ def simulate_sliding(
         Of the slip error alone [m → Pa].
     step : Fraction
         T_s [s].
-    lag, diffusion : Fraction
+    lag, diffusion, stages : Fraction, Fraction, tuple of SampledStage
         As of `PressurePath`.
+    transducer : Transducer, optional
+        That the slip is read with; exact unless given.
     tide : Tide, optional
         None: no disturbance.
     variation : SlidingVariation, optional
@@ -125,10 +131,10 @@ def simulate_sliding(
     began, length = perf_counter(), fault.reference.operation_time if duration is None else duration
     require_positive(duration=length, step=float(step))
     setting = Setting.of(fault, float(step), max(length, float(step)), samples or 1, settled_from)
-    loop = _Loop.of(
-        fault, PressurePath(lag=lag, diffusion=diffusion), tide or Tide(), variation or SlidingVariation(), inertia
-    )
-    rows, events = _followed(loop, law, float(step), length, method, progress)
+    path = PressurePath(lag=lag, diffusion=diffusion, stages=tuple(stages))
+    loop = _Loop.of(fault, path, tide or Tide(), variation or SlidingVariation(), inertia)
+    around = Instruments.of(path, transducer, float(step))
+    rows, events = _followed(loop, law, around, length, method, progress)
     told = {"scheme": "explicit", "step": float(step), "method": method, "inertia": str(inertia)}
     told |= {
         f"variation_{name}": value for name, value in asdict(variation or SlidingVariation()).items() if value != 1
@@ -153,32 +159,36 @@ class _Loop:
     """Plant between samples: slip, stretch (with the stress over the stiffness), log rate and log state."""
 
     slider: SpringSlider
-    speed: float
-    ramp: float
+    reference: SlidingReference
+    pressure_per_slip: float
     tide: Tide
     decay: "np.ndarray"
     share: "np.ndarray"
 
     @classmethod
     def of(cls, fault: Fault, path: PressurePath, tide: Tide, variation: SlidingVariation, inertia: bool) -> "_Loop":
-        speed = fault.reference.target_slip / fault.reference.operation_time
-        steady = float(fault.friction.steady_coefficient(speed))
-        ramp = fault.stiffness / fault.area * speed / steady
-        return cls(variation.slider(fault, inertia=inertia), speed, ramp, tide, *path.modes)
+        reference = SlidingReference(task=fault.reference)
+        steady = float(fault.friction.steady_coefficient(float(reference.first_rate)))
+        needed = fault.stiffness / fault.area / steady
+        return cls(variation.slider(fault, inertia=inertia), reference, needed, tide, *path.modes)
 
     @property
     def start(self) -> "np.ndarray":
         """In steady sliding, but that the stress of the tide has come at once."""
-        y = np.array(self.slider.start(self.speed))
+        y = np.array(self.slider.start(float(self.reference.first_rate)))
         y[1] += self.tide.at(0.0) / self.slider.stiffness
         return y if self.tide.at(0.0) == 0 else self.slider.stepped(y, 0.0, 0.0)
+
+    def planned(self, time: Any) -> Any:
+        """Pressure [Pa] that the nominal fault needs at its first rate at a time [s]."""
+        return self.pressure_per_slip * self.reference.slip(time)
 
     def pressure(self, time: Any, held: Any, since: Any, modes: Any, exp: Callable[[Any], Any] = np.exp) -> Any:
         """Pressure [Pa] of the fault at a time [s], `since` [s] after the law asked for `held` [Pa]."""
         direct, layered = held * (1 - sum(self.share)), 0
         for i, (rate, share) in enumerate(zip(self.decay, self.share, strict=True)):
             layered = layered + share * (held + (modes[i] - held) * exp(-rate * since))
-        return self.ramp * time + direct + layered
+        return self.planned(time) + direct + layered
 
     def rates(self) -> Any:
         """CasADi Function (t, y, (held pressure, its time, modes)) → dy/dt."""
@@ -191,30 +201,36 @@ class _Loop:
 
 
 def _followed(
-    loop: _Loop, law: LinearLaw, step: float, length: float, method: str, progress: Callable[[float], None]
+    loop: _Loop,
+    law: LinearLaw,
+    around: Instruments,
+    length: float,
+    method: str,
+    progress: Callable[[float], None],
 ) -> tuple["np.ndarray", dict[str, float]]:
     """Rows of (time, y, asked, pressure), and what ends them: when the fault opens, or nothing can go on."""
     sizes = [float(loop.slider.law.critical_slip)] * 2 + [1.0, 1.0]  # type: ignore[attr-defined]
     flow = adaptive_integrators()[method].flow(loop.rates(), sizes, _SHARES, rtol=_RTOL)
     own, fed, output = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output))
     z, y, held, modes = np.zeros(len(output)), loop.start, 0.0, np.zeros(len(loop.decay))
-    rows = [[0.0, *y, 0.0, 0.0]]
+    rows, step = [[0.0, *y, 0.0, 0.0]], around.step
     for k in range(math.ceil(length / step)):
         now = k * step
-        error = y[0] - loop.speed * now
+        error = around.read(y[0]) - loop.reference.slip(now)
         asked = float(output @ z) + float(law.feedback[0]) * error
         z = own @ z + fed[:, 0] * error
-        before, after = (loop.pressure(now, p, 0.0, modes) for p in (held, asked))
+        acting = around.pump(asked, loop.planned(now))
+        before, after = (loop.pressure(now, p, 0.0, modes) for p in (held, acting))
         if after >= loop.slider.normal_stress:
             return np.array(rows), {"opening": now}
-        y, held = loop.slider.stepped(y, before, after), asked
+        y, held = loop.slider.stepped(y, before, after), acting
         try:
             found = flow.follow(now, step, y, (held, now, *modes))[0]
         except StoppedError:
             return np.array(rows), {"diverged": now}
         for share, values in zip(_SHARES, found.T, strict=True):
             pressure = loop.pressure(now + share * step, held, share * step, modes)
-            rows.append([now + share * step, *values, held, pressure])
+            rows.append([now + share * step, *values, asked, pressure])
         y, modes = found[:, -1], held + (modes - held) * np.exp(-loop.decay * step)
         progress(min(1.0, (now + step) / length))
     return np.array(rows), {}
@@ -231,8 +247,8 @@ def _recorded(
         slip=slip,
         slip_rate=np.exp(log_rate),
         pressure=pressure,
-        reference=loop.speed * time,
-        reference_rate=np.full(len(time), loop.speed),
+        reference=loop.reference.slip(time),
+        reference_rate=loop.reference.rate(time),
         matched_perturbation=None,
         friction=friction,
         shear_stress=friction * (loop.slider.normal_stress - pressure),
@@ -253,10 +269,11 @@ def _recorded(
 
 def criterion_of(fault: Fault) -> OutcomeCriterion:
     """What the outcome of a run in slow sliding is decided by; the natural peak takes a cycle to know."""
+    reference = SlidingReference(task=fault.reference)
     return OutcomeCriterion(
         natural_peak=None,
         inertial_rate=math.inf,
-        reference_rate=fault.reference.target_slip / fault.reference.operation_time,
+        reference_rate=float(reference.first_rate * (1 + reference.swing)),
         target_slip=fault.reference.target_slip,
         dynamic_rate=dynamic_rate(fault),
     )

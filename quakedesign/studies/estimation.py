@@ -34,6 +34,8 @@ def sensor(
     order: int = 1,
     bandwidth: float = math.inf,
     averaging: int = 1,
+    quantum: float = 0.0,
+    inner_steps: int = 1,
 ) -> Measurement | OutputFeedback:
     """What a law is told: exact or noisy states, or estimates from the noisy slip.
 
@@ -52,6 +54,10 @@ def sensor(
         Of the transducer [Hz].
     averaging : int
         Number of the latest readings whose mean the differentiator gets.
+    quantum : float
+        Steps in which the transducer reads [m]; 0 for none.
+    inner_steps : int
+        Of the differentiator for every reading.
 
     Raises
     ------
@@ -64,6 +70,8 @@ def sensor(
             "filter order": filter_order != 0,
             "bandwidth": bandwidth != math.inf,
             "averaging": averaging != 1,
+            "quantum of the slip": quantum != 0,
+            "number of steps": inner_steps != 1,
         }
         for name in (name for name, there in given.items() if there):
             raise ParameterError(f"the {name} belongs to a differentiator. Received no bound. Give both or neither.")
@@ -73,10 +81,12 @@ def sensor(
             "with a differentiator the slip alone is measured. "
             f"Received rate noise {noise.rate_noise:g} m/s. Leave it out."
         )
-    transducer = Transducer(deviation=noise.slip_noise, bandwidth=bandwidth, seed=noise.seed)
-    stages: list[SlipStage] = [transducer] if transducer.start else []
+    transducer = Transducer(deviation=noise.slip_noise, bandwidth=bandwidth, quantum=quantum, seed=noise.seed)
+    stages: list[SlipStage] = [transducer] if transducer.start or quantum else []
     stages += [Averaging(samples=averaging)] if averaging != 1 else []
-    differentiator = Differentiator(bound=bound, step=step, order=order, filter_order=filter_order)
+    differentiator = Differentiator(
+        bound=bound, step=step, order=order, filter_order=filter_order, inner_steps=inner_steps
+    )
     return OutputFeedback(stages=tuple(stages), differentiator=differentiator)
 
 

@@ -25,6 +25,7 @@ def export_answer(
     differentiator_order: int = 1,
     filter_order: int = 0,
     averaging: int = 1,
+    differentiator_steps: int = 1,
     fmu: bool = False,
     force: bool = False,
 ) -> dict[str, Any]:
@@ -44,6 +45,8 @@ def export_answer(
         n_f of it.
     averaging : int
         Number of readings whose mean it gets.
+    differentiator_steps : int
+        Of it for every reading.
 
     Returns
     -------
@@ -56,7 +59,8 @@ def export_answer(
     """
     way, step, own = own_way(law, scheme, step)
     period = fault.sampling_time if step is None else step
-    seen = sensor(period, EXACT, differentiator_bound, filter_order, order=differentiator_order, averaging=averaging)
+    inner = {"order": differentiator_order, "averaging": averaging, "inner_steps": differentiator_steps}
+    seen = sensor(period, EXACT, differentiator_bound, filter_order, **inner)
     chosen = sampled_scheme(way, measurement=seen, **own)
     exported = export_controller(fault, law, folder, step=step, scheme=chosen, fmu=fmu, force=force)
     premises = []

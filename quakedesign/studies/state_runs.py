@@ -1,6 +1,6 @@
 """Runs of a fault whose friction has a state: free, as it is by nature, or held in slow sliding."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
-from quakedesign.fault import Disturbance, Fault
+from quakedesign.fault import Disturbance, Fault, SlidingReference
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop import SlidingModel
+from quakedesign.loop.actuators import SampledStage
+from quakedesign.loop.sensing import Transducer
 from quakedesign.rationals import rational
 from quakedesign.simulation import PressureCourse, StateTrajectory, simulate_state
 from quakedesign.simulation.metrics import Metrics
@@ -225,6 +227,8 @@ class HeldRun:
     model : SlidingModel
     step, lag, diffusion : Fraction
         [s].
+    stages : tuple of str
+        What else the pressure goes through.
     trajectory : SlidingRun
     """
 
@@ -233,21 +237,26 @@ class HeldRun:
     step: Fraction
     lag: Fraction
     diffusion: Fraction
+    stages: tuple[str, ...]
     trajectory: SlidingRun
 
     def to_dict(self) -> dict[str, Any]:
         """Answer of ``simulate`` with a controller, SI units."""
         run, rate = self.trajectory, float(self.model.rate)
+        reference = SlidingReference(task=self.fault.reference)
+        followed = reference.rate(run.time)
         return {
             "outcome": run.outcome.to_dict() | {"earthquake_from": rate + 0.1 * dynamic_rate(self.fault)},
             "reference_rate": rate,
+            "largest_reference_rate": float(np.max(followed)),
             "growth_rate": growth_rate(self.model),
             "step": float(self.step),
             "lag": float(self.lag),
             "diffusion": float(self.diffusion),
+            "stages": list(self.stages),
             "metrics": {
-                "max_log_rate": float(np.max(np.abs(np.log(run.slip_rate / rate)))),
-                "max_slip_error": float(np.max(np.abs(run.slip - rate * run.time))),
+                "max_log_rate": float(np.max(np.abs(np.log(run.slip_rate / followed)))),
+                "max_slip_error": float(np.max(np.abs(run.slip - reference.slip(run.time)))),
                 "max_asked": float(np.max(np.abs(run.asked))),
             },
             "pressure": [float(run.pressure.min()), float(run.pressure.max())],
@@ -265,6 +274,8 @@ def run_held(
     step: float | None = None,
     lag: float = 0.0,
     diffusion: float = 0.0,
+    stages: Sequence[SampledStage] = (),
+    transducer: Transducer | None = None,
     stress: float = 0.0,
     stress_period: float = TIDE,
     duration: float | None = None,
@@ -283,6 +294,8 @@ def run_held(
         Time constant of pump and pipe [s], which the law does not know.
     diffusion : float
         L²/D of the rock between well and fault [s].
+    stages, transducer : sequence of SampledStage, Transducer
+        As of `simulate_sliding`; the law does not know them.
     stress, stress_period : float
         Of a sine of shear stress [Pa], [s].
     duration, plant, method
@@ -302,12 +315,15 @@ def run_held(
         held,
         lag=rational(lag),
         diffusion=path,
+        stages=stages,
+        transducer=transducer,
         tide=Tide(amplitude=stress, period=stress_period),
         duration=duration,
         inertia=PLANTS[plant],
         method=method,
     )
-    return HeldRun(fault=fault, model=model, step=held, lag=rational(lag), diffusion=path, trajectory=run)
+    around: dict[str, Any] = {"lag": rational(lag), "diffusion": path, "stages": tuple(s.name for s in stages)}
+    return HeldRun(fault=fault, model=model, step=held, **around, trajectory=run)
 
 
 def _require_runnable(fault: Fault, plant: str) -> None:

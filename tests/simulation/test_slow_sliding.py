@@ -16,6 +16,8 @@ from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Reference, load_fault
 from quakedesign.fault.friction import friction_law
 from quakedesign.loop import LinearLaw, sliding_loop
+from quakedesign.loop.actuators import Delay
+from quakedesign.loop.sensing import Transducer
 from quakedesign.simulation import Actuator, Diffusion, Lag, Saturation, Variation
 from quakedesign.simulation.sliding_conditions import PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.slow_sliding import _Loop, simulate_sliding
@@ -96,21 +98,32 @@ def asking_for(pressure):
     )  # fmt: skip
 
 
-def oracle(law, name, tide, count, off=(1.0,) * 6):
-    """Slip error and ln(v/V) at every sample: balance of forces by Lambert's function, LSODA between samples."""
+def along(time, rate, ramp, length):
+    """Slip and rate of a reference: mean rate, share of the smooth ramp, operation time, typed in again."""
+    s = min(time / length, 1.0)
+    swollen = (1 - ramp) * time + ramp * length * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    return rate * swollen, rate * (1 - ramp + ramp * (30 * s**2 - 60 * s**3 + 30 * s**4))
+
+
+def oracle(law, name, tide, count, off=(1.0,) * 6, *, ramp=0.0, length=5e5, read=float, pump=lambda asked, _: asked):
+    """Slip error and ln(v/V) at every sample: balance of forces by Lambert's function, LSODA between samples.
+
+    V is the first rate of the reference, whose mean is V/(1 - ramp).
+    """
     a, b, d, sigma, stiffness, damping = (
         x * y for x, y in zip((A, B, D, NORMAL, STIFFNESS, DAMPING), off, strict=True)
     )
-    ramp = STIFFNESS * V / MU
+    mean = V / (1 - ramp)
     z, held, x, w, found = np.zeros(len(law.output)), 0.0, 0.0, 0.0, []
     update, fed, output = (np.array(part, float) for part in (law.update, law.measured, law.output))
 
     def rate(t, x, w, held):
-        normal = sigma - ramp * t - held
+        slip = along(t, mean, ramp, length)[0]
+        normal = sigma - STIFFNESS / MU * slip - held
         stress = (
             sigma * MU
             + damping * V
-            + stiffness * (-V * t - x)
+            + stiffness * (-slip - x)
             + tide.amplitude * math.sin(2 * math.pi * t / tide.period + tide.phase)
         )
         driving = stress / normal - MU - b * w
@@ -120,11 +133,13 @@ def oracle(law, name, tide, count, off=(1.0,) * 6):
     def field(t, state, held):
         y = rate(t, *state, held)
         grown = math.exp(-state[1]) - math.exp(y) if name.endswith("aging") else -math.exp(y) * (y + state[1])
-        return [V * math.expm1(y), V / d * grown]
+        return [V * math.exp(y) - along(t, mean, ramp, length)[1], V / d * grown]
 
     for k in range(count):
-        held = float(output @ z) + float(law.feedback[0]) * x
-        z = update @ z + fed[:, 0] * x
+        slip = along(40.0 * k, mean, ramp, length)[0]
+        error = read(slip + x) - slip
+        held = pump(float(output @ z) + float(law.feedback[0]) * error, STIFFNESS / MU * slip)
+        z = update @ z + fed[:, 0] * error
         part = solve_ivp(
             field, (40.0 * k, 40.0 * (k + 1)), [x, w], method="LSODA", args=(held,), rtol=1e-10, atol=1e-15
         )
@@ -142,6 +157,54 @@ def test_a_held_run_agrees_with_an_independent_integrator(name):
     assert run.slip_error[4::4] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
     assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
     assert run.pressure == pytest.approx(STIFFNESS * V / MU * run.time + run.asked, abs=1e-6)
+
+
+def test_a_reference_that_swells_is_followed_as_by_an_independent_integrator():
+    """From V up to 1 + 15/8·0.3/0.7 times that within 4000 s; behind its end V goes on."""
+    task = Reference(target_slip=V / 0.7 * 4000, operation_time=4000.0, ramp=0.3)
+    swelling = dataclasses.replace(fault(), reference=task, sampling_time=4.0)
+    law, tide = sliding_law(sliding_model(swelling), STEP), Tide(amplitude=40e3, period=3000.0)
+    run = simulate_sliding(swelling, law, STEP, tide=tide, duration=4400.0)
+    error, log_rate = oracle(law, "rate-and-state-aging", tide, 110, ramp=0.3, length=4000.0)
+    assert run.slip_error[4::4] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
+    assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
+    assert run.reference_rate.max() == pytest.approx(V * (1 + 15 / 8 * 0.3 / 0.7), rel=1e-12)
+    assert run.reference_rate[[0, -1]] == pytest.approx([V, V], rel=1e-12)
+    assert run.reference[400] == pytest.approx(task.target_slip, rel=1e-12)
+    assert run.criterion.reference_rate == pytest.approx(run.reference_rate.max(), rel=1e-12)
+
+
+def test_a_pump_that_is_late_and_cut_off_and_readings_in_steps_are_those_of_an_independent_integrator():
+    """The plan is known ahead, so not late; what is cut off is the whole pressure, the planned one included."""
+    law, tide = sliding_law(sliding_model(fault()), STEP), Tide(amplitude=90e3, period=3000.0)
+    step, queue = 1e-7, [0.0, 0.0]
+
+    def pump(asked, planned):
+        queue.append(asked)
+        return min(max(queue.pop(0) + planned, -30e3), 30e3) - planned
+
+    stages = (Delay(samples=2), Saturation(lowest=-30e3, highest=30e3))
+    told = {"tide": tide, "duration": 2000.0, "transducer": Transducer(quantum=step)}
+    run = simulate_sliding(fault(), law, STEP, stages=stages, **told)
+    read = {"read": lambda slip: step * math.floor(slip / step + 0.5), "pump": pump}
+    error, log_rate = oracle(law, "rate-and-state-aging", tide, 50, **read)
+    assert run.slip_error[4::4] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
+    assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
+    assert -30e3 <= run.pressure.min() < -29e3
+    assert run.asked.min() < -60e3
+    given = {"actuator": Actuator(stages=stages), "measurement": Transducer(quantum=step), "plant": "quasi-dynamic"}
+    controller = Held(law=law, step=STEP).controller
+    same = simulate(fault(), controller, tide=tide, duration=2000.0, samples=200, **given)
+    assert same.slip_rate[-1] == run.slip_rate[-1]
+
+
+def test_a_noisy_transducer_reads_other_slips_from_another_seed():
+    law = sliding_law(sliding_model(fault()), STEP)
+    ends = [
+        simulate_sliding(fault(), law, STEP, duration=400.0, transducer=Transducer(deviation=1e-6, seed=seed)).slip[-1]
+        for seed in (0, 0, 1)
+    ]
+    assert ends[0] == ends[1] != ends[2]
 
 
 def test_true_constants_other_than_the_nominal_ones_are_those_of_the_plant_alone():
@@ -216,8 +279,8 @@ def test_simulate_runs_what_a_design_found_in_its_own_way():
         ({"step": 20.0}, "runs with the scheme explicit"),
         ({"plant": "coulomb"}, "one of smooth, quasi-dynamic"),
         (
-            {"actuator": Actuator(stages=(Saturation(lowest=0.0, highest=1.0),))},
-            "a lag, rock, or both. Received saturation",
+            {"actuator": Actuator(stages=(Diffusion.of_time(100.0), Lag(time_constant=30.0)))},
+            "a lag, rock, or both. Received diffusion, lag",
         ),
     ],
 )

@@ -41,6 +41,12 @@ class Delay(SampledStage):
             help="Time that the computation takes, a whole number of steps, such as '2 ms'.",
             default=0.0,
         ),
+        Option(
+            name="jitter",
+            unit="",
+            help="Most further steps that a delay takes, drawn anew at every sample: 1 for 1 or 2 ms at --delay '1 ms' "
+            "and steps of 1 ms.",
+        ),
     )
 
     samples: int
@@ -54,7 +60,7 @@ class Delay(SampledStage):
         Measurement(seed=self.seed)
 
     @classmethod
-    def asked(cls, step: float, *, delay: float) -> Self:  # type: ignore[override]
+    def asked(cls, step: float, *, delay: float, jitter: int | None = None) -> Self:  # type: ignore[override]
         """See `Stage.asked`.
 
         Raises
@@ -68,7 +74,7 @@ class Delay(SampledStage):
                 f"delay must be a whole number of sampling periods of {step:g} s, since p is held over each. "
                 f"Received {delay:g} s. Change the delay or the step."
             )
-        return cls(samples=count)
+        return cls(samples=count, jitter=jitter or 0)
 
     @property
     def start(self) -> tuple[float, ...]:

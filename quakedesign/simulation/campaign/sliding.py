@@ -80,6 +80,7 @@ class SlidingProgram:
             self.step,
             lag=self.path.lag,
             diffusion=self.path.diffusion,
+            stages=self.path.stages,
             tide=Tide(amplitude=share * self.stress, period=self.period, phase=phase),
             variation=SlidingVariation(**dict(zip(_FACTORS, numbers, strict=False))),
             duration=duration,
