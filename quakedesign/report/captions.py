@@ -5,7 +5,7 @@ CAPTIONS = {
     "the natural earthquake.",
     "cycle": "Without control, loaded from afar at the reference rate of the law: slip and slip rate; dotted: the "
     "loading rate.",
-    "slow-sliding": "Held in slow sliding under the stress that the guarantee allows, as a tide: slip and its "
+    "slow-sliding": "Held in slow sliding under the stress that the guarantee allows, as a sine: slip and its "
     "reference, slip rate with what it never exceeds, fluid pressure in the fault, and state of friction over that of "
     "steady sliding.",
     "states": "Closed loop: slip and its reference on top, then the band that the slip rate of every law fills. The "

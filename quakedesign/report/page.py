@@ -41,8 +41,8 @@ REST_LIMITS = (
 SLIDING_LIMITS = (
     "the fault slides at the rate of its task from the start, and its far end rests: how it came to slide is not part "
     "of the run nor of the proof",
-    "the stress disturbance of the run is a sine with the period of the largest tide, which need not be the worst; no "
-    "search for worse ones was made",
+    "the stress disturbance of the run is a sine with the period of the largest tide, or a quarter of a short task, "
+    "which need not be the worst; what a search found stands beside the guarantee",
 )
 
 

@@ -30,6 +30,7 @@ from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
 
 _RTOL = 1e-8
 _UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
+_SWINGS = 4  # of the stress at least, in a run over a task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,7 +201,10 @@ def natural_run(fault: Fault) -> StateRun:
 
 
 def designed_run(design: Design, natural_peak: float | None, progress: Callable[[float], None]) -> SlidingRun:
-    """The law of a design for slow sliding over its task, under the stress that it is designed for as a tide."""
+    """The law of a design for slow sliding over its task, under the stress that it is designed for as a sine.
+
+    Its period is that of the tide, or a quarter of a task that is shorter than four of them.
+    """
     answer = design.sliding
     if answer is None or answer.held is None:
         raise ParameterError(f"a designed run needs a law for slow sliding. Received {design!r:.60}. Use simulate.")
@@ -210,7 +214,9 @@ def designed_run(design: Design, natural_peak: float | None, progress: Callable[
         answer.held.step,
         lag=answer.held.lag,
         diffusion=answer.held.diffusion,
-        tide=Tide(amplitude=float(answer.task.stress), period=TIDE),
+        tide=Tide(
+            amplitude=float(answer.task.stress), period=min(TIDE, design.fault.reference.operation_time / _SWINGS)
+        ),
         inertia=True,
         progress=progress,
     )
