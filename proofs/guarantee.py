@@ -50,6 +50,7 @@ def verify(document: dict[str, Any]) -> list[str]:
         value = found[name]
         holds = value >= claims[name] if name.startswith("least") else value <= claims[name]
         need(holds, f"the claim {name} must follow from the rest. It does not")
+    need(found["largest_pressure"] < task.normal_stress, "the pressure must not open the fault")
     least, largest = ASKED if asked else CLAIMS[3:]
     held = not loop.pump or (loop.pump[0] <= claims[least] and claims[largest] <= loop.pump[1])
     need(held, "the pressure that is claimed at the valve must stay within what the pump can do")

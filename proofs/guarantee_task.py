@@ -50,6 +50,7 @@ class Task:
     s: tuple[Fraction, Fraction]
     w: tuple[Fraction, Fraction]
     beta: tuple[Fraction, Fraction]
+    normal_stress: Fraction
     rest: tuple[Fraction, Fraction]
     reference_rate: Fraction
     reference_acceleration: Fraction
@@ -105,6 +106,7 @@ def read_task(document: dict[str, Any]) -> Task:
         s=s,
         w=w,
         beta=(Fraction(1), mu["largest"] * area[1] / b),
+        normal_stress=sigma,
         rest=(sigma - stress[1], sigma - stress[0]),
         reference_rate=first,
         reference_acceleration=second,

@@ -647,7 +647,8 @@ def test_a_small_gain_that_is_not_below_one_is_named(gain, said):
     """Only friction's slope in slip is uncertain, by ±1, and only its own gain is not zero."""
     zero, one = F(0), F(1)
     task = checker.Task(
-        name="a", b=one, s=(-one, one), w=(zero, zero), beta=(one, one), rest=(zero, zero), reference_rate=zero,
+        name="a", b=one, s=(-one, one), w=(zero, zero), beta=(one, one), normal_stress=one,
+            rest=(zero, zero), reference_rate=zero,
         reference_acceleration=zero, reference_jerk=zero, smooth=True, reference_force=zero, drift=zero, amplitude=one,
         change=None, slope_of_beta=zero, steady_beta=True,
     )  # fmt: skip
@@ -664,7 +665,8 @@ def test_of_a_disturbance_of_bounded_rate_what_the_gains_range_leaves_counts():
     """β ∈ [1, 3] may jump: (1 − β/2)φ stays in a, half of 6 m/s², p* is shifted by φ/2, and w has another range."""
     zero, one = F(0), F(1)
     task = checker.Task(
-        name="a", b=one, s=(zero, zero), w=(zero, F(8)), beta=(one, F(3)), rest=(zero, zero), reference_rate=zero,
+        name="a", b=one, s=(zero, zero), w=(zero, F(8)), beta=(one, F(3)), normal_stress=one,
+            rest=(zero, zero), reference_rate=zero,
         reference_acceleration=zero, reference_jerk=zero, smooth=True, reference_force=zero, drift=zero, amplitude=F(6),
         change=zero, slope_of_beta=zero, steady_beta=False,
     )  # fmt: skip

@@ -173,12 +173,12 @@ def test_both_take_what_is_just_allowed_and_refuse_what_is_just_beyond(raw, path
 
 @pytest.mark.parametrize("name", [*CLAIMS, "least_asked", "largest_asked"])
 def test_every_claim_may_be_what_follows_and_no_less(name, monkeypatch):
-    """Bounds 1 m, 2 m/s and, of the push, 3 m/s², at the valve 4 m/s², with b = 1/25 m²/kg; the rest by the task."""
+    """Bounds 1 m, 2 m/s and, of the push, 1/25 m/s², at the valve 4 m/s², with b = 1/25 m²/kg; the rest by the task."""
     task = checker.read_task(HELD)
-    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(1), F(2), F(3), F(4)], F(1, 3)))
+    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(1), F(2), F(1, 25), F(4)], F(1, 3)))
     assert task.b == F(1, 25)
     low, high = task.rest
-    tight = (F(1), F(2), 2 + task.reference_rate, low - 75, high + 75, low - 100, high + 100)
+    tight = (F(1), F(2), 2 + task.reference_rate, low - 1, high + 1, low - 100, high + 100)
     claims = dict(zip([*CLAIMS, "least_asked", "largest_asked"], map(str, tight), strict=True))
     found = checker.verify(BEHIND | {"claims": claims})
     ends = checker.lower(tight[5]), checker.upper(tight[6])
@@ -214,6 +214,19 @@ def test_what_is_claimed_at_the_valve_may_touch_the_limits_of_its_pump_and_not_p
     fewer = changed(BEHIND, (("loop", "pump"), {"least": "-8", "largest": "10"}))
     with pytest.raises(checker.Refused, match="a pump behind which there is a lag or rock needs claims of it"):
         checker.verify(fewer)
+
+
+def test_a_pressure_that_reaches_the_effective_normal_stress_is_refused(monkeypatch):
+    """σ′ = 9 Pa and b = 1/25 m²/kg: a push of (9 − p*)/25 reaches it, in the fault; at the valve it may be larger."""
+    given = checker.read_task(HELD)
+    room = (given.normal_stress - given.rest[1]) / 25
+    claims = {**HELD["claims"], "least_pressure": "-99", "largest_pressure": "99"}
+    for raw, more in ((HELD, ()), (BEHIND, (2 * room,))):
+        monkeypatch.setattr(checker, "bounds", lambda *_, m=more: ([F(0), F(0), room * F(999, 1000), *m], F(1, 3)))
+        assert checker.verify(raw | {"claims": claims})
+        monkeypatch.setattr(checker, "bounds", lambda *_, m=more: ([F(0), F(0), room, *m], F(1, 3)))
+        with pytest.raises(checker.Refused, match="the pressure must not open the fault"):
+            checker.verify(raw | {"claims": claims})
 
 
 @pytest.mark.usefixtures("coarse")

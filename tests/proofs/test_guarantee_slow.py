@@ -316,7 +316,8 @@ def test_the_inputs_solve_what_the_outputs_make_of_them(outputs, spread, asked):
 
 def _task_by_hand():
     return checker.Task(
-        name="", b=F(1), s=(F(0), F(1)), w=(F(0), F(3)), beta=(F(1), F(3)), rest=(F(0), F(0)), reference_rate=F(1),
+        name="", b=F(1), s=(F(0), F(1)), w=(F(0), F(3)), beta=(F(1), F(3)), normal_stress=F(9),
+        rest=(F(0), F(0)), reference_rate=F(1),
         reference_acceleration=F(0), reference_jerk=F(0), smooth=True, reference_force=F(2), drift=F(3),
         amplitude=F(1, 2), change=None, slope_of_beta=F(1), steady_beta=True,
     )  # fmt: skip

@@ -47,8 +47,7 @@ class ContinuousPeaks:
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         bounds = self.bounds()
-        proved = isinstance(bounds, Bounds) and self.claims.covers(Claims.of(self.task, bounds))
-        return Verdict.PROVED if proved else Verdict.UNDECIDED
+        return self.claims.verdict(self.task, bounds) if isinstance(bounds, Bounds) else Verdict.UNDECIDED
 
     def to_dict(self) -> dict[str, Any]:
         """Exact claims as texts, SI, and what they rest on."""
@@ -71,7 +70,10 @@ def continuous_peaks(task: Task, law: ContinuousLaw) -> ContinuousPeaks | NoGuar
     bounds = _bounds(task, law)
     if isinstance(bounds, NoGuarantee):
         return bounds
-    return ContinuousPeaks(task=task, law=law, claims=Claims.of(task, bounds).rounded())
+    claims = Claims.of(task, bounds).rounded()
+    if reason := claims.opens(task):
+        return NoGuarantee(reason=reason, small_gain=None)
+    return ContinuousPeaks(task=task, law=law, claims=claims)
 
 
 def _loop(task: Task, law: ContinuousLaw) -> PeriodicLoop:

@@ -220,6 +220,20 @@ class Claims:
             **dict(zip(_ENDS, ends, strict=False)),
         )
 
+    def verdict(self, task: Task, bounds: Bounds) -> Verdict:
+        """PROVED if the claims follow from bounds under which the fault stays closed, else UNDECIDED."""
+        tightest = Claims.of(task, bounds)
+        return Verdict.PROVED if self.covers(tightest) and not tightest.opens(task) else Verdict.UNDECIDED
+
+    def opens(self, task: Task) -> str:
+        """Why the fault may open, where the plant is another one; empty where the pressure stays below σ′."""
+        if self.largest_pressure < task.normal_stress:
+            return ""
+        return (
+            f"the pressure may rise to {self.largest_pressure.quantity('Pa')}, and the effective normal stress is "
+            f"{LowerBound(task.normal_stress).quantity('Pa')}: the fault may open"
+        )
+
     def covers(self, other: "Claims") -> bool:
         """Whether these claims follow from others."""
         return (
@@ -314,7 +328,7 @@ class Guarantee:
             return Verdict.UNDECIDED
         if self.slow_gain is not None and not bounds.slip_error < self.claims.slip_error:
             return Verdict.UNDECIDED
-        return Verdict.PROVED if self.claims.covers(Claims.of(self.task, bounds)) else Verdict.UNDECIDED
+        return self.claims.verdict(self.task, bounds)
 
     def sentence(self) -> str:
         """What is guaranteed, for people."""
@@ -363,7 +377,7 @@ def guarantee(task: Task, held: Held, slow_gain: SlowGain | None = None) -> Guar
     if not _root_within(held, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
         return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
-    if reason := _beyond_the_pump(held, claims):
+    if reason := claims.opens(task) or _beyond_the_pump(held, claims):
         return NoGuarantee(reason=reason, small_gain=None)
     return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
 

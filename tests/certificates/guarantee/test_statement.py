@@ -13,6 +13,7 @@ from quakedesign.certificates.guarantee import (
     Guarantee,
     Held,
     NoGuarantee,
+    continuous,
     guarantee,
     statement,
     task_of,
@@ -20,7 +21,7 @@ from quakedesign.certificates.guarantee import (
 from quakedesign.certificates.guarantee.statement import _above, sentence_of
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.loop import ImplicitRoot, LinearLaw, Power, compensated, summed_integrals
+from quakedesign.loop import ContinuousLaw, ImplicitRoot, LinearLaw, Power, compensated, summed_integrals
 
 TASK = task_of(load_fault("real-fault"))
 CLAIMS = Claims(
@@ -230,3 +231,21 @@ def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monk
     assert asked == [(TASK, claim.loop, SIGN, {"rate_noise": F(1, 9)})]
     assert tuple(claim.loop.sampled) == ("root", "rate_noise")
     assert [segment.duration for segment in claim.loop.segments] == [F(1, 3), F(2, 3)]
+
+
+@pytest.mark.parametrize(("off", "proved"), [(F(1, 10**9), True), (F(0), False), (F(-1), False)])
+def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
+    """With claims as wide as one likes: what counts is how far below σ′ the pressure follows to stay."""
+    ends = {"least_pressure": LowerBound(F(-(10**9))), "largest_pressure": UpperBound(F(10**9))}
+    wide = replace(CLAIMS, **ends, least_asked=None, largest_asked=None)
+    bounds = replace(BOUNDS, push=(TASK.normal_stress - off - TASK.rest_pressure[1]) * TASK.authority)
+    assert wide.verdict(TASK, bounds) is (Verdict.PROVED if proved else Verdict.UNDECIDED)
+    monkeypatch.setattr(statement, "_bounds", lambda *_: bounds)
+    found = Guarantee(task=TASK, held=HELD, claims=wide)
+    assert found.check() is (Verdict.PROVED if proved else Verdict.UNDECIDED)
+    law = ContinuousLaw(states=(), rates=(), measured=(), output=(), feedback=(F(-1), F(-1)))
+    monkeypatch.setattr(continuous, "_bounds", lambda *_: bounds)
+    assert continuous.ContinuousPeaks(task=TASK, law=law, claims=wide).check() is found.check()
+    for none in (guarantee(TASK, HELD), continuous.continuous_peaks(TASK, law)):
+        assert isinstance(none, NoGuarantee)
+        assert none.reason.endswith("the effective normal stress is 50 MPa: the fault may open")
