@@ -6,6 +6,7 @@ from quakedesign.faces import face
 
 if TYPE_CHECKING:
     from quakedesign.certificates.certificate import Certificate as Certificate
+    from quakedesign.certificates.certificate import decided_once as decided_once
     from quakedesign.certificates.certificate import load_certificate as load_certificate
     from quakedesign.certificates.certificate import parse_certificate as parse_certificate
     from quakedesign.certificates.claim import Equilibrium as Equilibrium

@@ -1,6 +1,9 @@
 """Evidence that decides itself, and goes into a file and back."""
 
-from dataclasses import dataclass, fields
+import pickle
+from dataclasses import dataclass, field, fields
+from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,6 +57,35 @@ class Certificate(Evidence):
     def save(self, path: str | Path) -> None:
         """Write the file of FORMAT.md, whole or not at all."""
         save_certificate(self, path)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A certificate and a law, the same as another by all that they hold."""
+
+    digest: bytes
+    law: "str | type[Law] | None"
+    certificate: Certificate = field(compare=False)
+
+
+def decided_once(certificate: Certificate, law: "str | type[Law] | LoopField | None" = None) -> Verdict:
+    """Verdict of `Certificate.check`, found once in a process for the same contents and law.
+
+    Searches that hand a certificate on ask for it; of a bare loop it is found each time.
+
+    Raises
+    ------
+    CertificateError, WorkError
+        As `Certificate.check`, each time.
+    """
+    if not isinstance(law, str | type | None):
+        return certificate.check(law)
+    return _verdict(_Asked(sha256(pickle.dumps(certificate)).digest(), law, certificate))
+
+
+@lru_cache(maxsize=64)
+def _verdict(asked: _Asked) -> Verdict:
+    return asked.certificate.check(asked.law)
 
 
 def load_certificate(path: str | Path) -> Certificate:

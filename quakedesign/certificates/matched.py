@@ -60,11 +60,9 @@ def coefficient_range(fault: Fault, divisor: Fraction) -> Range:
 @lru_cache(maxsize=16)
 def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> sp.Expr:
     """h' along a solution [unit of ν per s], in what `known_ranges` and the errors bound."""
-    slopes = (plant.slip_slope, plant.rate_slope)
-    total = sp.expand(plant.matched_rate())
-    flat = sp.expand(total.subs(dict.fromkeys(slopes, 0)) + _feedforward_rate(feedforward))
+    bending, flat = plant.matched_rate_in_parts()
     moved = (plant.r3, plant.r2, plant.r1, plant.phi_t, plant.acceleration_error, plant.e2)
-    bending = sp.factor_terms(sp.collect(sp.expand(total - total.subs(dict.fromkeys(slopes, 0))), slopes))
+    flat = sp.expand(flat + _feedforward_rate(feedforward))
     return _with_known(bending + sp.collect(flat, moved), fault, divisor)
 
 
@@ -83,36 +81,11 @@ def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedFo
     They bound the part of h that the errors cause: |h(t, e) − h(t, 0)| ≤ g1|e1| + g2|e2| with the largest
     absolute values g1, g2 between 0 and e.
     """
-    value = sp.Function("m_v", positive=True)(plant.e1, plant.e2)
-    force = sp.Function("f_v", real=True)(plant.e1, plant.e2)
-    h = _insert(plant.error_dynamics().h, value, force)
     added = feedforward.acceleration(plant.e1, plant.e2, sp.Integer(0))
-    expressions = []
-    slopes = ((plant.e1, plant.slip_slope, plant.phi_1), (plant.e2, plant.rate_slope, plant.phi_2))
-    for error, slope, growth in slopes:
-        bent = h.diff(error).subs({value.diff(error): slope, force.diff(error): growth})
-        bent = sp.expand(_named(bent.subs({value: plant.friction_value, force: plant.phi})))
-        straight = bent.coeff(slope, 0) + added.diff(error)
-        part = sp.expand(bent.coeff(slope))
-        # apart, so that N̂ cancels where it can and occurs once elsewhere
-        stressed = sp.simplify(part.coeff(plant.sigma)) * plant.sigma
-        part = stressed + sp.factor(part.coeff(plant.sigma, 0))
-        expressions.append(_with_known(slope * part + straight, fault, divisor))
-    return expressions[0], expressions[1]
-
-
-def _insert(h: sp.Expr, value: sp.Expr, force: sp.Expr) -> sp.Expr:
-    """Stand-ins for μ and φ̂_e where they act."""
-    kinds = {plant.mu: value, plant.disturbance: force}
-    return h.replace(lambda e: e.func in kinds, lambda e: kinds[e.func])
-
-
-def _named(h: sp.Expr) -> sp.Expr:
-    """Symbols for the reference and its derivatives."""
-    r = plant.reference(plant.t)
-    for part, name in ((r.diff(plant.t, 2), plant.r2), (r.diff(plant.t), plant.r1), (r, plant.r0)):
-        h = h.subs(part, name)
-    return h
+    slip, still, rate, calm = plant.sensitivities()
+    expressions = (slip + (still + added.diff(plant.e1)), rate + (calm + added.diff(plant.e2)))
+    first, second = (_with_known(expression, fault, divisor) for expression in expressions)
+    return first, second
 
 
 def _with_known(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Expr:
@@ -126,6 +99,7 @@ def _with_known(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Expr
     return expression.subs(plant.phi, plant.phi + grown).subs(known).subs(_reference_values(fault))
 
 
+@lru_cache(maxsize=16)
 def _reference_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
     """r and its three derivatives [m, m/s, …] as polynomials of the stage t/t_op."""
     t_op = sp.Rational(str(rational(fault.reference.operation_time)))

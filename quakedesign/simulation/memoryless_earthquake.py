@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
 from math import pi
 
 from quakedesign.errors import ParameterError, SimulationError
@@ -22,6 +21,9 @@ PERIODS = 100
 ENDING = 30, 10  # e-foldings and natural periods, of a fault that grows much faster than it swings
 FINENESS = 2e-3  # a step passes a kink of friction with an error of its square
 STILL = 1e3  # times the slip rate that the nudge alone gives: less is no growth
+
+_PEAKS: dict[Fault, float | None] = {}
+_MOST_PEAKS = 64
 
 
 def natural_earthquake(
@@ -74,10 +76,20 @@ def natural_earthquake(
     recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
     criterion = OutcomeCriterion.of(fault, natural_peak(fault) if pressure else None)
     earthquake = run(recorder, setting, integrator("dormand-prince"), criterion, progress=progress, compiled=compiled)
-    if pressure or growth <= 0:
+    if pressure:
         return earthquake
+    natural = earthquake if growth <= 0 else _with_peak(earthquake, fault, growth)
+    if plant == "smooth":
+        _PEAKS[_alone(fault)] = natural.criterion.natural_peak
+        if len(_PEAKS) > _MOST_PEAKS:
+            del _PEAKS[next(iter(_PEAKS))]
+    return natural
+
+
+def _with_peak(earthquake: Trajectory, fault: Fault, growth: float) -> Trajectory:
+    """Event of an unstable fault that is the measure of others, if it moves more than by the nudge alone."""
     peak = earthquake.metrics.peak_slip_rate  # none where the run diverges
-    if peak is not None and peak <= STILL * nudge / growth:
+    if peak is not None and peak <= STILL * _nudge(fault) / growth:
         raise SimulationError(
             f"{fault.name} is unstable (eigenvalue {growth:.4g} 1/s), but its simulation does not move: its peak is "
             f"{peak!r} m/s. Rounding may drown its friction; check the numbers of the law."
@@ -87,12 +99,15 @@ def natural_earthquake(
 
 def natural_peak(fault: Fault) -> float | None:
     """Largest slip rate [m/s] of a fault without control; None for a stable one. Computed once for every fault."""
-    return _peak(fault.with_disturbance(Disturbance()).with_box("paper"))
+    alone = _alone(fault)
+    if alone not in _PEAKS:
+        natural_earthquake(alone, compiled=False)
+    return _PEAKS[alone]
 
 
-@lru_cache(maxsize=64)
-def _peak(fault: Fault) -> float | None:
-    return natural_earthquake(fault, compiled=False).criterion.natural_peak
+def _alone(fault: Fault) -> Fault:
+    """Fault without what its natural earthquake does not depend on."""
+    return fault.with_disturbance(Disturbance()).with_box("paper")
 
 
 def _nudge(fault: Fault) -> float:

@@ -110,15 +110,29 @@ def instability() -> sp.Or:
     return sp.Or(sp.StrictLessThan(k_hat, stiffness_limit), sp.StrictLessThan(eta_hat, damping_limit))
 
 
-@cache
 def error_dynamics() -> ErrorDynamics:
     """β and h of eq. esystem3, from eq. shift, p = ν/(μ0N̂0) and e = x − (r, r')."""
+    return ErrorDynamics(beta=control_coefficient(), h=matched_perturbation())
+
+
+@cache
+def _error_acceleration() -> sp.Expr:
+    """e2' in e and ν."""
     r = reference(t)
     shifted = shifted_acceleration().subs(p, nu / divisor).subs({x1: e1 + r, x2: e2 + r.diff(t)}, simultaneous=True)
-    acceleration = shifted - r.diff(t, 2)
-    beta = sp.simplify(sp.expand(acceleration).coeff(nu))
-    rest = acceleration.subs(nu, 0)
-    return ErrorDynamics(beta=beta, h=rest / beta)
+    return shifted - r.diff(t, 2)
+
+
+@kept
+def control_coefficient() -> sp.Expr:
+    """β [-]."""
+    return sp.simplify(sp.expand(_error_acceleration()).coeff(nu))
+
+
+@kept
+def matched_perturbation() -> sp.Expr:
+    """h [m/s²]."""
+    return _error_acceleration().subs(nu, 0) / control_coefficient()
 
 
 def with_law(expression: sp.Expr, law: FrictionLaw, *, extended: bool = False) -> sp.Expr:
@@ -184,3 +198,42 @@ def matched_rate() -> sp.Expr:
         total = total.subs(step)
     inner = sp.expand(sp.simplify(total * N_hat * friction_value**2 / divisor))
     return divisor / N_hat * sp.collect(inner, [slip_slope, rate_slope, r3, phi_t]) / friction_value**2
+
+
+@kept
+def matched_rate_in_parts() -> sp.Tuple:
+    """h' as what the slopes of friction bring in, and the rest, expanded."""
+    slopes = (slip_slope, rate_slope)
+    total = sp.expand(matched_rate())
+    flat = sp.expand(total.subs(dict.fromkeys(slopes, 0)))
+    bending = sp.factor_terms(sp.collect(sp.expand(total - total.subs(dict.fromkeys(slopes, 0))), slopes))
+    return sp.Tuple(bending, flat)
+
+
+@kept
+def sensitivities() -> sp.Tuple:
+    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time, each as what the slope of friction brings in and the rest.
+
+    The slopes are those of chords where friction has no derivative.
+    """
+    value = sp.Function("m_v", positive=True)(e1, e2)
+    force = sp.Function("f_v", real=True)(e1, e2)
+    kinds = {mu: value, disturbance: force}
+    h = matched_perturbation().replace(lambda e: e.func in kinds, lambda e: kinds[e.func])
+    parts = []
+    for error, slope, growth in ((e1, slip_slope, phi_1), (e2, rate_slope, phi_2)):
+        bent = h.diff(error).subs({value.diff(error): slope, force.diff(error): growth})
+        bent = sp.expand(_named(bent.subs({value: friction_value, force: phi})))
+        part = sp.expand(bent.coeff(slope))
+        # apart, so that N̂ cancels where it can and occurs once elsewhere
+        stressed = sp.simplify(part.coeff(sigma)) * sigma
+        parts += [slope * (stressed + sp.factor(part.coeff(sigma, 0))), bent.coeff(slope, 0)]
+    return sp.Tuple(*parts)
+
+
+def _named(h: sp.Expr) -> sp.Expr:
+    """Symbols for the reference and its derivatives."""
+    r = reference(t)
+    for part, name in ((r.diff(t, 2), r2), (r.diff(t), r1), (r, r0)):
+        h = h.subs(part, name)
+    return h

@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 from fractions import Fraction as F
+from pathlib import Path
 
 import pytest
 import sympy as sp
 
-from quakedesign.certificates import Certificate, Loop, Witness, loop_of
+from quakedesign.certificates import Certificate, Loop, Verdict, Witness, decided_once, load_certificate, loop_of
 from quakedesign.certificates.checking import _check_equilibrium, _check_proof, _check_roots
 from quakedesign.certificates.claim import Equilibrium
 from quakedesign.certificates.obligations import claimed, different
@@ -17,6 +18,8 @@ from quakedesign.sos.exact.proofs import Square
 from quakedesign.symbolic import SignedPower
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.lyapunov.certify_exactly import finish
+
+CATALOGUE = Path(__file__).parents[2] / "proofs" / "certificates"
 
 x, k, root = sp.symbols("x k root", real=True)
 MODEL = LoopField(
@@ -216,3 +219,26 @@ def test_a_proof_that_would_take_too_long_to_check_is_not_found(monkeypatch):
     assert finish(good.loop, good.lyapunov, good.claims, MODEL) is None
     with pytest.raises(WorkError, match="steps of exact arithmetic"):
         good.check(MODEL)
+
+
+def test_a_verdict_is_found_once_for_all_that_a_certificate_holds(monkeypatch):
+    """One number less in a witness, changed in the very object, is another certificate; so is another law."""
+    good, asked = load_certificate(CATALOGUE / "cta_7_5_2.3_1.1.json"), []
+    check = Certificate.check
+    monkeypatch.setattr(Certificate, "check", lambda self, law=None: asked.append(law) or check(self, law))
+    assert [decided_once(good, law) for law in (None, None, "cta", "cta")] == [Verdict.PROVED] * 4
+    assert asked == [None, "cta"]
+    name, witness = next(iter(good.witnesses.items()))
+    square = witness.squares[0]
+    less = replace(square, gram=(square.gram[0] - F(1, 10**9), *square.gram[1:]))
+    good.witnesses[name] = replace(witness, squares=(less, *witness.squares[1:]))
+    for _ in range(2):
+        with pytest.raises(CertificateError, match="does not prove"):
+            decided_once(good, "cta")
+    with pytest.raises(CertificateError, match="is about 'cta', not 'dia'"):
+        decided_once(load_certificate(CATALOGUE / "cta_7_5_2.3_1.1.json"), "dia")
+    assert len(asked) == 5
+
+
+def test_a_bare_loop_is_decided_each_time():
+    assert str(decided_once(proof("2", "7/5", "3/2"), MODEL)) == "proved"

@@ -108,3 +108,28 @@ def test_an_unstable_fault_that_does_not_move_is_a_defect(monkeypatch):
     monkeypatch.setattr(memoryless_earthquake, "NUDGE", 1e-22)
     with pytest.raises(SimulationError, match=r"lab-fault is unstable .* but its simulation does not move"):
         natural_earthquake(LAWS["linear"])
+
+
+def test_the_measure_of_events_is_found_with_the_event(monkeypatch):
+    """Whatever disturbance and box the fault has; under pressure or with stick it is another event."""
+    monkeypatch.setattr(memoryless_earthquake, "_PEAKS", {})
+    runs, run = [], memoryless_earthquake.run
+    monkeypatch.setattr(memoryless_earthquake, "run", lambda *given, **more: runs.append(1) or run(*given, **more))
+    natural_earthquake(LAB, plant="coulomb")
+    peak = memoryless_earthquake.natural_peak(LAB)
+    assert len(runs) == 2
+    event = natural_earthquake(LAB, compiled=False)
+    assert event.criterion.natural_peak == event.metrics.peak_slip_rate == peak
+    assert natural_earthquake(LAB, 1e3, compiled=False).criterion.natural_peak == peak
+    assert memoryless_earthquake.natural_peak(LAB.with_box("ten-percent")) == peak
+    assert len(runs) == 4
+
+
+def test_no_more_measures_are_kept_than_are_asked_for_again(monkeypatch):
+    monkeypatch.setattr(memoryless_earthquake, "_PEAKS", {})
+    monkeypatch.setattr(memoryless_earthquake, "_MOST_PEAKS", 1)
+    stable = [
+        dataclasses.replace(LAB, friction=dataclasses.replace(LAB.friction, drop=0.0, residual=r)) for r in (0.3, 0.4)
+    ]
+    assert [memoryless_earthquake.natural_peak(fault) for fault in stable] == [None, None]
+    assert list(memoryless_earthquake._PEAKS) == [memoryless_earthquake._alone(stable[1])]

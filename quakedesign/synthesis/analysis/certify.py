@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from quakedesign.certificates import Certificate, Loop, Verdict, loop_of
+from quakedesign.certificates import Certificate, Loop, Verdict, decided_once, loop_of
 from quakedesign.controllers import LoopField, Subject, law, model_of
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import rational, to_sympy
@@ -57,7 +57,7 @@ def certify(
     """
     loop = closed_loop(subject, gains, lipschitz=lipschitz, gain_range=gain_range)
     certificate = refute(loop, subject) or proof(loop, subject)
-    return (certificate.check(subject), certificate) if certificate else (Verdict.UNDECIDED, None)
+    return (decided_once(certificate, subject), certificate) if certificate else (Verdict.UNDECIDED, None)
 
 
 def proof(loop: Loop, subject: Subject) -> Certificate | None:

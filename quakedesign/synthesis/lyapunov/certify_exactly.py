@@ -4,7 +4,15 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from quakedesign.certificates import Certificate, Loop, Verdict, Witness, certificate_text, parse_certificate
+from quakedesign.certificates import (
+    Certificate,
+    Loop,
+    Verdict,
+    Witness,
+    certificate_text,
+    decided_once,
+    parse_certificate,
+)
 from quakedesign.certificates.obligations import Obligation, claimed, different
 from quakedesign.certificates.witnesses import statement_of, width
 from quakedesign.controllers import Subject
@@ -34,7 +42,7 @@ def finish(
             witnesses[one.name] = witness
         certificate = Certificate(loop=loop, lyapunov=lyapunov, claims=dict(claims), witnesses=witnesses)
         readable = parse_certificate(certificate_text(certificate)) == certificate
-        return certificate if readable and certificate.check(subject) is Verdict.PROVED else None
+        return certificate if readable and decided_once(certificate, subject) is Verdict.PROVED else None
     except (CertificateError, WorkError):
         return None
 

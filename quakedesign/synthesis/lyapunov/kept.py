@@ -10,7 +10,7 @@ from functools import wraps
 from hashlib import sha256
 from pathlib import Path
 
-from quakedesign.certificates import Certificate, Loop, Verdict, certificate_text, load_certificate
+from quakedesign.certificates import Certificate, Loop, Verdict, certificate_text, decided_once, load_certificate
 from quakedesign.controllers import Subject
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.output import write_whole
@@ -33,7 +33,7 @@ def kept(search: Search) -> Search:
             return None
         try:
             certificate = load_certificate(path)
-            if certificate.loop == loop and certificate.check(subject) is Verdict.PROVED:
+            if certificate.loop == loop and decided_once(certificate, subject) is Verdict.PROVED:
                 return certificate
         except (CertificateError, WorkError):
             pass

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import sympy as sp
 
-from quakedesign.certificates import Certificate, Verdict
+from quakedesign.certificates import Certificate, Verdict, decided_once
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee, Task, task_of
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.linear_premises import linear_premises
@@ -112,7 +112,7 @@ class Problem(Generic[Designed]):
         The verdict is that on the certificate unless given; of a law of samples it is that on what runs.
         """
         own, domain = method_of(type(controller)).premises(self.fault, controller, certificate)
-        verdict = certificate.check(type(controller)) if certificate is not None else Verdict.UNDECIDED
+        verdict = decided_once(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
         if runs is not None and controller.sampling is not None:
             verdict = runs.check()
         found = {"name": controller.name, "verdict": verdict, "domain": domain, "runs": runs, **self.noise, **more}
