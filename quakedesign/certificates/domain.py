@@ -13,6 +13,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+import sympy as sp
+
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.certificate import Certificate
 from quakedesign.certificates.level_sets import LevelSets
@@ -238,8 +240,8 @@ def _whole_limit(question: Question, errors: Errors) -> str:
     every = _FROM_ERRORS | _GIVEN
 
     def alone(cause: str) -> Fraction:
-        others = {s: 0 for other, group in every.items() if other != cause for s in group}
-        return upper_bound(expression.subs(others), box, pieces=_PIECES)
+        others = {s: sp.Integer(0) for other, group in every.items() if other != cause for s in group}
+        return upper_bound(expression.xreplace(others), box, pieces=_PIECES)
 
     return max(_GIVEN if errors == Errors() else _FROM_ERRORS, key=alone)
 
@@ -259,8 +261,8 @@ def _split_limit(question: Question, level: Fraction) -> str:
     expressions = sensitivity_expressions(fault, controller.divisor, controller.feedforward)
     expression = dict(zip(_ERRORS, expressions, strict=True))[error]
     box = known_ranges(fault) | question.sets.errors(level).ranges()
-    straight = expression.subs(slope, 0)
-    calm = straight.subs({plant.phi_1: 0, plant.phi_2: 0})
+    straight = expression.xreplace({slope: sp.Integer(0)})
+    calm = straight.xreplace(dict.fromkeys((plant.phi_1, plant.phi_2), sp.Integer(0)))
     less = "" if controller.feedforward.name == "none" else " less its feed-forward"
     causes = {
         f"{rest}{less}": calm,

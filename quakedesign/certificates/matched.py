@@ -96,7 +96,7 @@ def _with_known(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Expr
         plant.mu_star: sp.Rational(static.numerator, static.denominator),
         plant.divisor: sp.Rational(divisor.numerator, divisor.denominator),
     }
-    return expression.subs(plant.phi, plant.phi + grown).subs(known).subs(_reference_values(fault))
+    return expression.xreplace({plant.phi: plant.phi + grown}).xreplace(known | _reference_values(fault))
 
 
 @lru_cache(maxsize=16)

@@ -110,6 +110,7 @@ def instability() -> sp.Or:
     return sp.Or(sp.StrictLessThan(k_hat, stiffness_limit), sp.StrictLessThan(eta_hat, damping_limit))
 
 
+@cache
 def error_dynamics() -> ErrorDynamics:
     """β and h of eq. esystem3, from eq. shift, p = ν/(μ0N̂0) and e = x − (r, r')."""
     return ErrorDynamics(beta=control_coefficient(), h=matched_perturbation())

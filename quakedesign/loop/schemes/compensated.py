@@ -74,7 +74,7 @@ class Compensated(Sampled):
         none = dict.fromkeys(law.integrals, sp.Integer(0))
         pull, feed_forward, *_ = backward_euler(law)
         slope = slope_of(law.pressure, law.integrals[0]) if len(law.integrals) == 1 else sp.Integer(0)
-        return pull.subs(none), feed_forward.subs(none), slope
+        return pull.xreplace(none), feed_forward.xreplace(none), slope
 
     @property
     def starts(self) -> tuple[float, ...]:

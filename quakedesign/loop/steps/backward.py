@@ -24,7 +24,7 @@ def backward_euler(law: Law) -> tuple[sp.Expr, ...]:
     pressure, ends = _at_end(law, ERRORS | AHEAD)
     if direction(pressure) != -1:
         pressure, ends = _at_end(law, ERRORS)
-    feed_forward = pressure.subs(dict.fromkeys((end_slip, end_rate, *law.integrals), 0))
+    feed_forward = pressure.xreplace(dict.fromkeys((end_slip, end_rate, *law.integrals), sp.Integer(0)))
     pull = discrete_law.step * discrete_law.authority * (pressure - feed_forward)
     return sp.expand_mul(pull), feed_forward, *map(sp.expand_mul, ends)
 
@@ -38,5 +38,5 @@ def _at_end(law: Law, place: dict[sp.Symbol, sp.Expr]) -> tuple[sp.Expr, list[sp
     """Pressure and ξ⁺ with the signals at the end of the step."""
     ends: dict[sp.Symbol, sp.Expr] = {}
     for symbol, rate in zip(law.integrals, law.rates, strict=True):
-        ends[symbol] = symbol + discrete_law.step * rate.subs(place | ends, simultaneous=True)
-    return law.pressure.subs(place | ends, simultaneous=True), list(ends.values())
+        ends[symbol] = symbol + discrete_law.step * rate.xreplace(place | ends)
+    return law.pressure.xreplace(place | ends), list(ends.values())

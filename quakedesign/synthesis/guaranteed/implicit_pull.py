@@ -38,7 +38,7 @@ def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -
     if feed_forward != 0:
         raise UnsupportedError("a law with a feed-forward has no guarantee in an implicit step. Use feedforward none.")
     numbers = {discrete_law.step: to_sympy(step), discrete_law.authority: to_sympy(authority)}
-    return _terms(-pull.subs(numbers))
+    return _terms(-pull.xreplace(numbers))
 
 
 @lru_cache(maxsize=256)
