@@ -382,7 +382,8 @@ def statement(
         f", along any reference whose rate stays within (1 +- {lower(fault.swing)}) times that" if fault.swing else ""
     )
     peak = fault.rate * power_of_e(claims["log_rate"])
-    highest = fault.stiffness * fault.distance / fault.box["coefficient"][0] + claims["push"]
+    needed = fault.stiffness * fault.distance / fault.box["coefficient"][0]
+    at = {"in the fault": claims["push"], "at the valve": claims["asked"]}
     return [
         f"fault {ascii(fault.name)[1:-1]} (a name; the data in the file are what counts), "
         f"{'regularised ' * fault.regularised}rate-and-state friction with "
@@ -395,5 +396,5 @@ def statement(
         f"{upper(claims['log_rate'])}",
         f"|slip - reference| <= {upper(claims['slip_error'])} m, |ln(state*first rate/critical_slip)| <= "
         f"{upper(claims['log_state'])}",
-        f"pressure in the fault from {lower(-claims['push'])} Pa to {upper(highest)} Pa",
+        *(f"pressure {where} from {lower(-v)} Pa to {upper(needed + v)} Pa" for where, v in at.items()),
     ]

@@ -18,7 +18,7 @@ from quakedesign.output import require_room
 from quakedesign.rationals import rational
 
 _USUAL = ("tracking", "amplitude")
-_SLOWLY = ("delay", "lag", "diffusion", "slip_noise")
+_SLOWLY = ("delay", "lag", "diffusion", "slip_noise", "pump")
 
 
 @Parameter(name="*")

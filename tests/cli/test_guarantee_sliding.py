@@ -11,6 +11,7 @@ from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.files import parse_guarantee
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.slow_sliding import WHOLE, SlidingClaims, SlidingGuarantee
 from quakedesign.cli import main
 from quakedesign.fault import load_fault
@@ -111,3 +112,24 @@ def test_the_slip_law_is_proved_with_a_smaller_bound_of_the_slip_rate_than_is_tr
     found = parse_guarantee((tmp_path / "g").read_text())
     assert found.task.state_law == "slip"
     assert found.check() is Verdict.PROVED
+
+
+def test_a_pump_that_cannot_hold_what_may_be_asked_for_has_no_guarantee(monkeypatch):
+    """The known law asks for -153 kPa to 3.713 MPa under 25 kPa; less stress asks for less."""
+    known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
+    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: known.held)
+    monkeypatch.setattr(sliding_answer, "proved_sliding", lambda task, held, log_rate: replace(known, task=task))
+    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, held, log_rate: Fraction(25000))
+    least, largest = known.valve_pressures
+    fault, asked = load_fault("crustal-patch"), {"diffusion": Fraction(833)}
+    for stress in (Fraction(25000), None):
+        enough = sliding_answer.answer_sliding(
+            fault, stress=stress, pump=Pump(least=Fraction(least), largest=Fraction(largest)), **asked
+        )
+        assert enough.proved
+        assert enough.to_dict()["asked_pressure"] == [least.exact, largest.exact]
+        for low, high in ((Fraction(least) + 1, Fraction(largest)), (Fraction(-(10**6)), Fraction(largest) - 1)):
+            weak = Pump(least=low, largest=high)
+            found = sliding_answer.answer_sliding(fault, stress=stress, pump=weak, **asked)
+            assert not found.proved
+            assert "may be asked for, which a pump of" in found.lines()[0]

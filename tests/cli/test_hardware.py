@@ -62,6 +62,24 @@ def test_an_actuator_in_units_gives_volume_and_flow_rate_in_units(run, tmp_path)
         assert np.all(data.well_pressure[:2] == 0)
 
 
+def test_jitter_steps_of_a_reading_and_of_a_differentiator_are_those_of_python(run):
+    late = ("--delay", "1 ms", "--jitter", "1")
+    read = ("--differentiator-bound", "1e4", "--slip-quantum", "0.15 um", "--differentiator-steps", "10")
+    told = strict(run(*SHORT, *late, *read, "--json")[1])["run"]
+    again = strict(run(*SHORT, *late, *read, "--seed", "1", "--json")[1])["run"]
+    assert "Delay(samples=1, jitter=1, seed=" in told["actuator"] != again["actuator"]
+    for part in ("quantum=1.5e-07", "inner_steps=10"):
+        assert part in told["measurement"]
+    for alone, said in (
+        (("--jitter", "1"), "a jitter belongs to a delay"),
+        (("--slip-quantum", "1 um"), "the quantum of the slip belongs to a differentiator"),
+        (("--differentiator-steps", "2"), "the number of steps belongs to a differentiator"),
+    ):
+        code, _, err = run(*SHORT, *alone)
+        assert code == 2
+        assert said in err
+
+
 def test_a_bare_number_is_in_si_units(run):
     given = [("--saturation", "0.02 MPa", "--lag", "2 ms", "--drift", "1 um/s", "--step", "1 ms")]
     given.append(("--saturation", "2e4", "--lag", "0.002", "--drift", "1e-6", "--step", "1e-3"))

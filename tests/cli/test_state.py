@@ -127,6 +127,19 @@ def test_a_controlled_run_says_that_it_tracks(capsys, patch, tmp_path):
     assert 0 < found["metrics"]["max_log_rate"] < 0.1
 
 
+def test_a_controlled_run_goes_through_pump_and_transducer(capsys, patch):
+    given = ("--controller", "elqr", "--plant", "quasi-dynamic", "--duration", "20 min", "--step", "100 s", "--json")
+    more = ("--delay", "100 s", "--saturation", "1 MPa", "--slip-quantum", "1 um", "--stress", "10 kPa")
+    plain = json.loads(run(capsys, "simulate", patch, *given, "--stress", "10 kPa")[1])
+    found = json.loads(run(capsys, "simulate", patch, *given, *more)[1])
+    assert (plain["stages"], found["stages"]) == ([], ["delay", "saturation"])
+    assert plain["metrics"] != found["metrics"]
+    noisy = [json.loads(run(capsys, "simulate", patch, *given, "--slip-noise", "1 um", "--seed", s)[1]) for s in "01"]
+    assert noisy[0]["metrics"] != noisy[1]["metrics"]
+    told = run(capsys, "simulate", patch, *given[:-1], *more)[1]
+    assert "through a delay, through a saturation" in told
+
+
 def test_a_disturbance_of_acceleration_is_not_ignored(capsys, patch, tmp_path):
     path = tmp_path / "shaken.toml"
     path.write_text(TEXT + '\n[disturbance]\namplitude = "1e-4 m/s^2"\n')

@@ -67,18 +67,27 @@ class SlidingGuarantee:
     @property
     def pressures(self) -> tuple[LowerBound, UpperBound]:
         """Least and largest pressure in the fault [Pa]."""
-        task, push = self.task, self.claims.push
-        return LowerBound(-push), UpperBound(task.pressure_per_slip * task.distance + push)
+        return self._within(self.claims.push)
+
+    @property
+    def valve_pressures(self) -> tuple[LowerBound, UpperBound]:
+        """Least and largest pressure at the valve, what is planned included [Pa]."""
+        return self._within(self.claims.asked)
+
+    def _within(self, size: UpperBound) -> tuple[LowerBound, UpperBound]:
+        """Ends of p* while the reference goes its distance, and a size [Pa] beyond."""
+        return LowerBound(-size), UpperBound(self.task.pressure_per_slip * self.task.distance + size)
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts, SI."""
-        claims, (low, high) = self.claims, self.pressures
+        claims, (low, high), (least, largest) = self.claims, self.pressures, self.valve_pressures
         return {
             "peak_slip_rate": self.peak_slip_rate.exact,
             "log_rate": claims.log_rate.exact,
             "log_state": claims.log_state.exact,
             "slip_error": claims.slip_error.exact,
             "pressure": [low.exact, high.exact],
+            "asked_pressure": [least.exact, largest.exact],
             "stress": str(self.task.stress),
             "cells": len(self.cells),
         }
@@ -87,13 +96,14 @@ class SlidingGuarantee:
         """What is guaranteed, for people; bounds rounded up, those of what it is guaranteed for down."""
         task, held, claims = self.task, self.held, self.claims
         ratio = UpperBound(exponential(claims.log_rate))
-        low, high = self.pressures
+        (low, high), (least, largest) = self.pressures, self.valve_pressures
         return (
             f"from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, for every shear stress disturbance "
             f"of at most {LowerBound(task.stress).quantity('Pa')}, {_along(task)}{_box(task)}: the slip rate never "
             f"exceeds {ratio:.4g} V = {self.peak_slip_rate:.3g} m/s {self.lasts}, the slip stays within "
             f"{claims.slip_error:.3g} m of it, the pressure in the fault between {low.quantity('Pa')} and "
-            f"{high.quantity('Pa')} ({', '.join(['with inertia', *_friction(task)])})"
+            f"{high.quantity('Pa')}, at the valve between {least.quantity('Pa')} and {largest.quantity('Pa')} "
+            f"({', '.join(['with inertia', *_friction(task)])})"
         )
 
 

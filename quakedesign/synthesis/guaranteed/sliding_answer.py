@@ -2,11 +2,12 @@
 
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from math import exp
 from typing import Any, ClassVar, Unpack
 
 from quakedesign.certificates.guarantee import Held, NoGuarantee
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask, sliding_task
 from quakedesign.errors import ParameterError, UnsupportedError
@@ -103,8 +104,8 @@ def answer_sliding(
         Bound of the shear stress disturbance [Pa]; the largest that the design is seen to stand unless given.
     spread : Fraction
         By how much of their values a, b and D_c may be off [-].
-    **around : Fraction
-        As in `design_held`; a lag or a diffusion is needed.
+    **around : Fraction, Pump
+        As in `design_held`; a lag or a diffusion is needed. A proof is one that the pump can hold all of its pressures.
 
     Raises
     ------
@@ -128,30 +129,43 @@ def answer_sliding(
         )
     held_over = rational(fault.sampling_time) if step is None else step
     task = sliding_task(fault, stress or Fraction(1), spread)
-    answers = []
+    pump, answers = around.pop("pump", None), []
     for log_rate in LOG_RATES:
-        answers.append(_answer(task, held_over, log_rate, around, given=stress is not None))
+        answers.append(_answer(task, held_over, log_rate, around, pump, given=stress is not None))
         if answers[-1].proved:
             return answers[-1]
     return answers[0]
 
 
-def _answer(task: SlidingTask, step: Fraction, log_rate: Fraction, around: Around, *, given: bool) -> SlidingAnswer:
+def _answer(
+    task: SlidingTask, step: Fraction, log_rate: Fraction, around: Around, pump: Pump | None, *, given: bool
+) -> SlidingAnswer:
     """With |ln(v/V)| at most `log_rate`, under the task's stress if that is given."""
     design = designed_sliding(task, step, log_rate=log_rate, **around)
     if isinstance(design, NoGuarantee):
         return SlidingAnswer(found=design, task=task, held=None)
-    prove = proved_sliding if given else _with_the_largest_stress
-    proved = prove(task, design, log_rate=log_rate)
+    prove = proved_sliding if given else partial(_with_the_largest_stress, pump=pump)
+    proved = _held_by(pump, prove(task, design, log_rate=log_rate))
     return SlidingAnswer(found=proved, task=proved.task if isinstance(proved, SlidingGuarantee) else task, held=design)
 
 
-def _with_the_largest_stress(task: SlidingTask, design: Held, *, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+def _held_by(pump: Pump | None, found: SlidingGuarantee | NoGuarantee) -> SlidingGuarantee | NoGuarantee:
+    """A guarantee whose pressures at the valve the pump can hold."""
+    if pump is None or isinstance(found, NoGuarantee):
+        return found
+    too_much = pump.exceeded(*found.valve_pressures)
+    return NoGuarantee(reason=too_much, small_gain=None) if too_much else found
+
+
+def _with_the_largest_stress(
+    task: SlidingTask, design: Held, *, log_rate: Fraction, pump: Pump | None = None
+) -> SlidingGuarantee | NoGuarantee:
     """A guarantee under about the largest stress that has one: what is estimated of it, or somewhat less."""
     most = largest_stress(task, design, log_rate=log_rate) or Fraction(1)
     found: SlidingGuarantee | NoGuarantee
     for share in _SHARES:
-        found = proved_sliding(replace(task, stress=two_digits(share * most)), design, log_rate=log_rate)
+        tried = replace(task, stress=two_digits(share * most))
+        found = _held_by(pump, proved_sliding(tried, design, log_rate=log_rate))
         if isinstance(found, SlidingGuarantee):
             break
     return found
