@@ -14,6 +14,7 @@ from quakedesign.executors import crew_or_here
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, Answer
+from quakedesign.synthesis.guaranteed.families import require_surroundings
 from quakedesign.synthesis.methods.base import Wanted, method_of
 
 Found = TypeVar("Found")
@@ -109,6 +110,7 @@ def answer(
     period = rational(fault.sampling_time) if step is None else step
     if not Fraction(1, 10**9) <= period <= 10**9:
         raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")
+    require_surroundings(around)
     task = task_of(fault, rate_limited=disturbance_class == "rate")
     law = control_law(controller)
     late, far = around.get("delay", Fraction(0)), around.get("diffusion", Fraction(0))

@@ -227,7 +227,9 @@ def test_noise_in_given_gains_and_in_a_sliding_mode(call):
     ("options", "said"),
     [
         (("--slip-noise", "1 s"), "slip noise"),
-        (("--rate-noise", "-1e-6"), "a bound of noise must be 0 or more"),
+        (("--rate-noise", "-1e-6"), "rate noise must be 0 or more. Received -1e-06 m/s"),
+        (("--slip-noise=-2um", "--measured", "slip"), "slip noise must be 0 or more. Received -2e-06 m."),
+        (("--diffusion=-1/1000",), "diffusion must be 0 or more. Received -0.001 s"),
         (("--measured", "rate"), "measured"),
     ],
 )

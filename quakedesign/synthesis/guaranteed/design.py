@@ -16,7 +16,7 @@ from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.checks import require_ordinary
 from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated, slowly_estimated
-from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of, why_no_law
+from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of, require_surroundings, why_no_law
 from quakedesign.synthesis.guaranteed.poles import own_poles
 from quakedesign.synthesis.guaranteed.slowly import best_guarantee
 
@@ -135,6 +135,7 @@ class _Laws:
     @classmethod
     def of(cls, task: Task, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
         """Laws for a T_s [s] and what is around them, or why there are none."""
+        require_surroundings(around)
         if (none := _unpredictable(task, step)) is not None:
             return none
         if reason := why_no_law(step, measured, around):

@@ -10,6 +10,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 from quakedesign.certificates.guarantee import Task
 from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.errors import ParameterError
 from quakedesign.loop import (
     SHORTEST,
     ErrorPrediction,
@@ -44,6 +45,20 @@ class Family:
     admits: Callable[[np.ndarray], bool]
     room: float
     period: Fraction
+
+
+def require_surroundings(around: Around) -> None:
+    """Refuse rock and noise below zero.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for name, unit in (("diffusion", "s"), ("slip_noise", "m"), ("rate_noise", "m/s")):
+        value = around.get(name, Fraction(0))
+        if value < 0:
+            told = name.replace("_", " ")
+            raise ParameterError(f"{told} must be 0 or more. Received {float(value):.4g} {unit}. Leave out the sign.")
 
 
 def why_no_law(step: Fraction, measured: str, around: Around) -> str:

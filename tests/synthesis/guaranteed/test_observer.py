@@ -123,7 +123,7 @@ def test_more_noise_is_guaranteed_less():
         ({"measured": "rate"}, "measured must be one of slip-and-rate, slip"),
         ({"measured": "slip", "gains": ("1", "1", "1", "1")}, "measured is for a designed e-LQR"),
         ({"measured": "slip", "controller": "cta"}, "measured is for a designed e-LQR"),
-        ({"slip_noise": F(-1)}, "a bound of noise must be 0 or more"),
+        ({"slip_noise": F(-1)}, "slip noise must be 0 or more. Received -1 m"),
         ({"measured": "slip", "rate_noise": F(1)}, "needs a law that measures it"),
     ],
 )
@@ -183,5 +183,5 @@ def test_another_objective_is_designed_for_what_a_guarantee_measures(monkeypatch
     )
     assert design_at(claim.task, claim, "tracking") is claim
     around = {"delay": 0, "lag": 0, "diffusion": 0, "slip_noise": NOISE, "rate_noise": 0}
-    around |= {"initial_slip": 0, "initial_slip_rate": 0}
+    around |= {"initial_slip": 0, "initial_slip_rate": 0, "pump": None}
     assert told == [((claim.task, STEP), {"objective": "tracking", "measured": "slip", **around})]
