@@ -34,7 +34,8 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
     Raises
     ------
     ParameterError
-        When the value is not a finite number of at most 300 characters and 308 digits.
+        When the value is not a finite number of at most 300 characters and 308 digits, or has more digits than a float
+        without being a rational.
     """
     if isinstance(value, Fraction):
         return value if type(value) is Fraction else Fraction(value)
@@ -48,6 +49,10 @@ def _read(value: object, name: str) -> Fraction:
     if isinstance(value, Rational) and not isinstance(value, bool):
         return Fraction(int(value.numerator), int(value.denominator))
     number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else value
+    if isinstance(number, float) and number != value and not math.isnan(number):
+        raise ParameterError(
+            f"{name} must be a float, a rational or text. Received {value!r:.60}, which is no float. Give it as text."
+        )
     written = number.strip() if isinstance(number, str) else repr(number)
     if len(written) > 300 or not _NUMBER.fullmatch(written) or re.search(r"/0+$", written):
         raise ParameterError(

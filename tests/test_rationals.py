@@ -52,6 +52,12 @@ def test_anything_else_is_refused_with_what_was_received(written):
         rational(written, "gain k1")
 
 
+@pytest.mark.parametrize("precise", [1 - np.longdouble(2) ** -60, sp.Float("0.1", 40), 1 + sp.Float(2, 40) ** -99])
+def test_more_digits_than_a_float_has_are_not_rounded_away(precise):
+    with pytest.raises(ParameterError, match=r"^gain must be a float, a rational or text.*Give it as text"):
+        rational(precise, "gain")
+
+
 @pytest.mark.parametrize("written", ["1e309", "1e-309", "9.9e999", 5e-324, 10**5000], ids=lambda w: str(type(w)))
 def test_a_number_that_no_float_can_show_is_refused(written):
     with pytest.raises(ParameterError, match="at most 308 digits"):

@@ -139,11 +139,11 @@ def from_sympy(expression: Any, variables: Sequence[Any]) -> dict[Exponents, Fra
     """
     import sympy as sp
 
-    expanded = expression.as_expr()
-    floats = {f: to_sympy(fraction_of_float(f)) for f in expanded.atoms(sp.Float)}  # "QQ" would take one close to them
     try:
-        terms = sp.Poly(expanded.xreplace(floats), *variables, domain="QQ").terms()
-    except (sp.PolynomialError, sp.CoercionFailed) as error:
+        whole = expression.as_expr()
+        floats = {f: to_sympy(fraction_of_float(f)) for f in whole.atoms(sp.Float)}  # "QQ" takes what is only close
+        terms = sp.Poly(whole.xreplace(floats), *variables, domain="QQ").terms()
+    except (AttributeError, sp.polys.polyerrors.BasePolynomialError) as error:  # relations and matrices have no as_expr
         raise PolynomialError(
             f"a polynomial in {', '.join(map(str, variables))} with rational coefficients is needed. "
             f"Received {str(expression)[:80]} ({error}). Write floats as exact rationals."

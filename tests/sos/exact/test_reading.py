@@ -69,6 +69,9 @@ def test_a_multiplier_is_read_like_a_polynomial():
         (x, (x,), None),
         (x, (sp.Ne(x, 0),), None),
         (x, ({(1,): 1},), ("x",)),
+        (sp.Symbol("x", commutative=False), (), None),
+        (sp.Matrix([[x]]), (), None),
+        (sp.Eq(x, 0), (), None),
     ],
 )
 def test_everything_else_is_refused(polynomial, on, variables):
