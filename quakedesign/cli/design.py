@@ -29,10 +29,11 @@ class DesignOptions:
     continuous
         Design in continuous time, as in the paper, in place of the loop that samples and holds with a guarantee.
     measured
-        What the e-LQR that samples is told: slip-and-rate, or slip, from which it estimates the slip rate.
+        What the e-LQR that samples is told: slip-and-rate, or slip, from which it estimates the slip rate; with slip
+        sliding modes are told both as they are.
     slip_noise
-        Bound of the error of the slip that it is told, such as '1 um', in its guarantee and in its run. simulate takes
-        a standard deviation by this name.
+        Bound of the error of the slip that designed laws are told, such as '1 um', in guarantees and runs. simulate
+        takes a standard deviation by this name.
     rate_noise
         The same of the slip rate.
     disturbance_class
@@ -94,13 +95,16 @@ class DesignOptions:
                 f"--scheme is for gains designed with --continuous, others run as guaranteed. Received {self.scheme}. "
                 "Give both, or none."
             )
-        linear = {"measured": self.measured, "slip_noise": self.slip_noise, "rate_noise": self.rate_noise}
-        if linear != {"measured": "slip-and-rate", "slip_noise": "0", "rate_noise": "0"} and "elqr" not in names:
+        alone = self.measured == "slip"
+        if alone and "elqr" not in names:
             raise ParameterError(
-                f"--measured and noise are for the e-LQR. Received --controller {', '.join(names)}. Leave them out."
+                f"--measured slip is for the e-LQR. Received --controller {', '.join(names)}. Leave it out."
             )
+        noise = {"slip_noise": self.slip_noise, "rate_noise": self.rate_noise}
+        linear = {"measured": self.measured, **noise} if alone else {}
         sliding = {"diffusion": self.diffusion, "stress": self.stress, "spread": self.spread}
         shared: dict[str, Any] = {"objective": self.objective, "continuous": self.continuous, **sliding}
+        shared |= {} if alone else noise
         shared["disturbance_class"] = self.disturbance_class
         return {"options": shared, "linear": linear, "scheme": self.scheme}
 

@@ -63,7 +63,7 @@ def design(
     measured : str
         What the e-LQR of samples is told: ``"slip-and-rate"``, or ``"slip"``, from which it estimates the slip rate.
     slip_noise, rate_noise : str, float or Fraction
-        Bounds of what it is told wrongly of slip [m] and slip rate [m/s], for its guarantee.
+        Bounds of what a law of samples is told wrongly of slip [m] and slip rate [m/s], for its guarantee.
     diffusion : str, float or Fraction, optional
         Of friction with a state: L²/D [s] of the rock between well and fault; a tenth of D_c/V unless given.
     stress : str, float or Fraction, optional

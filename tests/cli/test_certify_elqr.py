@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.cli import main
+from quakedesign.cli.design import DesignOptions
 
 SLOW = ("230909365.4", "327662.0266", "39426629850", "2484414953000")
 
@@ -71,11 +72,19 @@ def test_wrong_combinations_are_one_line(case, capsys):
     assert reason in err
 
 
-def test_noise_is_refused_without_the_elqr(capsys, tmp_path):
-    options = ("--slip-noise", "1 um", "--out", str(tmp_path / "o"))
+def test_the_slip_alone_is_refused_without_the_elqr(capsys, tmp_path):
+    options = ("--measured", "slip", "--out", str(tmp_path / "o"))
     code, _, err = run(capsys, "design", "lab-fault", "--controller", "cta", *options)
     assert code == 2
-    assert "--measured and noise are for the e-LQR" in err
+    assert "--measured slip is for the e-LQR" in err
+
+
+@pytest.mark.parametrize(("measured", "shared"), [("slip-and-rate", True), ("slip", False)])
+def test_noise_is_for_all_laws_but_where_the_slip_alone_is_told(measured, shared):
+    noise = {"slip_noise": "1/1000000", "rate_noise": "0"}
+    told = DesignOptions(measured=measured, slip_noise="1/1000000").told(["elqr", "cta"])
+    assert {name: told["options"].get(name) for name in noise} == (noise if shared else dict.fromkeys(noise))
+    assert told["linear"] == ({} if shared else {"measured": "slip", **noise})
 
 
 def test_an_objective_is_refused_in_continuous_time(capsys, tmp_path):

@@ -157,12 +157,17 @@ def test_options_that_do_not_go_together_are_one_message(real, law):
         qd.design(real, law, objective="speed")
 
 
-def test_options_of_the_elqr_are_refused_elsewhere(real):
-    for options in ({"measured": "slip"}, {"slip_noise": "1e-6"}, {"rate_noise": 1e-6}):
-        with pytest.raises(ParameterError, match="are for the e-LQR"):
-            qd.design(real, "cta", **options)
+def test_what_a_law_cannot_be_told_is_refused(real):
+    with pytest.raises(ParameterError, match="a sliding mode needs slip and slip rate"):
+        qd.design(real, "cta", measured="slip")
+    for law, options in (
+        ("elqr", {"measured": "slip"}),
+        ("elqr", {"slip_noise": "1e-6"}),
+        ("cta", {"slip_noise": "1e-6"}),
+        ("dia", {"rate_noise": 1e-6}),
+    ):
         with pytest.raises(ParameterError, match="knows slip and slip rate exactly"):
-            qd.design(real, "elqr", continuous=True, **options)
+            qd.design(real, law, continuous=True, **options)
 
 
 def test_a_sliding_mode_has_no_bound_of_peaks_in_continuous_time(judged):

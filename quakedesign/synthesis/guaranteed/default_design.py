@@ -99,7 +99,7 @@ def sampled_design(
 
 
 def sampled_sliding_mode(
-    task: Task, law: SlidingMode, step: Fraction, objective: str = "tracking"
+    task: Task, law: SlidingMode, step: Fraction, objective: str = "tracking", **noise: Unpack[Around]
 ) -> tuple[Compensation, SampledDesign]:
     """Sliding mode with the base gains of a law for a T_s [s], or for the longest shorter one that has a guarantee.
 
@@ -113,16 +113,20 @@ def sampled_sliding_mode(
     """
 
     def careful(time: Fraction, delay: Fraction = Fraction(0)) -> Compensation:
-        return design_compensated(task, law, time, objective="peak", delay=delay, weights=WEIGHTS[:1])
+        around = noise | {"delay": delay}
+        return design_compensated(task, law, time, objective="peak", weights=WEIGHTS[:1], **around)
 
-    made = design_compensated(task, law, step, objective=objective)
+    question = (task, law, *(item for item in sorted(noise.items()) if item[1]))
+    made = design_compensated(task, law, step, objective=objective, **noise)
     reason = made.found.reason if isinstance(made.found, NoGuarantee) else ""
     most = step if reason else None
     longest = reached_again(
-        lambda time: careful(time).found, lambda attempt: reached_step(task, step, attempt, most), task, law, step, most
+        lambda time: careful(time).found,
+        lambda attempt: reached_step(task, step, attempt, most),
+        *(*question, step, most),
     )
     if reason and longest is not None:
-        made = design_compensated(task, law, longest.held.step, objective=objective)
+        made = design_compensated(task, law, longest.held.step, objective=objective, **noise)
         made = careful(longest.held.step) if isinstance(made.found, NoGuarantee) else made
     if isinstance(made.found, NoGuarantee):
         return made, SampledDesign(step=step, runs=None, reason=reason)
@@ -131,7 +135,7 @@ def sampled_sliding_mode(
     delayed = reached_again(
         lambda delay: careful(held.step, delay).found,
         lambda attempt: reached_delay(held.step, attempt, held.step / 8),
-        *(task, law, held.step, "delay"),
+        *(*question, held.step, "delay"),
     )
     return replace(made, found=runs), SampledDesign(
         step=step,

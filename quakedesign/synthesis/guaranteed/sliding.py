@@ -14,7 +14,7 @@ from quakedesign.synthesis.guaranteed.compensated import GUARANTEED, Compensatio
 from quakedesign.synthesis.guaranteed.slowly import tightened
 
 
-def guarantee_of(task: Task, law: SlidingMode) -> Guarantee | NoGuarantee:
+def guarantee_of(task: Task, law: SlidingMode, **noise: Unpack[Around]) -> Guarantee | NoGuarantee:
     """What is guaranteed of a sliding mode as it runs: something only of one for the scheme ``compensated``."""
     own = law.sampling
     if own is None or own.scheme != GUARANTEED:
@@ -24,7 +24,7 @@ def guarantee_of(task: Task, law: SlidingMode) -> Guarantee | NoGuarantee:
     if not {"weight", "authority"} <= settings.keys():
         reason = f"the scheme {GUARANTEED} has a guarantee with a weight and an authority. Give both in its settings"
         return NoGuarantee(reason=reason, small_gain=None)
-    return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step))
+    return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, **noise))
 
 
 def sliding_mode(

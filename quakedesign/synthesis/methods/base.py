@@ -85,10 +85,18 @@ class Problem(Generic[Designed]):
         """What a guarantee uses of the fault."""
         return task_of(self.fault, rate_limited=self.disturbance_class == "rate")
 
-    @property
-    def told(self) -> bool:
-        """Whether a law is told less than slip and slip rate as they are."""
-        return self.measured != MEASURED[0] or any(self.noise.values())
+    def require_exact_in_continuous_time(self) -> None:
+        """Refuse a design in continuous time that is told less than slip and slip rate as they are.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if self.continuous and (self.measured != MEASURED[0] or any(self.noise.values())):
+            raise ParameterError(
+                "a design in continuous time knows slip and slip rate exactly. Received noise, or the slip alone. "
+                "Leave continuous out."
+            )
 
     def by_method(self, law: type[Controller]) -> Designed:
         """Gains by the method of the family that a law belongs to."""

@@ -25,6 +25,7 @@ from quakedesign.errors import CertificateError, KinkError, ParameterError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import (
+    MEASURED,
     Answer,
     Compensation,
     attacked,
@@ -53,10 +54,12 @@ class SlidingModes(Method[SlidingMode]):
 
     def design(self, problem: Problem[Designed], law: type[SlidingMode]) -> Designed:
         """λ for what is guaranteed in the scheme ``compensated``, or for L̄ in continuous time."""
-        if problem.told:
+        if problem.measured != MEASURED[0]:
             raise ParameterError(
-                f"measured and noise are for the e-LQR. Received some of them with {law.name}. Leave them out."
+                f"a sliding mode needs slip and slip rate. Received {problem.measured!r} for {law.name}. Leave it out, "
+                "or design an e-LQR."
             )
+        problem.require_exact_in_continuous_time()
         if problem.feedforward != NONE and not problem.continuous:
             raise ParameterError(
                 "a feed-forward has no guarantee with the pressure held over T_s. "
@@ -93,7 +96,7 @@ class SlidingModes(Method[SlidingMode]):
 
     def guarantee(self, fault: Fault, task: Task, controller: SlidingMode, noise: Around) -> Guarantee | NoGuarantee:
         """In the scheme ``compensated``, and in no other."""
-        return guarantee_of(task, controller)
+        return guarantee_of(task, controller, **noise)
 
     def compensation(self, controller: SlidingMode, found: Guarantee | NoGuarantee) -> Compensation:
         """With the weight and the authority of its scheme."""
@@ -128,7 +131,8 @@ def _compensated(problem: Problem[Designed], base: BaseGains[SlidingMode], certi
     """As it runs with a guarantee; in continuous time where no T_s has one."""
     fault = problem.fault
     law = base.law.with_divisor(least_authority(fault))
-    made, found = sampled_sliding_mode(problem.task, law, rational(fault.sampling_time), problem.objective)
+    step = rational(fault.sampling_time)
+    made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, **problem.noise)
     if found.runs is None:
         none = NoGuarantee(reason=f"run in the scheme compensated, {found.reason}", small_gain=None)
         return _scaled(problem, base, certificate, runs=none)
@@ -136,6 +140,7 @@ def _compensated(problem: Problem[Designed], base: BaseGains[SlidingMode], certi
         "objective": problem.objective,
         "step": str(found.runs.held.step),
         "reason": found.reason or None,
+        **{name: str(value) for name, value in found.runs.held.noise.items()},
         "rho": str(smallest_root(made.controller.scale)),
         **_origin(base),
     }

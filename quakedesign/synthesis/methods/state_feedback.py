@@ -61,11 +61,7 @@ class StateFeedback(Method[ExtendedLQR]):
                 f"a feed-forward is part of sliding-mode laws. Received {problem.feedforward.name!r} with {law.name}. "
                 "Leave it out."
             )
-        if problem.continuous and problem.told:
-            raise ParameterError(
-                "a design in continuous time knows slip and slip rate exactly. Received noise, or the slip alone. "
-                "Leave continuous out."
-            )
+        problem.require_exact_in_continuous_time()
         if problem.fault.friction.state_names:
             return _sliding(problem, law)
         return _continuous(problem, law) if problem.continuous else _sampled(problem, law)

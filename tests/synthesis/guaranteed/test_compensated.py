@@ -66,8 +66,12 @@ def test_sliding_modes_are_guaranteed_within_the_targets(row):
 
 
 def numbers(row):
-    """Everything that the attacker knows; it finds the end of the implicit step of the 2-CTA and 2-DIA itself."""
-    controller, weight, authority, claim = loop(row)
+    """Everything that the attacker knows, and the guarantee."""
+    return attacked(*loop(row))
+
+
+def attacked(controller, weight, authority, claim):
+    """The same of any loop; the attacker finds the end of the implicit step of the 2-CTA and 2-DIA itself."""
     step, gain, scale = float(STEP), float(STEP * authority), float(controller.scale)
     push, a = gain / float(DIVISOR), float(weight)
     k = [float(v) for v in controller.gains.values()]
@@ -106,6 +110,7 @@ def numbers(row):
         delay=0.0,
         force=float(TASK.amplitude + TASK.reference_force),
         ends=ends,
+        noise=(float(claim.held.slip_noise), float(claim.held.rate_noise)),
     ), claim
 
 
@@ -117,6 +122,30 @@ def test_no_course_violates_a_guarantee(row, courses):
     assert largest[0].max() <= claim.claims.slip_error
     assert largest[1].max() <= claim.claims.slip_rate_error
     assert largest[1].max() > 0.3 * float(claim.claims.slip_rate_error)  # the courses do hurt
+
+
+@pytest.mark.parametrize("courses", [500, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("row", ["cta", "dia"])
+def test_no_course_with_noise_violates_a_guarantee(row, courses):
+    """Slip and slip rate told within 1 um and 10 um/s, along random courses and along the nominal response."""
+    noise = {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
+    made = design_compensated(TASK, law(row, CTA if row == "cta" else DIA, 1), STEP, **noise)
+    held, claim = attacked(made.controller, made.weight, made.authority, made.found)
+    assert claim.check() is Verdict.PROVED
+    assert designed(row).found.claims.slip_rate_error < claim.claims.slip_rate_error <= F(4, 10**4)
+    hear = attacker.noisy(held, courses, 240, seed=8)
+    largest, _ = attacker.run(held, 40, 6, attacker.switching(held, courses, 240, seed=3), courses, hear=hear)
+    response, off = attacker.responses(held, 40, 6, size=1e-6)[1], np.zeros((2, 240))
+    for place in (0, 1):
+        heard = lambda i, place=place: 1e-9 * np.outer(np.arange(2) == place, np.arange(240) == i)  # noqa: E731
+        off[place] = attacker.run(held, 40, 6, attacker.nominal(held), 240, hear=heard)[1][1]
+    aligned = attacker.run(held, 40, 6, attacker.aligned(held, response), 1, hear=attacker.heard(held, off))[0]
+    quiet = attacker.run(held, 40, 6, attacker.aligned(held, response), 1)[0]
+    for seen in (largest, aligned):
+        assert seen[0].max() <= claim.claims.slip_error
+        assert seen[1].max() <= claim.claims.slip_rate_error
+    assert quiet[1].max() < aligned[1].max()
+    assert claim.claims.slip_rate_error <= 2 * aligned[1].max()
 
 
 @pytest.mark.parametrize("row", ROWS)

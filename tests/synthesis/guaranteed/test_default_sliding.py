@@ -34,6 +34,7 @@ STEP = F("0.184")
 DESIGN, COMPENSATED = map(
     import_module, ("quakedesign.synthesis.methods.sliding_mode", "quakedesign.synthesis.guaranteed.compensated")
 )
+DEFAULT = import_module("quakedesign.synthesis.guaranteed.default_design")
 CERTIFICATE = Path(__file__).parents[3] / "proofs" / "certificates" / "cta_7_5_2.3_1.1.json"
 
 
@@ -96,6 +97,35 @@ def test_its_base_gains_stay_proved_in_continuous_time():
     assert dict(design.certificate.loop.gains) == dict(design.controller.gains)
     assert design.controller.scale == F(design.details["rho"]) ** 6
     assert {"control_coefficient", "along_reference", "level_set"} <= {p.name for p in design.premises}
+
+
+@pytest.mark.usefixtures("unproved", "unreached")
+def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for():
+    design = qd.design(REAL, "cta", slip_noise="1e-6", rate_noise="1e-5")
+    claim, told = design.guarantee, {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
+    assert (design.verdict, claim.check(), claim.held.noise) == (Verdict.PROVED, Verdict.PROVED, told)
+    assert replace(design, runs=None).guarantee == claim
+    assert designed().guarantee.claims.slip_rate_error < claim.claims.slip_rate_error <= F(26, 10**5)
+    assert {name: design.details[name] for name in told} == {name: str(bound) for name, bound in told.items()}
+    seen = run(design.controller, measurement=design.measurement).metrics
+    assert 0 < seen.max_slip_error <= claim.claims.slip_error
+    assert 0 < seen.max_slip_rate_error <= claim.claims.slip_rate_error
+
+
+@pytest.mark.usefixtures("unproved")
+def test_how_far_other_designs_go_is_asked_with_the_same_noise(monkeypatch):
+    asked, noise = [], {"slip_noise": F(1, 10**6), "rate_noise": F(0)}
+    made = DEFAULT.design_compensated
+
+    def seen(*asks, **around):
+        asked.append({name: around.get(name) for name in noise})
+        return made(*asks, **around)
+
+    monkeypatch.setattr(DEFAULT, "design_compensated", seen)
+    monkeypatch.setattr(DEFAULT, "reached_step", lambda task, step, attempt, most: attempt(step) and None)
+    monkeypatch.setattr(DEFAULT, "reached_delay", lambda step, attempt, first: attempt(first) and None)
+    qd.design(REAL, "dia", slip_noise="1e-6")
+    assert asked == 3 * [noise]
 
 
 def test_what_runs_is_what_is_guaranteed():
