@@ -62,7 +62,7 @@ GAINS = ("6.96e8", "2.53e8", "6.02e8", "2.16e8")
 def test_given_gains_for_people(call):
     code, out, _ = call("real-fault", "--gains", *GAINS)
     assert code == 0
-    assert out.startswith("proved: from rest, held over 0.184 s, for every disturbance of at most 0.00032 m/s^2")
+    assert out.startswith("proved: from rest, held over 0.184 s, for every disturbance of at most 0.00032 m/s^2 (4 kPa")
     assert "worst found with stick" in out
     assert "of the box: the slip rate never exceeds" in " ".join(out.split())
     assert max(map(len, out.splitlines())) <= 200

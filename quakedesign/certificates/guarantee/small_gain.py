@@ -272,5 +272,6 @@ def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoGuara
     (name, share), whole = max(alone.items(), key=lambda item: item[1]), UpperBound(small_gain)
     what = _WORDS.get(name, _LEFT_OUT)
     return NoGuarantee(
-        reason=f"small gain {whole:.3g}: the {what} alone needs {UpperBound(share):.2g}", small_gain=whole
+        reason=f"small gain {whole:.3g}, which must be below 1: the {what} alone makes {UpperBound(share):.2g}",
+        small_gain=whole,
     )

@@ -349,7 +349,8 @@ def sentence_of(task: Task, claims: Claims, when: str, start: str = "from rest")
 
     Bounds of what is claimed are rounded up, those of the disturbances and starts for which it is claimed down.
     """
-    kind = f"for every disturbance of at most {LowerBound(task.amplitude):.3g} m/s^2"
+    stress = LowerBound(task.amplitude / task.area_per_mass[1])
+    kind = f"for every disturbance of at most {LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
     if task.change is not None:
         kind += f" that starts at 0 and changes by at most {LowerBound(task.change):.3g} m/s^3 (class rate)"
     if not task.amplitude:

@@ -88,16 +88,16 @@ def test_four_digits_are_not_below(value, rounded):
 @pytest.mark.parametrize(
     ("amplitude", "change", "said"),
     [
-        (F("0.00032"), None, "for every disturbance of at most 0.00032 m/s^2, for all"),
+        (F("0.00032"), None, "for every disturbance of at most 0.00032 m/s^2 (4 kPa of shear), for all"),
         (
             F("0.00032"),
             F("0.0002208"),
-            "of at most 0.00032 m/s^2 that starts at 0 and changes by at most 0.00022 m/s^3 (class rate), for",
+            "at most 0.00032 m/s^2 (4 kPa of shear) that starts at 0 and changes by at most 0.00022 m/s^3 (class rate)",
         ),
         (
             F(1, 3),
             F(2, 3),
-            "of at most 0.333 m/s^2 that starts at 0 and changes by at most 0.666 m/s^3 (class rate), for",
+            "at most 0.333 m/s^2 (4.16 MPa of shear) that starts at 0 and changes by at most 0.666 m/s^3 (class rate)",
         ),
         (F(0), None, "held over 1 s, without disturbance, for all friction"),
         (F(0), F(0), "held over 1 s, without disturbance, for all friction"),
