@@ -79,34 +79,41 @@ class DesignOptions:
 
         controllers(self.controller)
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
-        names = controllers(self.controller, loaded)
-        return loaded, {"names": names, "published_scheme": self.published_scheme, **self.told(names)}
+        names = controllers(self._laws, loaded)
+        return loaded, {"names": names, "published_scheme": self.published_scheme, **self.told()}
 
-    def told(self, names: list[str]) -> dict[str, Any]:
+    def told(self) -> dict[str, Any]:
         """Options of `designed_comparison`.
 
         Raises
         ------
         ParameterError
-            For a scheme of designs that have their own, or options of the e-LQR when none is designed.
+            For a scheme of designs that have their own.
         """
         if self.scheme is not None and not self.continuous:
             raise ParameterError(
                 f"--scheme is for gains designed with --continuous, others run as guaranteed. Received {self.scheme}. "
                 "Give both, or none."
             )
-        alone = self.measured == "slip"
-        if alone and "elqr" not in names:
+        shared = ("objective", "continuous", "measured", "slip_noise", "rate_noise")
+        shared += ("diffusion", "stress", "spread", "disturbance_class")
+        return {"options": {name: getattr(self, name) for name in shared}, "scheme": self.scheme}
+
+    @property
+    def _laws(self) -> str:
+        """Laws that are asked for: of the slip alone the only one that there is.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if self.measured != "slip" or self.controller == "elqr":
+            return self.controller
+        if self.controller != "all":
             raise ParameterError(
-                f"--measured slip is for the e-LQR. Received --controller {', '.join(names)}. Leave it out."
+                f"--measured slip is for the e-LQR. Received --controller {self.controller}. Leave it out."
             )
-        noise = {"slip_noise": self.slip_noise, "rate_noise": self.rate_noise}
-        linear = {"measured": self.measured, **noise} if alone else {}
-        sliding = {"diffusion": self.diffusion, "stress": self.stress, "spread": self.spread}
-        shared: dict[str, Any] = {"objective": self.objective, "continuous": self.continuous, **sliding}
-        shared |= {} if alone else noise
-        shared["disturbance_class"] = self.disturbance_class
-        return {"options": shared, "linear": linear, "scheme": self.scheme}
+        return "elqr"
 
 
 _AS_USUAL = DesignOptions()

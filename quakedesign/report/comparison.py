@@ -87,7 +87,6 @@ def designed_comparison(
     tell: Callable[[str, float], None],
     *,
     options: Mapping[str, Any] | None = None,
-    linear: Mapping[str, Any] | None = None,
     **schemes: Any,
 ) -> Comparison:
     """Comparison of a fault's designs of the named laws and the published gains.
@@ -99,12 +98,10 @@ def designed_comparison(
     tell : callable
         Progress.
     options : mapping, optional
-        ``objective`` and ``continuous`` of `quakedesign.design`.
-    linear : mapping, optional
-        Its further options for an e-LQR.
+        Of `quakedesign.design`, such as ``objective`` and ``continuous``.
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """
     for name in filter(None, schemes.values()):
         simulation_scheme(name)
-    return compare(fault, designs_of(fault, names, tell, options, linear), progress=tell, **schemes)
+    return compare(fault, designs_of(fault, names, tell, options), progress=tell, **schemes)

@@ -181,14 +181,12 @@ def designs_of(
     names: Iterable[str],
     tell: Tell,
     options: Mapping[str, Any] | None = None,
-    linear: Mapping[str, Any] | None = None,
 ) -> list[Design]:
-    """Designs of the named laws, with options of `quakedesign.design`, and its further ones for an e-LQR."""
+    """Designs of the named laws, with options of `quakedesign.design`."""
     wanted, designs = list(names), []
     for i, name in enumerate(wanted):
         tell(f"synthesis and proof of {name}", i / len(wanted))
-        further = linear or {} if name == "elqr" else {}
-        designs.append(synthesise(fault, name, **(options or {}), **further))
+        designs.append(synthesise(fault, name, **(options or {})))
     return designs
 
 

@@ -79,12 +79,12 @@ def test_the_slip_alone_is_refused_without_the_elqr(capsys, tmp_path):
     assert "--measured slip is for the e-LQR" in err
 
 
-@pytest.mark.parametrize(("measured", "shared"), [("slip-and-rate", True), ("slip", False)])
-def test_noise_is_for_all_laws_but_where_the_slip_alone_is_told(measured, shared):
-    noise = {"slip_noise": "1/1000000", "rate_noise": "0"}
-    told = DesignOptions(measured=measured, slip_noise="1/1000000").told(["elqr", "cta"])
-    assert {name: told["options"].get(name) for name in noise} == (noise if shared else dict.fromkeys(noise))
-    assert told["linear"] == ({} if shared else {"measured": "slip", **noise})
+def test_of_the_slip_alone_the_laws_that_need_more_are_left_out_and_noise_is_for_all():
+    asked = DesignOptions(measured="slip", slip_noise="1/1000000").asked("lab-fault")[1]
+    assert asked["names"] == ["elqr"]
+    assert DesignOptions().asked("lab-fault")[1]["names"] == ["cta", "dia", "elqr"]
+    told = {name: asked["options"][name] for name in ("measured", "slip_noise", "rate_noise")}
+    assert told == {"measured": "slip", "slip_noise": "1/1000000", "rate_noise": "0"}
 
 
 def test_an_objective_is_refused_in_continuous_time(capsys, tmp_path):
