@@ -15,6 +15,12 @@ if TYPE_CHECKING:
     from quakedesign.fault import Fault
 
 
+_SHARED = (
+    *("objective", "continuous", "measured", "slip_noise", "rate_noise"),
+    *("diffusion", "stress", "spread", "disturbance_class"),
+)
+
+
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class DesignOptions:
@@ -95,9 +101,7 @@ class DesignOptions:
                 f"--scheme is for gains designed with --continuous, others run as guaranteed. Received {self.scheme}. "
                 "Give both, or none."
             )
-        shared = ("objective", "continuous", "measured", "slip_noise", "rate_noise")
-        shared += ("diffusion", "stress", "spread", "disturbance_class")
-        return {"options": {name: getattr(self, name) for name in shared}, "scheme": self.scheme}
+        return {"options": {name: getattr(self, name) for name in _SHARED}, "scheme": self.scheme}
 
     @property
     def _laws(self) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from math import log10
+from typing import Any
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
@@ -54,11 +55,12 @@ def require_surroundings(around: Around) -> None:
     ------
     ParameterError
     """
+    told: dict[str, Any] = {**around}
     for name, unit in (("diffusion", "s"), ("slip_noise", "m"), ("rate_noise", "m/s")):
-        value = around.get(name, Fraction(0))
+        value = told.get(name, Fraction(0))
         if value < 0:
-            told = name.replace("_", " ")
-            raise ParameterError(f"{told} must be 0 or more. Received {float(value):.4g} {unit}. Leave out the sign.")
+            what = name.replace("_", " ")
+            raise ParameterError(f"{what} must be 0 or more. Received {float(value):.4g} {unit}. Leave out the sign.")
 
 
 def why_no_law(step: Fraction, measured: str, around: Around) -> str:
