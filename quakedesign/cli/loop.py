@@ -172,6 +172,7 @@ def sampling(
     from quakedesign.synthesis import design
 
     loaded = load_fault(fault)
+    loaded.require_memoryless("a study of sampling")
     folder = out or Path(f"quakedesign-{loaded.name}-sampling")
     prepare(folder, force=force)
     with progress() as tell:

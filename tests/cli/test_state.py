@@ -109,6 +109,22 @@ def test_what_does_not_apply_is_refused_in_one_line(capsys, patch, given, said):
     assert len(err.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (("sampling",), "a study of sampling needs a friction law of slip and slip rate alone"),
+        (
+            ("guarantee", "--controller", "cta"),
+            "sliding modes do not apply to it, as the slip rate follows",
+        ),
+    ],
+)
+def test_commands_that_do_not_apply_say_why(capsys, patch, command, said):
+    code, out, err = run(capsys, command[0], patch, *command[1:])
+    assert (code, out) == (2, "")
+    assert said in err
+
+
 def test_a_controlled_run_says_that_it_tracks(capsys, patch, tmp_path):
     out = tmp_path / "run.nc"
     given = ("--controller", "elqr", "--plant", "quasi-dynamic", "--duration", "1 hour", "--step", "100 s")

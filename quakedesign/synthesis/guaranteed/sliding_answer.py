@@ -114,7 +114,8 @@ def answer_sliding(
     box = fault.box
     if controller != "elqr" or any((box.stiffness, box.damping, box.authority)):
         raise UnsupportedError(
-            "slow sliding is guaranteed of elqr, with the box of a, b and D_c that a spread gives. Received "
+            "slow sliding is guaranteed of elqr, with the box of a, b and D_c that a spread gives; sliding modes do "
+            "not apply to it, as the slip rate follows the pressure at once. Received "
             f"{controller} and the box {box.name}. Give --controller elqr, --box paper and --spread."
         )
     if not 0 <= spread < 1 or (stress is not None and stress <= 0):
