@@ -22,6 +22,7 @@ _MANY, _FEW = 512, 2  # courses that switch after random times, and their sweeps
 _COURSES, _LEAST_COURSES = 24, 8  # for each of the two outputs; fewer where they are longer
 _SOON = 1, 2, 4, 8, 16  # periods after which errors are looked at as well where a loop does not start at rest
 _SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
+_LEVELS = 400  # of a disturbance of bounded rate above 0
 _SEED = 7
 
 
@@ -45,10 +46,11 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     """Adversarial courses of disturbance, friction slope, damping and input gain, all at their ends.
 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64 to 512
-    periods long, as the loop forgets; in continuous time a period is that of the fastest pole, 1/|λ|. With `sticks` the
-    fault does not slide backward: friction holds it wherever the loop would, along the reference at its largest rate
-    and at a twentieth of that, and courses that switch after random times are tried as well. Noise is at its ends too.
-    An implicit step ends where its equation says, inside its lines or not. A box of starts is left from its corners.
+    periods long, as the loop forgets; in continuous time a period is that of the fastest pole, 1/|λ|. A disturbance of
+    bounded rate is the best of all for a costate (`_steepest`). With `sticks` the fault does not slide backward:
+    friction holds it wherever the loop would, along the reference at its largest rate and at a twentieth of that, and
+    courses that switch after random times are tried as well. Noise is at its ends too. An implicit step ends where its
+    equation says, inside its lines or not. A box of starts is left from its corners.
     """
     slip, rate = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     return WorstFound(slip_error=slip, slip_rate_error=rate)
@@ -174,9 +176,22 @@ class _Search:
 
     def follow(self, costates: np.ndarray, sweeps: int) -> None:
         """Follow the maximum principle forward and backward."""
-        for _ in range(sweeps):
-            chosen, held = self._forward(costates)
+        slopes = None
+        for left in reversed(range(sweeps)):
+            chosen, held = self._forward(costates, slopes)
             costates = self._backward(chosen, held)
+            if self.limit is not None and left <= sweeps // 2:  # before, by the sign of its costate
+                slopes = self._slopes(costates, chosen, self.limit)
+
+    def _slopes(self, costates: np.ndarray, chosen: list[np.ndarray], limit: float) -> np.ndarray:
+        """Of a disturbance of bounded rate, in every piece, over the largest: the best along the vertices chosen."""
+        held, moved = np.empty(costates.shape[:2]), np.empty(costates.shape[:2])
+        for number, (costate, vertices) in enumerate(zip(costates[:, :, :-1], chosen, strict=True)):
+            part = self.parts[number // _PIECES % len(self.parts)]
+            held[number] = (part.steps[vertices][:, :-1, -1] * costate).sum(axis=1)
+            moved[number] = (part.added[vertices][:, :-1, -1] * costate).sum(axis=1)
+        most = np.array([self.parts[n // _PIECES % len(self.parts)].added[0, -1, -1] for n in range(self.steps)])
+        return _steepest(held, moved, most, limit)
 
     def random(self) -> np.ndarray:
         """Costates that change at every step."""
@@ -192,7 +207,7 @@ class _Search:
         found[:, :, 1] = 1 - 2 * ((flips + random.integers(2, size=courses)) % 2)
         return found
 
-    def _forward(self, costates: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    def _forward(self, costates: np.ndarray, slopes: np.ndarray | None) -> tuple[list[np.ndarray], list[np.ndarray]]:
         state, chosen, held = self._started(costates[0]), [], []
         limit = self.rest_limit and self.rest_limit.anew()
         self._seen(state)
@@ -204,10 +219,13 @@ class _Search:
                     state = limit.cut(state)
             ahead = np.einsum("vij,cj->cvi", part.steps, state)
             push = _pushes(part.added, costate)
-            gain = np.einsum("cvi,ci->cv", ahead, costate) + np.abs(push).sum(axis=2)
+            ways = np.sign(push)
+            if slopes is not None:
+                ways[:, :, -1] = slopes[number][:, None]
+            gain = np.einsum("cvi,ci->cv", ahead, costate) + (push * ways).sum(axis=2)
             best = np.where(self.allowed, gain, -np.inf).argmax(axis=1)
             row = np.arange(len(best))
-            following = ahead[row, best] + np.einsum("cij,cj->ci", part.added[best], np.sign(push[row, best]))
+            following = ahead[row, best] + np.einsum("cij,cj->ci", part.added[best], ways[row, best])
             chosen.append(best)
             held.append(self._held(state, following, part.length))
             if limit:
@@ -266,6 +284,32 @@ class _Search:
             costate = np.einsum("cij,ci->cj", part.steps[chosen[number]], costate)
             costate = costate @ part.jump if number % _PIECES == 0 else costate
         return np.array(found[::-1])
+
+
+def _steepest(held: np.ndarray, moved: np.ndarray, most: np.ndarray, limit: float) -> np.ndarray:
+    """Slopes in [-1, 1], of every course, for the largest sum of `held`·φ + `moved`·slope over the pieces.
+
+    φ is 0 at first, changes by slope·`most` over a piece and stays within the limit, on a grid of the smallest change.
+    """
+    if not limit or not most.min():
+        return np.zeros(held.shape)
+    size = int(min(np.ceil(limit / most.min()), _LEVELS))
+    grid = np.linspace(-limit, limit, 2 * size + 1)
+    share = limit / size / most  # slope of a step to the next level; none is taken where that is above 1
+    worth, ways = np.zeros((held.shape[1], len(grid))), np.zeros((*held.shape, len(grid)), dtype=np.int8)
+    for number in reversed(range(len(held))):
+        rate = moved[number][:, None] * share[number]
+        down, up = np.full_like(worth, -np.inf), np.full_like(worth, -np.inf)
+        down[:, 1:], up[:, :-1] = worth[:, :-1] - rate, worth[:, 1:] + rate
+        ahead = np.stack([down, worth, up]) if share[number] <= 1 else worth[None]
+        best = ahead.argmax(axis=0)
+        ways[number] = best - len(ahead) // 2
+        worth = np.take_along_axis(ahead, best[None], axis=0)[0] + held[number][:, None] * grid
+    level, slopes = np.full(held.shape[1], size), np.zeros(held.shape)
+    for number, way in enumerate(ways):
+        taken = way[np.arange(len(level)), level]
+        level, slopes[number] = level + taken, taken * share[number]
+    return slopes
 
 
 def _pushes(added: np.ndarray, costates: np.ndarray) -> np.ndarray:
