@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from quakedesign.report.comparison import Comparison
-from quakedesign.report.grade import GRADES
+from quakedesign.report.grade import GRADES, grade
 from quakedesign.report.headlines import (
     FEEDFORWARD_COLUMNS,
     domain_sentence,
@@ -30,9 +30,15 @@ if TYPE_CHECKING:
 
 
 def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True) -> None:
-    """Fault, gains, verdicts with premises, and tables; unless `whole` no premise that holds, no domain, no variant."""
+    """What came of it, fault, gains, verdicts with premises, and tables.
+
+    Unless `whole` no premise that holds, no domain, no variant.
+    """
     console.print(comparison.fault.name, style="bold", end=" ")
     console.print(f"({comparison.fault.source})")
+    for entry in comparison.of("designed"):
+        console.print(f"  {entry.label}: {grade(entry)}")
+    console.print()
     for line in fault_sentences(comparison.fault):
         console.print(f"  {line}")
     if isinstance(comparison.uncontrolled, StateRun):

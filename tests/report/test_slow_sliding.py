@@ -1,5 +1,6 @@
 """What `design` says and writes of a fault with rate-and-state friction: outcome, guarantee, cycle, one report."""
 
+import io
 import json
 import re
 from dataclasses import replace
@@ -9,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from quakedesign import compare
 from quakedesign.certificates.guarantee.files import parse_guarantee
@@ -17,6 +19,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.report.folder import write_folder
 from quakedesign.report.sliding_figures import cycle
+from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
 from quakedesign.simulation.starting_state import sliding
 from quakedesign.studies import comparison as compared_in
@@ -77,6 +80,14 @@ def test_the_folder_holds_the_certificate_the_figures_and_the_keys_of_all_design
     page = (folder / "report.html").read_text()
     assert "state of rate-and-state friction, the age of contacts" in page
     assert "signed power" not in page  # of sliding modes, which such faults have not
+
+
+def test_the_terminal_says_first_what_came_of_it(comparison):
+    told = io.StringIO()
+    print_comparison(comparison, Console(file=told, width=200), whole=False)
+    name, outcome, *_ = told.getvalue().splitlines()
+    assert name.startswith("crustal-patch (")
+    assert outcome == "  e-LQR (designed): guaranteed: slip rate <= 1.2e-06 m/s, slip error <= 8.33e-05 m"
 
 
 def test_the_report_is_the_one_of_all_faults(folder):
