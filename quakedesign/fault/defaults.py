@@ -95,10 +95,18 @@ def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[s
     )
 
 
+def _why_stable(fault: Fault) -> str:
+    weakens = fault.authority * fault.effective_normal_stress * fault.friction.slip_slope
+    return (
+        f"a stable fault has none (per m of slip its spring unloads by {fault.specific_stiffness:.3g} m/s^2, friction "
+        f"by at most {weakens:.3g} m/s^2 under {fault.effective_normal_stress:.4g} Pa; check units)"
+    )
+
+
 def _target(fault: Fault, assumed: list[str]) -> float:
     slip = fault.rest_slip
     if not slip > 0:
-        why = "friction with a state has none" if math.isnan(slip) else "a stable fault has none"
+        why = "friction with a state has none" if math.isnan(slip) else _why_stable(fault)
         raise ScenarioError(
             f"task.target_slip must be given, because it is the next rest slip unless told, and {why}. "
             "Received nothing. Add [task] with target_slip."

@@ -15,6 +15,9 @@ from quakedesign.studies.needed_pressure import need_sentence, needed_pressure, 
 from quakedesign.symbolic import derive
 from quakedesign.synthesis.analysis.sampling_adequacy import LARGEST_PRODUCT, SamplingAdequacy, sampling_adequacy
 
+SHEAR_SPEEDS = 500.0, 6000.0  # of soft sediments and of the mantle, m/s
+IN_A_LABORATORY = 10.0  # m; below it what slides need not be rock
+
 
 def fault_dict(fault: Fault) -> dict[str, Any]:
     """Keys of the command ``fault`` in DESIGN.md; SI, eigenvalues as [real, imaginary] in 1/s.
@@ -57,6 +60,7 @@ def fault_sentences(fault: Fault) -> list[str]:
     return [
         f"mass {fault.mass:.4g} kg, stiffness {fault.stiffness:.4g} N/m, natural frequency "
         f"{fault.natural_frequency:.4g} rad/s, damping ratio {fault.damping_ratio:.4g}",
+        *_rock(fault),
         *_event(fault),
         *(f"assumed: {said}" for said in fault.assumed),
         f"{state}; eigenvalues {poles} 1/s",
@@ -117,6 +121,31 @@ def beyond_control(fault: Fault) -> list[str]:
 def _known(value: float) -> float | None:
     """A number, if there is one."""
     return value if isfinite(value) else None
+
+
+def _rock(fault: Fault) -> list[str]:
+    """Speed of shear waves, by which a wrong unit shows, the stress, friction as it was read, and its box."""
+    speed, law = (fault.shear_modulus / fault.density) ** 0.5, fault.friction
+    usual = fault.length < IN_A_LABORATORY or SHEAR_SPEEDS[0] <= speed <= SHEAR_SPEEDS[1]
+    unlikely = "" if usual else " (UNLIKELY for rock: check density and shear modulus)"
+    stress = LowerBound(rational(fault.effective_normal_stress)).quantity("Pa")
+    numbers = ", ".join(
+        f"{name} {getattr(law, name):.4g} {told.metadata['unit']}".strip()
+        for name, told in law.quantities().items()
+    )
+    rock = f"shear waves {speed:.4g} m/s{unlikely}, effective normal stress {stress}"
+    return [f"{rock}, friction {law.name}: {numbers}", *([] if law.state_names else [_box(fault)])]
+
+
+def _box(fault: Fault) -> str:
+    """What a guarantee takes for possible of friction without a state."""
+    (low, high), law = fault.friction.bounds, fault.friction
+    slopes = [f"{law.slip_slope:.4g} per m of slip"] * (law.slip_slope > 0)
+    slopes += [f"{law.rate_slope:.4g} per m/s"] * (law.rate_slope > 0)
+    return (
+        f"guarantees are for every friction from {low:.4g} to {high:.4g} that changes by at most {', '.join(slopes)} "
+        f"(box {fault.box.name})"
+    )
 
 
 def _event(fault: Fault) -> list[str]:

@@ -1,0 +1,29 @@
+"""What is said of a fault: friction as it was read, its box in numbers, and units that look wrong."""
+
+from dataclasses import replace
+
+import pytest
+
+from quakedesign.fault import load_fault
+from quakedesign.studies.facts import fault_sentences
+
+REAL, PATCH = load_fault("real-fault"), load_fault("crustal-patch")
+
+
+def test_friction_is_told_as_it_was_read_with_its_box_in_numbers():
+    """√(30 GPa / 2500 kg/m³) = 3464 m/s; the slope of an exponential is largest at first: 0.1/(276.35 mm)."""
+    told = fault_sentences(REAL)
+    assert told[1] == (
+        "shear waves 3464 m/s, effective normal stress 50 MPa, friction exponential-slip-weakening: residual 0.2353, "
+        "drop 0.1, critical_slip 0.2763 m"
+    )
+    assert told[2].startswith("guarantees are for every friction from 0.2353 to 0.3353 that changes by at most 0.3619")
+    assert told[2].endswith("per m of slip (box paper)")
+    assert not any("guarantees are for" in line for line in fault_sentences(PATCH))
+
+
+@pytest.mark.parametrize(("density", "unlikely"), [(2.5, True), (2500.0, False), (834.0, False), (833.0, True)])
+def test_shear_waves_that_no_rock_has_are_pointed_out(density, unlikely):
+    """833.3 kg/m³ makes 6000 m/s of 30 GPa; a block in a laboratory may be anything."""
+    assert ("UNLIKELY for rock" in fault_sentences(replace(REAL, density=density))[1]) is unlikely
+    assert "UNLIKELY" not in fault_sentences(load_fault("lab-fault"))[1]
