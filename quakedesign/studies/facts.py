@@ -130,8 +130,7 @@ def _rock(fault: Fault) -> list[str]:
     unlikely = "" if usual else " (UNLIKELY for rock: check density and shear modulus)"
     stress = LowerBound(rational(fault.effective_normal_stress)).quantity("Pa")
     numbers = ", ".join(
-        f"{name} {getattr(law, name):.4g} {told.metadata['unit']}".strip()
-        for name, told in law.quantities().items()
+        f"{name} {getattr(law, name):.4g} {told.metadata['unit']}".strip() for name, told in law.quantities().items()
     )
     rock = f"shear waves {speed:.4g} m/s{unlikely}, effective normal stress {stress}"
     return [f"{rock}, friction {law.name}: {numbers}", *([] if law.state_names else [_box(fault)])]
