@@ -88,6 +88,8 @@ class Statement:
         echelon: dict[int, int] = {}
         for p in (self.target, *self.inequalities, *self.equalities):
             for e in p:
+                if len(echelon) == len(self.variables):
+                    return echelon
                 vector = residue(parity(e), echelon)
                 if vector:
                     echelon[vector.bit_length()] = vector

