@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
@@ -70,7 +71,7 @@ class Compiled:
     Parameters
     ----------
     problem : cvxpy.Problem
-        Disciplined in its Parameters (DPP).
+        Disciplined in its Parameters (DPP), none of which is a term of the objective by itself.
     """
 
     def __init__(self, problem: Any) -> None:
@@ -80,6 +81,26 @@ class Compiled:
 
     def data(self) -> tuple[dict[str, Any], Any, Any]:
         """Cone form for the present Parameters, as `cvxpy.Problem.get_problem_data` returns it."""
+        form, chain, inverse = self._form
+        program = form["param_prob"]
+        if not program.total_param_size:
+            return self._form
+        told = np.zeros(program.total_param_size + 1)
+        told[-1] = 1
+        for key, parameter in program.id_to_param.items():
+            start = program.param_id_to_col[key]
+            told[start : start + parameter.size] = np.ravel(parameter.value, order="F")
+        values, costs = program.reduced_A.reduced_mat @ told, program.q @ told
+        rows, ends, (height, width) = program.reduced_A.problem_data_index
+        last = ends[-2]
+        side = np.zeros(height)
+        side[rows[last:]] = values[last:]
+        matrix = sparse.csc_array((-values[:last], rows[:last], ends[:-1]), shape=(height, width - 1))
+        return {**form, "A": matrix, "b": side, "c": costs[:-1]}, chain, inverse
+
+    @cached_property
+    def _form(self) -> tuple[dict[str, Any], Any, Any]:
+        """What is compiled once, with the maps from the Parameters to the numbers of the cone form."""
         import cvxpy as cp
 
         form, chain, inverse = self.problem.get_problem_data(

@@ -8,7 +8,7 @@ so that t goes on below zero beyond the largest disturbance, and its derivatives
 multipliers. All numbers are floating point: a sweep screens, it proves nothing.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -102,6 +102,16 @@ class Sweep:
         if not any(row.rate for row in self.rows):
             raise CertificateError(f"there are no Lyapunov functions of degree {degree} to try for {loop.law}.")
         self.products = sorted({names for row in self.rows for _, _, names, _ in row.parts})
+        order = {names: i for i, names in enumerate(self.products)}
+        parts = [part for row in self.rows for part in row.parts]
+        coefficients = [Fraction(c) for *_, c in parts]
+        self.parts = np.array([j for j, *_ in parts])
+        self.places = np.array([order[names] for _, _, names, _ in parts])
+        self.rate = np.array([row.rate for row in self.rows for _ in row.parts])
+        self.exponents = _exponents(coefficients)
+        self.mantissas = np.array(
+            [float(c / Fraction(2) ** int(n)) for c, n in zip(coefficients, self.exponents, strict=True)]
+        )
         self.solves = 0
         self.solver_seconds = 0.0
         self._numbers: dict[tuple[Fraction, ...], _Numbers] = {}
@@ -192,14 +202,16 @@ class _Numbers:
     def __init__(self, sweep: Sweep, scale: tuple[Fraction, ...], cones: Cones | None) -> None:
         self.cones = cones or Cones(sweep.rows, sweep.loop, sweep.monomials, scale)
         self.sizes = tuple(monomial(scale, exponents_of(t, sweep.loop.states)) for t in sweep.monomials)
-        order = {names: i for i, names in enumerate(sweep.products)}
-        parts = [(row, *part) for row in sweep.rows for part in row.parts]
-        wholes = {id(row): lifted_scale(row.equalities, scale) for row in sweep.rows}
-        self.coefficients = np.array(
-            [float(c * monomial(wholes[id(row)], e) / self.sizes[j]) for row, j, e, _, c in parts]
-        )
-        self.products = np.array([order[names] for _, _, _, names, _ in parts])
-        self.rate = np.array([row.rate for row, *_ in parts])
+        self.products, self.rate = sweep.places, sweep.rate
+        moved = [
+            np.array([part[1] for part in row.parts]) @ _exponents(lifted_scale(row.equalities, scale))
+            for row in sweep.rows
+        ]
+        grown = sweep.exponents + np.concatenate(moved) - _exponents(self.sizes)[sweep.parts]
+        with np.errstate(over="ignore"):
+            self.coefficients = np.ldexp(sweep.mantissas, grown)
+        if not np.isfinite(self.coefficients).all():
+            raise OverflowError
 
     def pace(self, features: Any) -> float:
         """Largest coefficient of all −V̇_j."""
@@ -219,6 +231,11 @@ class _Numbers:
         shares = weights * decision[self.cones.parts] * moments[self.cones.columns]
         per_product = np.bincount(self.products, shares, minlength=len(features))
         return margin, decision.tolist(), per_product, self.cones.compiled.solver_seconds
+
+
+def _exponents(values: Sequence[Fraction]) -> Any:
+    """n of 2^n within a factor of two, exact where the values are powers of two: numbers of any size have one."""
+    return np.array([v.numerator.bit_length() - v.denominator.bit_length() for v in values])
 
 
 def _product(values: Mapping[str, float], names: tuple[str, ...]) -> float:

@@ -29,6 +29,19 @@ def test_other_parameters_give_other_answers(anew):
         assert x.value[:, 0] == pytest.approx(inverse @ c.value / best, abs=1e-3)  # the root of the value's accuracy
 
 
+def test_the_numbers_of_the_cone_form_are_those_of_cvxpy():
+    x, matrix, side = cp.Variable(3), cp.Parameter((2, 3)), cp.Parameter(2)
+    problem = cp.Problem(cp.Minimize(side[0] * x[0] + x[1]), [matrix @ x <= side, cp.diag(x) >> np.eye(3) * side[1]])
+    compiled, random = Compiled(problem), np.random.default_rng(5)
+    for _ in range(3):
+        matrix.value, side.value = random.normal(size=(2, 3)), random.normal(size=2)
+        ours, theirs = compiled.data()[0], problem.get_problem_data(cp.CLARABEL, canon_backend="COO", solver_opts={})[0]
+        assert np.array_equal(ours["A"].toarray(), theirs["A"].toarray())
+        assert ours["A"].nnz == theirs["A"].nnz
+        assert np.array_equal(ours["b"], theirs["b"])
+        assert np.array_equal(ours["c"], theirs["c"])
+
+
 def test_what_has_no_answer_has_none():
     x, b = cp.Variable(), cp.Parameter(value=-1.0)
     compiled = Compiled(cp.Problem(cp.Minimize(x), [x >= 0, x <= b]))
