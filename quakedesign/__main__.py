@@ -1,6 +1,7 @@
 """``python -m quakedesign``, and the command ``quakedesign``."""
 
 import gc
+import os
 import sys
 
 from quakedesign.interruption import ending, leave
@@ -12,6 +13,7 @@ _OBJECTS = 100_000
 def main() -> None:
     """Run the command line; an interruption is one line from the first import on."""
     gc.set_threshold(_OBJECTS, *gc.get_threshold()[1:])
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # matrices are small: threads of linear algebra only wait for another
     try:
         with ending(process=True):
             _run()
