@@ -27,9 +27,16 @@ IMPORTS = {
     "guarantee_task": ("guarantee_reading",),
     "guarantee_numbers": ("guarantee_reading",),
     "guarantee_root": ("guarantee_reading", "guarantee_numbers"),
-    "guarantee_loop": ("guarantee_reading", "guarantee_task", "guarantee_numbers", "guarantee_root"),
-    "guarantee_flows": ("guarantee_reading", "guarantee_numbers", "guarantee_loop"),
-    "guarantee_gains": ("guarantee_reading", "guarantee_numbers", "guarantee_loop", "guarantee_flows"),
+    "guarantee_pulse": ("guarantee_reading", "guarantee_numbers"),
+    "guarantee_loop": (
+        *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
+        *("guarantee_root", "guarantee_pulse"),
+    ),
+    "guarantee_flows": ("guarantee_reading", "guarantee_numbers", "guarantee_loop", "guarantee_pulse"),
+    "guarantee_gains": (
+        *("guarantee_reading", "guarantee_numbers"),
+        *("guarantee_loop", "guarantee_flows", "guarantee_pulse"),
+    ),
     "guarantee_start": (
         *("guarantee_reading", "guarantee_numbers"),
         *("guarantee_loop", "guarantee_flows", "guarantee_gains"),

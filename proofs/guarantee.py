@@ -17,6 +17,7 @@ from guarantee_task import Task, read_task
 
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
 ASKED = ("least_asked", "largest_asked")  # at the valve
+STEP = "largest_step"  # of what is asked for
 
 
 def verify(document: dict[str, Any]) -> list[str]:
@@ -29,31 +30,47 @@ def verify(document: dict[str, Any]) -> list[str]:
     """
     more = [name for name in ("slow_gain", "start") if name in document]
     keys(document, "the file", "format", "kind", "fault", "reference", "disturbance", "loop", "claims", *more)
-    asked = ASKED if type(document["claims"]) is dict and any(name in document["claims"] for name in ASKED) else ()
-    claims = numbers(document["claims"], "claims", *CLAIMS, *asked)
+    given = document["claims"] if type(document["claims"]) is dict else {}
+    asked = ASKED if any(name in given for name in ASKED) else ()
+    claims = numbers(document["claims"], "claims", *CLAIMS, *asked, *([STEP] if STEP in given else []))
     task = read_task(document)
     start = read_start(document["start"]) if "start" in more else [Fraction(0)] * 2
     loop = read_loop(document["loop"], task, start)
-    errors = [claims[name] + off for name, off in zip(CLAIMS[:2], loop.noise, strict=True)]
+    moved = [loop.off * v for v in (task.reference_rate, task.reference_acceleration)]
+    errors = [claims[name] + off + way for name, off, way in zip(CLAIMS[:2], loop.noise, moved, strict=True)]
     need(
         loop.asked or not asked, "without a lag and rock the claims must not tell the valve's pressure from the fault's"
     )
     need(not (loop.pump and loop.asked) or bool(asked), "a pump behind which there is a lag or rock needs claims of it")
+    need(
+        loop.stepped or STEP not in claims,
+        "a largest step is claimed of a loop with jitter or a pump of some rate alone",
+    )
+    need("rate" not in loop.pump or STEP in claims, "the rate of a pump needs a claim of the largest step")
     within = loop.root is None or root_within(loop.root, loop.step, *errors)
     need(within, "the root of the implicit step must lie between its lines for all errors that are claimed")
     slow = read_slow(document["slow_gain"], task, loop) if "slow_gain" in more else None
     (slip, rate, *pushes), small = bounds(task, loop, slow, claims["slip_error"])
     need(not slow or slip < claims["slip_error"], "the slip error that moves the input gain must stay below its claim")
+    steps = [pushes.pop() / task.b] if loop.stepped else []
     ends = [end for push in pushes for end in (task.rest[0] - push / task.b, task.rest[1] + push / task.b)]
     found = dict(zip([*CLAIMS, *ASKED], (slip, rate, rate + task.reference_rate, *ends), strict=False))
+    found |= dict(zip([STEP], steps, strict=False))
     for name in claims:
         value = found[name]
         holds = value >= claims[name] if name.startswith("least") else value <= claims[name]
         need(holds, f"the claim {name} must follow from the rest. It does not")
     need(found["largest_pressure"] < task.normal_stress, "the pressure must not open the fault")
     least, largest = ASKED if asked else CLAIMS[3:]
-    held = not loop.pump or (loop.pump[0] <= claims[least] and claims[largest] <= loop.pump[1])
-    need(held, "the pressure that is claimed at the valve must stay within what the pump can do")
+    pump = loop.pump
+    need(
+        "least" not in pump or (pump["least"] <= claims[least] and claims[largest] <= pump["largest"]),
+        "the pressure that is claimed at the valve must stay within what the pump can do",
+    )
+    need(
+        "rate" not in pump or claims[STEP] <= pump["rate"] * pump["ramp"],
+        "the largest step that is claimed must be made within the ramp of the pump",
+    )
     return statement(document, task, claims, small)
 
 
@@ -81,8 +98,13 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
     if "noise" in loop:
         rate = "" if alone else f", slip rate within {loop['noise']['rate']} m/s"
         off = f", measured slip within {loop['noise']['slip']} m of the true one{rate}"
+    if "jitter" in loop:
+        measured, late = (loop["jitter"][name] for name in ("measured", "delay"))
+        off += f", measurements within {measured} s of their instants, pressures within that and {late} s more"
     if "pump" in loop:
-        off += f", a pump from {loop['pump']['least']} Pa to {loop['pump']['largest']} Pa that is never at its limits"
+        parts = [f"from {loop['pump']['least']} Pa to {loop['pump']['largest']} Pa"] if "least" in loop["pump"] else []
+        parts += [f"of {loop['pump']['rate']} Pa/s"] if "rate" in loop["pump"] else []
+        off += f", a pump {' and '.join(parts)} that is never at its limits"
     where = "from rest"
     if "start" in document:
         slip, rate = (lower(Fraction(document["start"][name])) for name in ("slip", "rate"))
@@ -102,7 +124,8 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         f"pressure from {lower(claims['least_pressure'])} Pa to {upper(claims['largest_pressure'])} Pa"
         + (
             f", at the valve from {lower(claims[ASKED[0]])} Pa to {upper(claims[ASKED[1]])} Pa"
-            if len(claims) > 5
+            if ASKED[0] in claims
             else ""
-        ),
+        )
+        + (f", from sample to sample by at most {upper(claims[STEP])} Pa" if STEP in claims else ""),
     ]

@@ -17,7 +17,8 @@ ONE_OVER_E = Fraction(3679, 10000)  # from above
 def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fraction(0)) -> tuple[Row, Fraction]:
     """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee); the best of both classes.
 
-    Where the valve's pressure is not the fault's, its b|p − p*| is a fourth.
+    Where the valve's pressure is not the fault's, its b|p − p*| is a fourth; where its last step counts, b times that
+    is the last.
     With a slow gain they hold while the slip error stays below `slip`.
     """
     spread = None
@@ -43,7 +44,7 @@ def of_class(
 
     `spread`: how far a slow beta is off that of a nominal loop by itself, and by its past.
     """
-    pushes = len(loop.outputs) - loop.asked  # up to there outputs are errors and what acts on the fault
+    pushes = len(loop.outputs) - loop.asked - loop.stepped  # up to there outputs are errors and what acts on the fault
     half = [(high - low) / 2 for low, high in (task.s, task.w, task.beta)]
     force, drift, coupling, shifted = inputs(task, half[2])
     half[2] = spread[0] if spread else half[2]
@@ -52,11 +53,12 @@ def of_class(
     if loop.root:
         low, high = loop.root.slopes
         wide = (high - low) / 2 / loop.step
-        own.append(loop.root.remainder + wide * loop.noise[0])
+        own.append(loop.root.remainder + wide * (loop.noise[0] + loop.off * task.reference_rate))
         shares.append([wide, *none[1:]])
-    noise = [off for off in loop.noise if off]
-    own += noise
-    shares += [none] * len(noise)
+    for k in loop.told:
+        own.append(loop.noise[k] + loop.off * (task.reference_acceleration + force if k else task.reference_rate))
+        moves = [max(map(abs, ends)) for ends in (task.s, task.w, task.beta)] if k else [Fraction(0), Fraction(1)]
+        shares.append([*(loop.off * v for v in moves), *none[len(moves) :]])
     if not loop.events and len(loop.inputs) == 4:
         own += [task.reference_acceleration, task.reference_jerk]
         shares += [none] * 2
@@ -66,6 +68,9 @@ def of_class(
         shares[-1 if loop.fade else 0][3] = half[2]  # it acts as b(p - p*) does, in the small gain
         shares += [[*none[:3], Fraction(1), *none[4:]]] * 2  # what is awaited, and told of it
         own += [Fraction(0)] * (len(shares) - len(own))
+    if loop.pulse:
+        own.append(Fraction(0))
+        shares.append([*none[1:], Fraction(1)])
     if loop.start:
         own.append(Fraction(1))
         shares.append(none)
@@ -73,7 +78,9 @@ def of_class(
         own.append(Fraction(0))
         shares.append([spread[1] if 2 <= i < pushes else Fraction(0) for i in range(len(none))])
     peaks, small = peaks_of(found, own, shares)
-    return [peaks[0], peaks[1], sum(peaks[2:pushes]) + shifted, *(v + shifted for v in peaks[pushes:])], small
+    last = len(peaks) - loop.stepped
+    asked = [v + shifted for v in peaks[pushes:last]]
+    return [peaks[0], peaks[1], sum(peaks[2:pushes]) + shifted, *asked, *peaks[last:]], small
 
 
 def peaks_of(found: list[list[list[Fraction]]], own: Row, shares: list[Row]) -> tuple[Row, Fraction]:

@@ -8,6 +8,7 @@ from math import ceil
 
 from guarantee_loop import Fade, Loop
 from guarantee_numbers import BITS, Fixed, coarse_product, column, exponentials, fixed, sums_of_product
+from guarantee_pulse import Near, Pulse, near_of, with_next
 from guarantee_reading import Refused, Row, need
 
 DOUBLINGS = 12  # at most 4096 periods are summed
@@ -20,7 +21,7 @@ MAX_WORK = 3 * 10**7  # products of integers
 class Flow:
     """One event and the flow after it, cut into pieces, for one input.
 
-    It enters at every time, with the event alone (`sudden`), or less and less (`masses`, of every piece).
+    It enters at every time, with the event alone (`sudden`), less and less (`masses`, of every piece), or near events.
     """
 
     event: Fixed
@@ -34,6 +35,7 @@ class Flow:
     sudden: bool
     masses: list[tuple[Fraction, Fraction]]
     responses: dict[int, list[Fixed]] = field(default_factory=dict)
+    near: Near | None = None
 
     def ends(self, start: int = 0) -> list[Fixed]:
         """Impulse response from the start of a piece on, at the ends of pieces; computed once."""
@@ -53,7 +55,9 @@ class Flow:
         return (self.nears[i] * (self.generator * (self.generator * now)).size()).size()
 
 
-def cut(loop: Loop, cuts: Sequence[Fraction], entry: Row, sudden: bool, fade: Fade | None = None) -> list[Flow]:
+def cut(
+    loop: Loop, cuts: Sequence[Fraction], entry: Row, sudden: bool, fade: Fade | None = None, pulse: Pulse | None = None
+) -> list[Flow]:
     """Flows with their pieces between the cuts, for one input."""
     flows = []
     generator = fixed(loop.flow)
@@ -76,6 +80,19 @@ def cut(loop: Loop, cuts: Sequence[Fraction], entry: Row, sudden: bool, fade: Fa
             since = sum(length for _, length in turned[: (place - fade.event) % len(turned)])
             masses = [mass(fade, since + c * duration, h) for c, h in zip(cuts, lengths, strict=False)]
         flows.append(Flow(fixed(event), lengths, steps, nears, whole, column(entry), generator, moved, sudden, masses))
+    return pulsed(loop, flows, pulse) if pulse else flows
+
+
+def pulsed(loop: Loop, flows: list[Flow], pulse: Pulse) -> list[Flow]:
+    """The same of an input that is there near one event alone."""
+    most = majorant(loop.flow)
+    for place, flow in enumerate(flows):
+        moved, here = flow.generator * flow.entry, None
+        if place == pulse.event:
+            here = near_of(loop.flow, most, flow.event, flow.entry, moved, pulse)
+        if (place + 1) % len(flows) == pulse.event:
+            here = with_next(here, most, flow.entry, moved, pulse)
+        flow.near = here or Near([], None, None, Fraction(0))
     return flows
 
 
@@ -94,6 +111,8 @@ def majorant(flow: list[Row]) -> list[Row]:
 
 def pieces(flow: Flow, later: Fixed | None) -> Fixed:
     """Columns whose sum of absolute values, after any row, bounds the integral over a flow that `later` may follow."""
+    if flow.near:
+        return near_pieces(flow, flow.near, later)
     ends = flow.ends()
     if flow.sudden:
         return later * ends[-1] if later else ends[-1]
@@ -108,10 +127,26 @@ def pieces(flow: Flow, later: Fixed | None) -> Fixed:
     rest = Fixed([[ceil(v) if j in flow.moved else 0] for j, v in enumerate(bound)])
     if later:
         summed, rest = [(later * end, weight) for end, weight in summed], (later.size() * rest).size()
-    corner = [i for i, (v,) in enumerate(rest.rows) if v]
-    diagonal = Fixed([[v if i == j else 0 for j in corner] for i, (v,) in enumerate(rest.rows)])
     first, *others = (end.scaled(weight) for end, weight in summed)
-    return first.beside(*others, diagonal)
+    return first.beside(*others, diagonal(rest))
+
+
+def diagonal(rest: Fixed) -> Fixed:
+    """One column for every entry that is not 0."""
+    corner = [i for i, (v,) in enumerate(rest.rows) if v]
+    return Fixed([[v if i == j else 0 for j in corner] for i, (v,) in enumerate(rest.rows)])
+
+
+def near_pieces(flow: Flow, here: Near, later: Fixed | None) -> Fixed:
+    """The same of a pulse: what comes of both its sides is at most the larger, and what they are off."""
+    if not here.sides:
+        return Fixed([[0] for _ in flow.event.rows])
+    whole = flow.steps[0]
+    for step in flow.steps[1:]:
+        whole = step * whole
+    whole = later * whole if later else whole
+    columns, rest = here.halves()
+    return (whole * columns).beside(diagonal((whole.size() * rest).size()))
 
 
 @dataclass

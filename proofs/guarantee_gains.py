@@ -9,19 +9,22 @@ from math import ceil
 from guarantee_flows import MAX_WORK, Flow, cut, integral, majorant, past
 from guarantee_loop import Fade, Loop
 from guarantee_numbers import BITS, Fixed, column, exponential, fixed, unit
+from guarantee_pulse import Near, Pulse
 from guarantee_reading import Refused, Row
 
 STRETCHES, PARTS = 128, 6  # of time without samples, each of 2^PARTS pieces
 LATE = 1 << 12  # what is left of the past after those is below a 4096th
 
 
-def gains(loop: Loop, entry: Row, sudden: bool, fade: Fade | None = None) -> list[list[Fraction]]:
+def gains(
+    loop: Loop, entry: Row, sudden: bool, fade: Fade | None = None, pulse: Pulse | None = None
+) -> list[list[Fraction]]:
     """Bounds of every output for an input of size 1, on every piece of the period."""
     if not loop.events:
         return [[v] for v in flow_gains(loop, entry)]
     loop, entry = in_even_units(loop, entry)
     size, many = len(loop.flow), len(loop.outputs)
-    flows, early = (cut(loop, cuts, entry, sudden, fade) for cuts in (loop.cuts, loop.past_cuts))
+    flows, early = (cut(loop, cuts, entry, sudden, fade, pulse) for cuts in (loop.cuts, loop.past_cuts))
     start = fixed(loop.outputs)
     square = flows[0].generator * flows[0].generator
     before = past(early, len(flows) * (many * len(loop.cuts) + size))
@@ -45,6 +48,9 @@ def gains(loop: Loop, entry: Row, sudden: bool, fade: Fade | None = None) -> lis
 
 def since_event(flow: Flow, outputs: Fixed) -> Iterator[tuple[Row, Row, Row]]:
     """What came since the event, in every piece: bounds at both ends, and of what may lie above both of them."""
+    if flow.near:
+        yield from near_event(flow, flow.near, outputs)
+        return
     ends, size = flow.ends(), outputs.size()
     heights = [sums_of(outputs * end) for end in ends]
     total = [Fraction(0)] * len(size.rows)
@@ -77,6 +83,25 @@ def faded(flow: Flow, outputs: Fixed, i: int) -> tuple[Row, Row, Row]:
         last = [v + heavy * a for v, a in zip(last, there, strict=True)]
         more = [v + heavy * a * chord + moment * b for v, a, b in zip(more, bent, slope, strict=True)]
     return first, last, more
+
+
+def near_event(flow: Flow, here: Near, outputs: Fixed) -> Iterator[tuple[Row, Row, Row]]:
+    """The same of a pulse: the larger of both its sides, and what is there before the next event already."""
+    none, left, phase = [Fraction(0)] * len(outputs.rows), sum(flow.pieces), outputs
+    square = flow.generator * flow.generator
+    for step, h, within in zip(flow.steps, flow.pieces, flow.nears, strict=True):
+        first, last, more, left = none, none, none, left - h
+        following, bends = phase * step, ((phase * square).size() * within).size()
+        for side, off in here.sides:
+            bent, far = sums_of(bends * side.size()), sums_of((phase.size() * within).size() * off)
+            first = list(map(max, first, sums_of(phase * side)))
+            last = list(map(max, last, sums_of(following * side)))
+            more = [max(v, b * h**2 / 8 + f) for v, b, f in zip(more, bent, far, strict=True)]
+        phase = following
+        if here.ahead and here.soon and left < here.reach:
+            there = zip(more, sums_of(outputs * here.ahead), sums_of(outputs.size() * here.soon), strict=True)
+            more = [sum(values, Fraction(0)) for values in there]
+        yield first, last, more
 
 
 def sums_of(values: Fixed) -> Row:

@@ -31,7 +31,23 @@ def loop_gains(loop: Loop, gain: Fraction) -> list[list[Row]]:
         lines = gains(loop, awaited.entry, False, awaited.fade)
         lines[1] = [v + awaited.at_once for v in lines[1]]
         found = [lines, gains(loop, awaited.told, True)]
-    return [*input_gains(loop), *found, *([start_gains(loop)] if loop.start else [])]
+    own = input_gains(loop)
+    if loop.pulse:
+        found = [gains(loop, pulse_entry(loop, gain), False, pulse=loop.pulse)]
+        seen = own[1][3 if loop.asked else 2]  # the steady pressure moves on while one before is at the valve
+        seen[:] = [v + loop.pulse.late for v in seen]
+    return [*own, *found, *([start_gains(loop)] if loop.start else [])]
+
+
+def pulse_entry(loop: Loop, gain: Fraction) -> Row:
+    """Where a pressure at the valve enters: the slip rate, or what that behind a lag is more than the valve's."""
+    entry = [Fraction(0)] * len(loop.flow)
+    if loop.asked:
+        well = len(entry) - 2
+        entry[well] = -loop.flow[well][well]
+    else:
+        entry[1] = gain
+    return entry
 
 
 def without_area(loop: Loop, gain: Fraction) -> tuple[Loop, Awaited]:

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from guarantee_numbers import unit, zeros
+from guarantee_pulse import Pulse
 from guarantee_reading import Row, keys, matrix, need, number, numbers, row
 from guarantee_root import Root, read_root
 from guarantee_task import Task
@@ -45,8 +46,9 @@ class Loop:
     be two inputs more, the second and third derivatives of the reference.
     With a layer of rock, L^2/D = `layer`, a fourth output bounds what its modes leave out; where `fade` is given, that
     is one more input, the last one. Where `asked`, the last output is the pressure at the valve. `start` has the
-    columns of the box from which it starts, none where that is rest. `pump`: what its pressure at the valve must stay
-    between, nothing where there are no limits.
+    columns of the box from which it starts, none where that is rest. `pump` has its limits as told. Where the
+    valve's last step counts it is the last output, `stepped`, and `pulse` says when it may be made. `off` is by how
+    much measurements are early or late, and `told` says which of e1 and e2 have an input for that and noise.
     """
 
     flow: list[Row]
@@ -62,7 +64,11 @@ class Loop:
     layer: Fraction = Fraction(0)
     start: list[Row] = field(default_factory=list)
     asked: bool = False
-    pump: Row = field(default_factory=list)
+    pump: dict[str, Fraction] = field(default_factory=dict)
+    stepped: bool = False
+    pulse: Pulse | None = None
+    off: Fraction = Fraction(0)
+    told: list[int] = field(default_factory=list)
 
 
 @dataclass
@@ -80,7 +86,8 @@ class Held:
     root: Root | None
     noise: tuple[Fraction, Fraction]
     first: list[Row]  # what the law makes of slip and slip rate before its first sample
-    pump: Row
+    jitter: Row  # of measurements, and of pressures besides
+    pump: dict[str, Fraction]
 
     def __post_init__(self) -> None:
         whole, self.part = self.delay // self.step, self.delay % self.step  # arrival after a sample
@@ -88,9 +95,11 @@ class Held:
         self.waiting = int(whole) + (self.part > 0)
         self.valve = 2 + self.own + self.waiting
         layered = self.diffusion > 0
-        self.well, self.stepped = self.valve + 1, layered and self.lag == 0
+        self.watched = any(self.jitter) or "rate" in self.pump
+        self.well, self.stepped = self.valve + 1, self.watched or (layered and self.lag == 0)
         self.path = range(self.well, self.well + (self.lag > 0) + MODES * layered)
         self.modes = self.path[self.lag > 0 :]
+        self.fed = self.measured, self.feedback
         self.size = self.well + len(self.path) + self.stepped
 
 
@@ -112,17 +121,22 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     events += [(arrival, step - law.part)] if law.part else []
     inputs = [unit(size)[1], drift_of(law, task.b), *([[line[size] for line in sample]] if root else [])]
     told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
-    inputs += [entry for entry, off in zip(told, law.noise, strict=True) if off]
+    heard = [k for k in (0, 1) if law.noise[k] or (law.jitter[0] and (k == 0 or root or uses_rate(*law.fed)))]
+    inputs += [told[k] for k in heard]
     outputs = [unit(size)[0], unit(size)[1], push]
     cuts = BENT if law.lag else EVEN
     loop = Loop(flow, events, outputs, inputs, root, step, law.noise, cuts, start=starts_of(law, errors), pump=law.pump)
     loop = with_left_out(loop, law) if law.diffusion else loop
-    return replace(loop, outputs=[*loop.outputs, unit(size)[law.valve]], asked=True) if law.path else loop
+    loop = replace(loop, outputs=[*loop.outputs, unit(size)[law.valve]], asked=True) if law.path else loop
+    loop = replace(loop, off=law.jitter[0], told=heard)
+    if not law.watched:
+        return loop
+    return replace(loop, outputs=[*loop.outputs, unit(size)[-1]], stepped=True, pulse=pulse_of(law))
 
 
 def read_held(value: Any) -> Held:
     """Read step, delay, lag and diffusion, the law's matrices, the implicit step, the noise and the pump."""
-    more = [k for k in ("root", "noise", "diffusion", "first", "pump") if type(value) is dict and k in value]
+    more = [k for k in ("root", "noise", "diffusion", "first", "jitter", "pump") if type(value) is dict and k in value]
     parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
     given = keys(value, "loop", *parts, *more)
     implicit = "root" in more
@@ -137,16 +151,45 @@ def read_held(value: Any) -> Held:
     time = number(given.get("diffusion", "0"), "diffusion")
     need("diffusion" not in more or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
     first = matrix(given["first"], "first", n, 2) if "first" in more else [[Fraction(0)] * 2] * n
-    pump = [*numbers(given["pump"], "pump", "least", "largest").values()] if "pump" in more else []
-    need(not pump or (pump[0] <= 0 <= pump[1] and any(pump)), "a pump needs a range with 0 in it")
-    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first, pump)
+    jitter = read_jitter(given["jitter"]) if "jitter" in more else [Fraction(0)] * 2
+    pump = read_pump(given["pump"]) if "pump" in more else {}
+    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first, jitter, pump)
+    need(not (law.watched and time), "jitter and the rate of a pump must not be told of a loop through rock")
     need(law.size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
     return law
 
 
+def read_jitter(value: Any) -> Row:
+    """Read by how much measurements are early or late, and pressures besides."""
+    found = [*numbers(value, "jitter", "measured", "delay").values()]
+    need(min(found) >= 0 and any(found), "jitter must be >= 0, some of it above")
+    return found
+
+
+def read_pump(value: Any) -> dict[str, Fraction]:
+    """Read limits of the pressure, and of its rate with the time in which it is what was asked for."""
+    paced = type(value) is dict and "rate" in value
+    limited = not paced or not set(value) <= {"rate", "ramp"}
+    found = numbers(value, "pump", *(("least", "largest") if limited else ()), *(("rate", "ramp") if paced else ()))
+    if limited:
+        low, high = found["least"], found["largest"]
+        need(low <= 0 <= high and low != high, "a pump needs a range with 0 in it")
+    need(not paced or min(found["rate"], found["ramp"]) > 0, "rate and ramp of a pump must be > 0")
+    return found
+
+
+def pulse_of(law: Held) -> Pulse | None:
+    """When the valve's pressure may differ from that on schedule; refused where that reaches another sample."""
+    off, ramp, before = sum(law.jitter), law.pump.get("ramp", Fraction(0)), law.part or law.step
+    after = law.step - law.part
+    apart = off <= before and off + ramp <= after and 2 * off + ramp <= law.step and 2 * law.jitter[0] <= law.step
+    need(apart, "a pressure must begin and end to change between two samples, and those must keep their order")
+    return Pulse(int(law.part > 0), off, off + ramp, off, off + ramp / 2) if off or ramp else None
+
+
 def flow_of(law: Held, task: Task) -> tuple[list[Row], Row]:
     """The flow between events, and what the states say of the fault's pressure."""
-    push = [Fraction(i in (law.valve, law.well)) for i in range(law.size)]  # modes follow
+    push = [Fraction(i == law.valve or (i == law.well and law.lag > 0)) for i in range(law.size)]  # modes follow
     flow = zeros(law.size)
     flow[0][1] = Fraction(1)
     if law.lag > 0:

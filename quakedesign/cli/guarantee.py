@@ -12,7 +12,15 @@ from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Scheduler, Shaking
 from quakedesign.cli.shared import app, new_file, progress
-from quakedesign.cli.units import ExactMetres, ExactMetresPerSecond, ExactPascals, ExactSeconds, Gains, Whole
+from quakedesign.cli.units import (
+    ExactMetres,
+    ExactMetresPerSecond,
+    ExactPascals,
+    ExactPascalsPerSecond,
+    ExactSeconds,
+    Gains,
+    Whole,
+)
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.output import require_room
 from quakedesign.rationals import rational
@@ -44,11 +52,18 @@ class Surroundings:
         Bound of the slip at the start, of either sign, such as '0.01 mm'; the law begins as it always does.
     initial_slip_rate
         The same of the slip rate, such as '0.1 mm/s'. Slip rates below zero are those of the continued plant.
+    jitter
+        By how much a measurement is early or late at most, and its pressure with it, such as '2 ms'.
+    delay_jitter
+        The same of the delay alone.
     saturation
         Largest pressure of the pump, such as '20 MPa', and largest withdrawal unless that is given: a proof is one that
         these limits are never reached.
     withdrawal
         Largest decrease of the pressure; 0 for a pump that only injects.
+    rate_limit
+        How fast the pump goes from one pressure to the next, such as '10 MPa/s': a proof counts that it takes its time,
+        and is one that it is there before the next sample.
     """
 
     delay: ExactSeconds = "0"
@@ -58,8 +73,11 @@ class Surroundings:
     rate_noise: ExactMetresPerSecond = "0"
     initial_slip: ExactMetres = "0"
     initial_slip_rate: ExactMetresPerSecond = "0"
+    jitter: ExactSeconds = "0"
+    delay_jitter: ExactSeconds = "0"
     saturation: ExactPascals | None = None
     withdrawal: ExactPascals | None = None
+    rate_limit: ExactPascalsPerSecond | None = None
 
     def exact(self) -> dict[str, Any]:
         """All of it as rationals in SI units, and the pump, None without limits.
@@ -71,20 +89,26 @@ class Surroundings:
         """
         told = {name: text for name, text in asdict(self).items() if text is not None}
         values: dict[str, Any] = {name: rational(text, name.replace("_", " ")) for name, text in told.items()}
-        largest, withdrawn = values.pop("saturation", None), values.pop("withdrawal", None)
-        return {**values, "pump": _pump(largest, withdrawn)}
+        pump = [values.pop(name, None) for name in ("saturation", "withdrawal", "rate_limit")]
+        return {**values, "pump": _pump(*pump)}
 
 
-def _pump(largest: Fraction | None, withdrawn: Fraction | None) -> Any:
+def _pump(largest: Fraction | None, withdrawn: Fraction | None, rate: Fraction | None) -> Any:
+    """The pump, None without limits.
+
+    Raises
+    ------
+    ParameterError
+    """
     from quakedesign.certificates.guarantee.pump import Pump
 
     if largest is None and withdrawn is None:
-        return None
+        return None if rate is None else Pump(rate=rate)
     if largest is None:
         raise ParameterError(
             "a withdrawal belongs to a saturation, the largest pressure. Received it alone. Give both."
         )
-    return Pump(least=-(largest if withdrawn is None else withdrawn), largest=largest)
+    return Pump(least=-(largest if withdrawn is None else withdrawn), largest=largest, rate=rate)
 
 
 _ALONE = Surroundings()

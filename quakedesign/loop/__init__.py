@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.held import starts as starts
     from quakedesign.loop.implicit_root import ImplicitRoot as ImplicitRoot
     from quakedesign.loop.implicit_root import Power as Power
+    from quakedesign.loop.instants import Instants as Instants
     from quakedesign.loop.internal_model import PathModel as PathModel
     from quakedesign.loop.internal_model import estimate_through_path as estimate_through_path
     from quakedesign.loop.internal_model import observer_through_path as observer_through_path
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.observer import slip_observer as slip_observer
     from quakedesign.loop.periodic import Fading as Fading
     from quakedesign.loop.periodic import PeriodicLoop as PeriodicLoop
+    from quakedesign.loop.periodic import Pulse as Pulse
     from quakedesign.loop.periodic import Segment as Segment
     from quakedesign.loop.rest_limit import RestLimit as RestLimit
     from quakedesign.loop.running import SampledController as SampledController

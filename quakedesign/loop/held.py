@@ -1,13 +1,14 @@
 """A linear law around a fault: sample, hold, delay, lag, and diffusion between well and fault."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from quakedesign.errors import ParameterError
+from quakedesign.loop.instants import Instants
 from quakedesign.loop.laws import NOISES, LinearLaw, Matrix, Model, Row
 from quakedesign.loop.layer import MODES, Layer
-from quakedesign.loop.periodic import EVEN, Fading, PeriodicLoop, Segment
+from quakedesign.loop.periodic import EVEN, Fading, PeriodicLoop, Pulse, Segment
 
 MOST_PERIODS = 8
 SHORTEST = 32  # parts of a step: the modes of a faster layer are gone sooner than bounds can follow
@@ -27,6 +28,7 @@ def held_loop(
     lag: Fraction = Fraction(0),
     diffusion: Fraction = Fraction(0),
     noisy: Collection[str] = (),
+    instants: Instants | None = None,
 ) -> PeriodicLoop:
     """The error loop of a fault about p*, the pressure that holds it at rest at the reference.
 
@@ -45,6 +47,11 @@ def held_loop(
     input ``root``. If asked for, what the measured e1 and e2 are more than the true ones are the sampled inputs
     ``slip_noise`` [m] and ``rate_noise`` [m/s]: the law does with them what it does with e1 and e2, w included.
 
+    Where instants may be off there is one state more, the valve's last step, which the output ``stepped`` is [m/s²].
+    The input ``late`` is b times what the valve's pressure is more than on schedule, at most its last step or the next
+    one, and there near the arrivals alone; in the meantime p* drifts, so that ``push`` (or ``asked``, where the fault's
+    pressure is not the valve's) gains ``drift`` times that time.
+
     Parameters
     ----------
     law : LinearLaw
@@ -58,13 +65,16 @@ def held_loop(
         L²/D of the layer between well and fault [s]; 0 for none.
     noisy : collection of str
         Which of ``slip_noise`` and ``rate_noise`` are inputs.
+    instants : Instants, optional
+        How far they may be off; None where they are not and the last step does not matter. Not through a layer.
 
     Raises
     ------
     ParameterError
         For a law that leaves an error under a constant p*, or times that are negative or too long.
     """
-    path = _Path(own=len(law.states), step=step, delay=delay, lag=lag, diffusion=diffusion)
+    watched = instants is not None
+    path = _Path(own=len(law.states), step=step, delay=delay, lag=lag, diffusion=diffusion, watched=watched)
     sample, arrival = _events(law, authority, path)
     n = path.size
     slope = Fraction(0) if law.root is None else law.root.middle / step
@@ -77,8 +87,8 @@ def held_loop(
     maps = [(jump, path.part or step), *([(arrival, step - path.part)] if path.part else [])]
     left_out, fading = _left_out(path)
     push = _push(path)
-    asked = {"asked": _unit(n, path.valve)} if path.behind else {}
-    return PeriodicLoop(
+    asked = {"asked": _unit(n, path.valve)} if lag or diffusion else {}
+    loop = PeriodicLoop(
         states=("e1", "e2", *law.states, *(f"waiting{i}" for i in range(path.waiting)), "valve", *path.behind),
         flow=_flow(path, push, model, model.gain / authority),
         segments=tuple(Segment(jump=j, duration=time, ends=ends, past_ends=past_ends) for j, time in maps),
@@ -87,6 +97,26 @@ def held_loop(
         sampled=sampled,
         fading=fading,
     )
+    return loop if instants is None else _off_schedule(loop, instants, path)
+
+
+def _off_schedule(loop: PeriodicLoop, instants: Instants, path: "_Path") -> PeriodicLoop:
+    """A loop whose last state is the valve's last step, with what is early and late."""
+    instants.require_within(path.step, path.part)
+    n, pushed, off = path.size, loop.flow[1][path.valve], instants.arrived
+    outputs, pulses, at_once = {**loop.outputs, "stepped": _unit(n, n - 1)}, {}, dict[tuple[str, str], Fraction]()
+    if off or instants.ramp:
+        place, size = (path.valve + 1, 1 / path.lag) if path.lag else (1, pushed)
+        pulses["late"] = Pulse(
+            entry=tuple(size * v for v in _unit(n, place)),
+            first=int(path.part > 0),
+            early=off,
+            late=off + instants.ramp,
+            before=off,
+            after=off + instants.ramp / 2,
+        )
+        at_once["asked" if path.lag else "push", "drift"] = off + instants.ramp
+    return replace(loop, outputs=outputs, pulses=pulses, at_once=at_once)
 
 
 def starts(
@@ -113,6 +143,7 @@ class _Path:
     delay: Fraction
     lag: Fraction
     diffusion: Fraction
+    watched: bool
 
     def __post_init__(self) -> None:
         step, delay, lag, diffusion = self.step, self.delay, self.lag, self.diffusion
@@ -125,6 +156,11 @@ class _Path:
             raise ParameterError(
                 f"diffusion must take at least T_s/{SHORTEST}, here {float(step / SHORTEST):.4g} s, or nothing. "
                 f"Received {float(diffusion):.4g} s. Leave it out."
+            )
+        if diffusion and self.watched:
+            raise ParameterError(
+                "jitter and the rate of a pump are known of pressures that reach the fault at once or through a lag. "
+                f"Received rock of {float(diffusion):.4g} s. Leave one of them out."
             )
 
     @property
@@ -144,9 +180,10 @@ class _Path:
 
     @property
     def behind(self) -> tuple[str, ...]:
-        """What follows the valve: the well, the modes of a layer, and its last step for a layer that has no lag."""
+        """What follows the valve: the well, the modes of a layer, and its last step where that counts."""
         layer = [f"layer{i}" for i in range(MODES)] * (self.diffusion > 0)
-        return (*["behind"] * (self.lag > 0), *layer, *["stepped"] * (self.diffusion > 0 and not self.lag))
+        stepped = self.watched or (self.diffusion > 0 and not self.lag)
+        return (*["behind"] * (self.lag > 0), *layer, *["stepped"] * stepped)
 
     @property
     def size(self) -> int:
@@ -203,7 +240,7 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
 
 def _push(path: _Path) -> Row:
     """What the states say of the fault's pressure."""
-    push = [Fraction(i in (path.valve, path.valve + 1)) for i in range(path.size)]  # modes follow
+    push = [Fraction(i == path.valve or (i == path.valve + 1 and path.lag > 0)) for i in range(path.size)]
     for place, number in path.modes.items():
         push[place] = Layer(time=path.diffusion).share(number)
     return tuple(push)

@@ -62,6 +62,33 @@ class Fading:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Pulse:
+    """An input b·w that is there near the jump of a segment alone, before it or after it: |w| ≤ W.
+
+    ∫|w| over the time before the jump, over `before`, and that over the time after it, over `after`, are at most W in
+    all.
+
+    Attributes
+    ----------
+    entry : tuple of Fraction
+        b.
+    first : int
+        Number of the segment, from 0.
+    early, late : Fraction
+        From so long before the jump until so long after it [s], within the segments that meet there.
+    before, after : Fraction
+        [s].
+    """
+
+    entry: Row
+    first: int
+    early: Fraction
+    late: Fraction
+    before: Fraction
+    after: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PeriodicLoop:
     """x' = Ax + Σ b_i·w_i between jumps; the segments follow each other for ever, the first one at time 0.
 
@@ -81,6 +108,8 @@ class PeriodicLoop:
         j_i by the name of an input that adds j_i·w_i to the state once a period, with the jump of the first segment.
     fading : dict of str to Fading
         Inputs of which only what a jump leaves is known.
+    pulses : dict of str to Pulse
+        Inputs that are there near a jump alone.
     at_once : dict of (str, str) to Fraction
         What an input of size 1 adds to an output at the same instant, besides, at most; by (output, input).
     start : tuple of tuple of Fraction
@@ -94,6 +123,7 @@ class PeriodicLoop:
     outputs: dict[str, Row]
     sampled: dict[str, Row] = field(default_factory=dict)
     fading: dict[str, Fading] = field(default_factory=dict)
+    pulses: dict[str, Pulse] = field(default_factory=dict)
     at_once: dict[tuple[str, str], Fraction] = field(default_factory=dict)
     start: tuple[Row, ...] = ()
 

@@ -306,3 +306,19 @@ def test_a_pump_is_asked_for_no_more_than_it_can_do(call):
     assert "which a pump of -14 MPa to 15 MPa cannot all hold" in json.loads(out)["reason"]
     code, _, err = call("real-fault", "--withdrawal", "14 MPa")
     assert (code, "a withdrawal belongs to a saturation" in err) == (2, True)
+
+
+def test_jitter_and_a_slow_pump_are_in_the_answer_and_in_the_file(call, tmp_path):
+    path = tmp_path / "late.json"
+    asked = ("--jitter", "1 ms", "--delay-jitter", "1/2000", "--rate-limit", "60 MPa/s", "--json", "--out", str(path))
+    code, out, _ = call("real-fault", "--gains", *GAINS, *asked)
+    found = json.loads(out)
+    assert (code, found["jitter"], found["delay_jitter"]) == (0, "1/1000", "1/2000")
+    assert found["pump"] == {"rate": "60000000"}
+    assert F(found["largest_step"]) > 0
+    assert found["worst_found"]["slip_rate_error"] <= F(found["slip_rate_error"])
+    assert check_files([path], "real-fault")[str(path)][0] == "proved"
+    code, out, _ = call("real-fault", "--gains", *GAINS, "--rate-limit", "1 kPa/s")
+    assert code == 1
+    for given in (("--jitter", "100 ms"), ("--jitter", "1 ms", "--diffusion", "1 s"), ("--rate-limit", "0 Pa/s")):
+        assert call("real-fault", "--gains", *GAINS, *given)[0] == 2

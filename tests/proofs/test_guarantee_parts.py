@@ -23,6 +23,7 @@ from quakedesign.certificates.guarantee import (
 from quakedesign.certificates.guarantee import task as package_task
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
 from quakedesign.certificates.guarantee.inputs import channels_of
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.small_gain import bounds_from, certified_bounds
 from quakedesign.certificates.guarantee.task import Friction
 from quakedesign.errors import ParameterError
@@ -126,6 +127,14 @@ def some_held(random):
     return Held(law=law, step=step, delay=delay, lag=random.choice([F(0), F(1, 3)]), **noise)
 
 
+def off_schedule(held, number):
+    """The same with jitter of measurements, of the delay or both, or a pump of some rate, or all of that."""
+    jitter, later, ramp = [(1, 0, 0), (0, 1, 0), (1, 1, 0), (0, 0, 1), (1, 1, 1)][number % 5]
+    pump = Pump(rate=F(5), least=F(-3), largest=F(2)) if ramp else None
+    short = held.step / 12
+    return replace(held, jitter=jitter * short, delay_jitter=later * short, pump=pump, ramp=ramp * short)
+
+
 def some_continuous(random):
     n = random.randint(1, 3)
     return ContinuousLaw(
@@ -215,11 +224,13 @@ def without_awaited(loop, theirs):
 
 @pytest.mark.usefixtures("coarse")
 def test_both_build_the_same_loop_of_a_law_that_is_held():
-    random, built, layers = Random(2), 0, set()
+    random, built, layers, late = Random(2), 0, set(), set()
     for i in range(60):
         (task, read), held = some_tasks()[i % 4], some_held(random)
         if i % 3 and held.delay < 3 * held.step:
             held = replace(held, diffusion=F(i, 7) * held.step)
+        elif i % 3 == 0:
+            held = off_schedule(held, i // 3)
         raw = document_of(Guarantee(task=task, held=held, claims=some_claims(random)))
         ours = unless(ParameterError, held.loop, task)
         theirs = unless(checker.Refused, checker.read_loop, raw["loop"], read)
@@ -239,6 +250,7 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             given = theirs.fade
             assert fades == ([(given.event, given.height, given.rate, given.floor)] if given else [])
             layers.add((held.diffusion > 0, held.lag > 0, given.event if given else None))
+            late.add(same_pulse(task, ours, theirs, held))
             entries = [ours.inputs["acceleration"], ours.inputs["drift"], *ours.sampled.values()]
             entries += [f.entry for f in ours.fading.values()]
             assert theirs.inputs == list(map(list, entries))
@@ -248,10 +260,29 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             if theirs.root:
                 given = plain(held.law.root.pull), list(held.law.root.slopes), held.law.root.remainder
                 assert (theirs.root.pull, theirs.root.slopes, theirs.root.remainder) == given
-            claim = Guarantee(task=task, held=held, claims=some_claims(random))
+            more = {"largest_step": UpperBound(1)} if held.pump else {}
+            more |= {"least_asked": LowerBound(-1), "largest_asked": UpperBound(1)} if held.pump and held.lag else {}
+            claim = Guarantee(task=task, held=held, claims=replace(some_claims(random), **more))
             assert parse_guarantee(guarantee_text(claim)) == claim
     assert built > 25
     assert {(True, True, None), (True, False, 0), (True, False, 1)} <= layers
+    assert {(0, True), (0, False), (1, True), (1, False), None} <= late
+
+
+def same_pulse(task, ours, theirs, held):
+    """What is late, in both: its event, and whether it comes through a lag; None where nothing is."""
+    assert (theirs.off, theirs.stepped) == (held.jitter, "stepped" in ours.outputs)
+    assert [NOISES[k] for k in theirs.told] == [name for name in NOISES if name in ours.sampled]
+    if "late" not in ours.pulses:
+        assert theirs.pulse is None
+        assert "late" not in {name for _, name in ours.at_once}
+        return None
+    own, given = ours.pulses["late"], theirs.pulse
+    assert (own.first, own.early, own.late) == (given.event, given.early, given.late)
+    assert (own.before, own.after) == (given.before, given.after)
+    assert list(own.entry) == checker.pulse_entry(theirs, sum(task.beta) / 2)
+    assert ours.at_once == {("asked" if held.lag else "push", "drift"): own.late}
+    return own.first, held.lag > 0
 
 
 @pytest.mark.usefixtures("coarse")
@@ -278,12 +309,13 @@ def test_both_build_the_same_loop_in_continuous_time():
 
 FORWARD = ("reference_acceleration", "reference_jerk")
 HEARD = (NOISES, NOISES[:1], NOISES[1:], ("root", *NOISES), ("root", "slip_noise"))
+OFF = ((*NOISES, "late"), ("slip_noise", "late"), ("root", *NOISES, "late"), ("late",))
 
 
 @pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize(
     ("more", "held"),
-    [((), True), (("root",), True), (FORWARD, False), ((), False), *((more, True) for more in HEARD)],
+    [((), True), (("root",), True), (FORWARD, False), ((), False), *((more, True) for more in (*HEARD, *OFF))],
 )
 @pytest.mark.parametrize("asked", [(), ("asked",)])
 def test_both_draw_the_same_bounds_from_the_same_gains(more, held, asked, monkeypatch):
@@ -294,26 +326,32 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, asked, monkey
         (task, read), step = some_tasks()[1 if more == FORWARD else i % 4], some(random, 1, 9, 4)
         root = some_root(random) if "root" in more else None
         noise = {name: some(random, 1, 9, 4) for name in more if name in NOISES}
-        seen = (*OUTPUTS, *asked)
+        late, jitter = "late" in more, some(random, 1, 9, 99) if "late" in more and noise else F(0)
+        seen = (*OUTPUTS, *asked, *["stepped"] * late)
         table = {(y, k): tuple(some(random, 0, 9, 900 >> i) for _ in range(parts)) for y in seen for k in names}
         answers = iter([[list(table[y, k]) for y in seen] for k in names])
         events = [([], step)] if held else []
         monkeypatch.setattr(
-            checker, "gains", lambda _l, _e, sudden, queue=answers: entered.append(sudden) or next(queue)
+            checker, "gains", lambda _l, _e, sudden, queue=answers, pulse=None: entered.append(sudden) or next(queue)
         )
         monkeypatch.setattr(small_gain, "norms" if held else "flow_norms", lambda _, known=table: known)
         given = checker.Root([], list(root.slopes), root.remainder) if root else None
         off = tuple(noise.get(name, F(0)) for name in NOISES)
-        loop = checker.Loop([], events, [[]] * len(seen), [[] for _ in names], given, step, off, asked=bool(asked))
+        told = [k for k, name in enumerate(NOISES) if name in noise]
+        watched = {"stepped": True, "pulse": checker.Pulse(0, step, F(0), F(0), F(0)), "off": jitter} if late else {}
+        inputs = [[] for name in names if name != "late"]
+        loop = checker.Loop([[F(0)] * 3] * 3, events, [[]] * len(seen), inputs, given, step, off, asked=bool(asked))
+        loop = replace(loop, told=told, **watched)
         segments = tuple(Segment(jump=(), duration=step) for _ in events)
         ours = PeriodicLoop(states=(), flow=(), segments=segments, inputs={}, outputs={})
-        found = certified_bounds(task, ours, root, noise)
+        found = certified_bounds(task, ours, root, noise, jitter)
         theirs = unless(checker.Refused, checker.bounds, read, loop)
         assert (theirs is None) == (not isinstance(found, Bounds))
         if theirs:
             proved += 1
-            assert theirs[0] == [found.slip_error, found.slip_rate_error, found.push, found.asked][: len(seen)]
-            assert (found.asked is None) == (not asked)
+            each = found.slip_error, found.slip_rate_error, found.push, found.asked, found.stepped
+            assert theirs[0] == [v for v in each if v is not None]
+            assert (found.asked is None, found.stepped is None) == (not asked, not late)
             assert abs(theirs[1] - found.small_gain) <= max(found.small_gain / 2**19, F(1, 2**40))
     assert 2 < proved < 8
     assert not held or entered == 8 * [name in ("root", *NOISES) for name in names]  # with the sample alone

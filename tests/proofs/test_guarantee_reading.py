@@ -64,6 +64,11 @@ CONTINUOUS = changed(
 LAYERED = changed(HELD, (("loop", "diffusion"), "2"))
 NOISY = changed(HELD, (("loop", "noise"), {"slip": "1/9", "rate": "1/7"}), (("loop", "feedback"), ["1", "0"]))
 PUMPED = changed(HELD, (("loop", "pump"), {"least": "-4", "largest": "5"}))
+STEPS = HELD["claims"] | {"largest_step": "5"}
+PACED = changed(HELD, (("loop", "pump"), {"rate": "4", "ramp": "1/9"}), (("claims",), STEPS))
+JITTERY = changed(HELD, (("loop", "jitter"), {"measured": "1/9", "delay": "1/7"}))
+LATE = changed(JITTERY, (("loop", "delay"), "5/4"))
+BOTH = changed(JITTERY, (("loop", "pump"), {"rate": "4", "ramp": "1/9"}), (("claims",), STEPS))
 ALONE = changed(NOISY, (("loop", "measured"), [["1", "0"]]), (("loop", "noise", "rate"), "0"))
 
 
@@ -121,6 +126,25 @@ LIMITS = [
     (PUMPED, ("loop", "pump"), [{"least": "0", "largest": "5"}, {"least": "-4", "largest": "0"}],
      [{"least": "0", "largest": "0"}, {"least": "1/9", "largest": "5"}, {"least": "-4", "largest": "-1/9"},
       {"least": "-4"}, {"largest": "5"}, {"least": "-4", "largest": "5", "rate": "1"}, {}, [], "5", None, 5]),
+    (PACED, ("loop", "pump"), [{"rate": "4", "ramp": "1"}, {"least": "-4", "largest": "0", "rate": "1", "ramp": "1"}],
+     [{"rate": "0", "ramp": "1"}, {"rate": "4", "ramp": "0"}, {"rate": "4"}, {"ramp": "1"}, {"rate": "-4", "ramp": "1"},
+      {"rate": "4", "ramp": "-1"}, {"rate": "4", "ramp": "11/10"}, {"rate": "4", "ramp": "1", "least": "-4"},
+      {"rate": "4", "ramp": "1", "least": "0", "largest": "0"}, {"rate": "4", "ramp": "1", "more": "1"}]),
+    (PACED, ("loop", "diffusion"), [], ["1"]),
+    (JITTERY, ("loop", "diffusion"), [], ["1"]),
+    (CONTINUOUS, ("loop", "jitter"), [], [JITTERY["loop"]["jitter"]]),
+    (JITTERY, ("loop", "jitter"),
+     [{"measured": "1/2", "delay": "0"}, {"measured": "0", "delay": "1/2"}, {"measured": "1/4", "delay": "1/4"}],
+     [{"measured": "0", "delay": "0"}, {"measured": "-1/9", "delay": "1/2"}, {"measured": "1/2", "delay": "-1/9"},
+      {"measured": "51/100", "delay": "0"}, {"measured": "1/4", "delay": "26/100"}, {"measured": "1/9"},
+      {"delay": "1/9"}, {"measured": "1/9", "delay": "0", "more": "0"}, {}, [], "1/9", None]),
+    (LATE, ("loop", "jitter"), [{"measured": "1/4", "delay": "0"}, {"measured": "0", "delay": "1/4"}],
+     [{"measured": "26/100", "delay": "0"}, {"measured": "0", "delay": "26/100"}]),
+    (changed(LATE, (("loop", "delay"), "7/4")), ("loop", "jitter", "delay"), ["5/36"], ["6/36"]),
+    (BOTH, ("loop", "pump", "ramp"), ["31/63"], ["32/63"]),
+    (changed(BOTH, (("loop", "delay"), "1/2")), ("loop", "pump", "ramp"), ["31/126"], ["32/126"]),
+    (JITTERY, ("loop",), [many(12, "3", "1")["loop"] | {"jitter": JITTERY["loop"]["jitter"]}],
+     [many(12, "4", "1")["loop"] | {"jitter": JITTERY["loop"]["jitter"]}]),
     (LAYERED, ("loop", "diffusion"), ["1/32", "1/31", "5"], ["1/33", "0", "-1", 1, None]),
     (LAYERED, ("loop",), [many(7, "1", "0", "1")["loop"], many(8, "0", "1", "1")["loop"]],
      [many(8, "1", "0", "1")["loop"], many(8, "1/2", "1", "1")["loop"]]),
@@ -169,6 +193,35 @@ def test_both_take_what_is_just_allowed_and_refuse_what_is_just_beyond(raw, path
             except CertificateError:
                 package = False
             assert (standalone, package) == (expected, expected), value
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_largest_step_is_claimed_where_it_counts_alone_and_has_to_be_for_a_pump_of_some_rate(monkeypatch):
+    """Steps of 1/5 m/s², 5 Pa with b = 1/25 m²/kg; ramps of 1/9 s at 45 Pa/s are just enough for them."""
+    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(0), F(0), F(0), F(1, 5)], F(1, 3)))
+    rest = checker.read_task(HELD).rest
+    wide = STEPS | {"least_pressure": str(rest[0]), "largest_pressure": str(rest[1])}
+    enough = changed(PACED, (("claims",), wide), (("loop", "pump", "rate"), "45"))
+    said = checker.verify(enough)
+    assert said[2].endswith(", a pump of 45 Pa/s that is never at its limits")
+    assert said[-1].endswith(" Pa, from sample to sample by at most 5 Pa")
+    with pytest.raises(checker.Refused, match="must be made within the ramp of the pump"):
+        checker.verify(changed(enough, (("loop", "pump", "rate"), "449/10")))
+    with pytest.raises(checker.Refused, match="claim largest_step must follow"):
+        checker.verify(changed(enough, (("claims", "largest_step"), "499/100")))
+    missing = {name: v for name, v in wide.items() if name != "largest_step"}
+    for raw, claims, why in (
+        (enough, missing, "needs a claim of the largest step"),
+        (HELD, wide, "is claimed of a loop with jitter or a pump of some rate alone"),
+    ):
+        with pytest.raises(checker.Refused, match=why):
+            checker.verify(changed(raw, (("claims",), claims)))
+        with pytest.raises(CertificateError, match=why):
+            read_guarantee(changed(raw, (("claims",), claims)))
+    assert checker.verify(changed(JITTERY, (("claims",), missing)))[2].endswith(
+        "measurements within 1/9 s of their instants, pressures within that and 1/7 s more"
+    )
+    assert read_guarantee(changed(JITTERY, (("claims",), missing))).claims.largest_step is None
 
 
 @pytest.mark.parametrize("name", [*CLAIMS, "least_asked", "largest_asked"])

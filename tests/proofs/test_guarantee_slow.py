@@ -193,7 +193,7 @@ def test_a_claim_that_no_bound_stays_below_is_not_proved(monkeypatch):
 
 
 def test_a_slip_error_that_moves_the_gain_without_end_is_said(monkeypatch):
-    def grows(task, gains, root, step, noise, spread):
+    def grows(task, gains, root, step, noise, spread, jitter):
         return Bounds(slip_error=spread.half, slip_rate_error=F(0), push=F(0), small_gain=F(1, 2))
 
     monkeypatch.setattr(statement, "best_bounds", grows)

@@ -45,7 +45,7 @@ _TIMES = ("step", "delay", "lag")
 _SLIDING_TIMES = (*_TIMES, "diffusion", "slip_noise")
 _SLIDING_REFERENCE = ("rate", "distance", "ramp")
 _NOISE = ("slip", "rate")
-_PUMP = ("least", "largest")
+_LIMITS, _JITTER = ("least", "largest"), ("measured", "delay")
 _LAW = ("states", "measured", "output", "feedback")
 _FAULT = re.compile(r"\w[\w .+-]{0,59}")
 _MOST_COEFFICIENTS = 13
@@ -156,7 +156,9 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         own |= {} if root is None else {"root": _root_document(root)}
         noise = claim.held.noise
         own |= {"noise": {name: str(noise.get(f"{name}_noise", 0)) for name in _NOISE}} if noise else {}
-        own |= {"pump": claim.held.pump.to_dict()} if claim.held.pump else {}
+        jitter = dict(zip(_JITTER, (claim.held.jitter, claim.held.delay_jitter), strict=True))
+        own |= {"jitter": {name: str(v) for name, v in jitter.items()}} if any(jitter.values()) else {}
+        own |= {"pump": _pump_document(claim.held)} if claim.held.pump else {}
     return {
         **times,
         "states": list(law.states),
@@ -181,6 +183,10 @@ def _read_tracking(raw: Any) -> Guarantee | ContinuousPeaks:
     loop = claim.loop
     told = "asked" in loop.outputs or claims.least_asked is None
     need(told, "without a lag and rock the claims must not tell the valve's pressure from the fault's")
+    counted = "stepped" in loop.outputs or claims.largest_step is None
+    need(counted, "a largest step is claimed of a loop with jitter or a pump of some rate alone")
+    paced = isinstance(claim, Guarantee) and claim.held.ramp
+    need(not paced or claims.largest_step is not None, "the rate of a pump needs a claim of the largest step")
     pumped = isinstance(claim, Guarantee) and claim.held.pump and "asked" in loop.outputs
     need(not pumped or claims.least_asked is not None, "a pump behind which there is a lag or rock needs claims of it")
     _require_few(loop.states)
@@ -204,7 +210,9 @@ def _require_few(states: tuple[str, ...]) -> None:
 def _claims(kind: type[_Claimed], raw: dict[str, Any]) -> _Claimed:
     given, known = raw["claims"], fields(kind)
     more = {part.name for part in known if part.default is None}
-    left_out = more if isinstance(given, dict) and not more & set(given) else set[str]()
+    left_out = set[str]()
+    for group in (more - {"largest_step"}, more & {"largest_step"}):
+        left_out |= group if isinstance(given, dict) and not group & set(given) else set[str]()
     found = read_exactly(given, (part.name for part in known if part.name not in left_out))
     ends: dict[str, Any] = {name: LowerBound if name.startswith("least") else UpperBound for name in found}
     return kind(**{name: ends[name](value) for name, value in found.items()})
@@ -268,7 +276,8 @@ def _start(raw: Any) -> dict[str, Fraction]:
 
 
 def _held(raw: Any, start: dict[str, Fraction]) -> Held:
-    given = {"root", "noise", "diffusion", "first", "pump"} & set(raw) if isinstance(raw, dict) else set[str]()
+    more = {"root", "noise", "diffusion", "first", "jitter", "pump"}
+    given = more & set(raw) if isinstance(raw, dict) else set[str]()
     with_keys(raw, {*_TIMES, "update", *_LAW} | given)
     root = _read_root(raw["root"]) if "root" in given else None
     law = LinearLaw(
@@ -277,10 +286,29 @@ def _held(raw: Any, start: dict[str, Fraction]) -> Held:
     noise = read_exactly(raw["noise"], _NOISE) if "noise" in given else {}
     diffusion = read_rational(raw["diffusion"]) if "diffusion" in given else _ZERO
     need(diffusion > 0 or "diffusion" not in given, "diffusion must be positive where it is given")
-    times = {name: read_rational(raw[name]) for name in _TIMES}
-    told = {f"{name}_noise": v for name, v in noise.items()}
-    pump = Pump(**read_exactly(raw["pump"], _PUMP)) if "pump" in given else None
-    return Held(law=law, diffusion=diffusion, pump=pump, **times, **told, **start)
+    times: dict[str, Any] = {name: read_rational(raw[name]) for name in _TIMES}
+    times |= {f"{name}_noise": v for name, v in noise.items()} | start
+    jitter, delay_jitter = read_exactly(raw["jitter"], _JITTER).values() if "jitter" in given else (_ZERO, _ZERO)
+    need(min(jitter, delay_jitter) >= 0, "jitter must be 0 or more")
+    need(jitter + delay_jitter > 0 or "jitter" not in given, "jitter must be there where it is given")
+    times |= _pump(raw["pump"]) if "pump" in given else {}
+    return Held(law=law, diffusion=diffusion, jitter=jitter, delay_jitter=delay_jitter, **times)
+
+
+def _pump_document(held: Held) -> dict[str, str]:
+    """The pump, and how long it takes at most where it has a rate."""
+    pump = held.pump.to_dict() if held.pump else {}
+    return pump | ({"ramp": str(held.ramp)} if "rate" in pump else {})
+
+
+def _pump(raw: Any) -> dict[str, Any]:
+    """A pump and its ramp."""
+    paced = isinstance(raw, dict) and "rate" in raw
+    limited = not paced or not set(raw) <= {"rate", "ramp"}
+    given = read_exactly(raw, (*_LIMITS * limited, *("rate", "ramp") * paced))
+    ramp = given.pop("ramp", _ZERO)
+    need(ramp > 0 or not paced, "a ramp must be positive")
+    return {"pump": Pump(**given), "ramp": ramp}
 
 
 def _sliding_held(raw: Any) -> Held:

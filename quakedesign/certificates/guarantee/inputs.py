@@ -11,10 +11,11 @@ from typing import Any
 
 from quakedesign.certificates.guarantee.free_response import START
 from quakedesign.certificates.guarantee.task import Task
-from quakedesign.loop import ImplicitRoot
+from quakedesign.loop import NOISES, ImplicitRoot
 
 Gains = Mapping[tuple[str, str], tuple[Any, ...]]
 NOISELESS: Mapping[str, Fraction] = MappingProxyType({})
+LATE = "late"
 _ZERO = Fraction(0)
 
 
@@ -58,8 +59,12 @@ def channels_of(
     step: Fraction,
     noise: Mapping[str, Fraction] = NOISELESS,
     spread: GainSpread | None = None,
+    jitter: Fraction = _ZERO,
 ) -> tuple[Channel, ...]:
-    """Inputs of the loop of a task, of a law with an implicit root or without, with noise or without."""
+    """Inputs of the loop of a task, of a law with an implicit root or without, with noise or without.
+
+    `noise` has the bounds of those inputs of the loop that are noise, `jitter` [s] is that of the measurements.
+    """
     force, drift, coupling = _task_inputs(task)
     half, implicit, aged = task.half_ranges, [], []
     if spread is not None:
@@ -67,25 +72,42 @@ def channels_of(
         aged.append(Channel(name="aged", own=_ZERO, shares={"push": spread.aged}))
     if root is not None:
         share = root.half_range / step
-        own = root.remainder + share * noise.get("slip_noise", _ZERO)
+        own = root.remainder + share * (noise.get("slip_noise", _ZERO) + jitter * task.reference_rates[0])
         implicit.append(Channel(name="root", own=own, shares={"slip_error": share}))
     return (
         Channel(name="acceleration", own=force, shares=half),
         Channel(name="drift", own=drift, shares={"slip_rate_error": coupling}),
         *implicit,
         *aged,
-        *(Channel(name=name, own=size, shares={}) for name, size in noise.items()),
+        *_told(task, noise, jitter),
     )
 
 
+def _told(task: Task, noise: Mapping[str, Fraction], jitter: Fraction) -> Iterator[Channel]:
+    """What the measured errors are more than the true ones at their instants: noise, and what moves until then."""
+    forces = _task_inputs(task)[0]
+    slopes = [max(map(abs, ends)) for ends in (task.slip_chord, task.rate_chord, task.beta)]
+    moves = {
+        "slip_noise": (_ZERO, {"slip_rate_error": Fraction(1)}),
+        "rate_noise": (forces, dict(zip(task.half_ranges, slopes, strict=True))),
+    }
+    for name, rate in zip(NOISES, task.reference_rates, strict=True):
+        if name in noise:
+            force, shares = moves[name]
+            off = {output: jitter * share for output, share in shares.items()} if jitter else {}
+            yield Channel(name=name, own=noise[name] + jitter * (rate + force), shares=off)
+
+
 def beside(task: Task, names: Collection[str]) -> Iterator[Channel]:
-    """Inputs of a law in continuous time that uses the reference itself (`continuous_loop`), and a start."""
+    """Inputs of a law in continuous time that uses the reference itself (`continuous_loop`), a start, what is late."""
     if "reference_acceleration" in names:
         yield Channel(name="reference_acceleration", own=task.reference_rates[1], shares={})
     if "reference_jerk" in names:
         yield Channel(name="reference_jerk", own=task.reference_jerk, shares={})
     if START in names:
         yield Channel(name=START, own=Fraction(1), shares={})
+    if LATE in names:
+        yield Channel(name=LATE, own=_ZERO, shares={"stepped": Fraction(1)})
 
 
 def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:

@@ -30,6 +30,13 @@ the trapezoidal sum. Of the flow since the last jump, a piece that has passed ad
 Ω·max|ce^{Aσ}b|. Since e^{−x} ≤ 1/(1 + x + x²/2 + x³/6 + x⁴/24) = E(x), the weight he^{−λθ} + f has Ω = hE(λα)·min(1/λ,
 ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
 
+**Pulses.** Where w is there from `early` before a jump J to `late` after it, an impulse of it at −σ or σ has become
+Je^{Aσ}b or e^{−Aσ}b, after the jump, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. As the area before the
+jump, over `before`, and that after it, over `after`, are W in all, what comes of both is at most the larger of what
+`before`·Jb and `after`·b become, and of these remainders. With x and y for the two that is |x + y|/2 + |x − y|/2: two
+columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added to the
+outputs of the pieces that `early` reaches.
+
 **At once.** What an input of size 1 adds to an output at the same instant is added to the gain, whatever its weight.
 """
 
@@ -83,7 +90,7 @@ def _norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
         bounds: dict[tuple[str, str], tuple[Fraction, ...]] = {}
         flows, earlier = ([Flow.of(flow, part, past=past) for part in loop.segments] for past in (False, True))
         slow = slowest(earlier)
-        for name in (*loop.inputs, *loop.sampled, *loop.fading):
+        for name in (*loop.inputs, *loop.sampled, *loop.fading, *loop.pulses):
             gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name), slow), rows)
             bounds |= {
                 (output, name): tuple(map(upper, worst)) for output, worst in zip(loop.outputs, gains, strict=True)

@@ -9,10 +9,10 @@ from itertools import accumulate, pairwise
 from operator import add
 from typing import Any
 
-from flint import arb
+from flint import arb, arb_mat
 
 from quakedesign.certificates.guarantee.ball_matrices import absolute, ball, column, majorant, matrix
-from quakedesign.loop import Fading, PeriodicLoop, Segment
+from quakedesign.loop import Fading, PeriodicLoop, Pulse, Segment
 
 Weights = tuple[tuple[Any, Any], ...]
 _ZERO = Fraction(0)
@@ -152,6 +152,72 @@ class Faded(Response):
         return (size * self.curvature(start, piece))[0, 0] * self.of.chord(piece)
 
 
+@dataclass(frozen=True)
+class Pulsed(Response):
+    """Of an input that is there near a jump: `here` that of the segment itself, `ahead` that of the next one.
+
+    e^{A(τ − σ)}b is within σ·|A·…| of e^{Aτ}b. Of what is before and after the jump one is larger, and max(|x|, |y|) =
+    |x + y|/2 + |x − y|/2.
+    """
+
+    pulse: Pulse
+    here: bool
+    ahead: bool
+
+    @cached_property
+    def _sides(self) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+        """After the jump, for what is before and after it: b with its share, and by how much it is off, at most."""
+        pulse, flow = self.pulse, self.of.flow
+        moved, early, late = flow * self.entry, self._within(pulse.early), self._within(pulse.late)
+        before = self.of.jump * self.entry * ball(pulse.before)
+        shifted = absolute(self.of.jump) * early * absolute(moved) * ball(pulse.before * pulse.early)
+        back = absolute((flow * ball(-pulse.late)).exp() * moved)
+        after = self.entry * ball(pulse.after)
+        return (before, shifted), (after, late * back * ball(pulse.after * pulse.late))
+
+    def _within(self, time: Fraction) -> Any:
+        """Upper bound of |e^{Aσ}|, 0 ≤ σ ≤ time."""
+        return absolute((majorant(self.of.flow) * ball(time)).exp())
+
+    def columns(self, later: Any) -> tuple[list[Any], Any]:
+        """See `Response.columns`."""
+        none = self.entry * 0
+        if not self.here:
+            return [later * none], absolute(none)
+        (before, off), (after, far) = self._sides
+        whole = later * reduce(lambda now, step: step * now, self.of.steps)
+        rest = absolute(whole) * _larger(off, far)
+        return [whole * (before + after) / 2, whole * (before - after) / 2], absolute(rest)
+
+    def since_jump(self, row: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """See `Response.since_jump`."""
+        phases = list(accumulate(self.of.steps, lambda now, step: now * step, initial=row))
+        soon = self._ahead(row)
+        for i in range(len(self.of.lengths)):
+            start, end, more = arb(0), arb(0), arb(0)
+            if self.here:
+                for side, off in self._sides:
+                    ends = [abs((phase * side)[0, 0]) for phase in phases[i : i + 2]]
+                    start, end = start.max(ends[0]), end.max(ends[1])
+                    bent = (absolute(phases[i] * self.of.square) * self.of.within[i] * absolute(side))[0, 0]
+                    # what it is off by, anywhere in the piece
+                    far = (absolute(phases[i]) * self.of.within[i] * off)[0, 0]
+                    more = more.max(bent * self.of.chord(i) + far)
+            left = sum(self.of.lengths[i + 1 :], _ZERO)
+            yield start, end, more + (soon if self.ahead and left < self.pulse.early else 0)
+
+    def _ahead(self, row: Any) -> Any:
+        """Of the pulse before the jump that ends the segment, as long as it is there."""
+        moved = self._within(self.pulse.early) * absolute(self.of.flow * self.entry)
+        height = abs((row * self.entry)[0, 0]) + (absolute(row) * moved)[0, 0] * ball(self.pulse.early)
+        return height * ball(self.pulse.before)
+
+
+def _larger(one: Any, other: Any) -> Any:
+    """Entry by entry, of columns."""
+    return arb_mat([[a.max(b)] for a, b in zip(one.entries(), other.entries(), strict=True)])
+
+
 def responses(loop: PeriodicLoop, flows: list[Flow], name: str) -> list[Response]:
     """Of an input, over all segments."""
     if name in loop.inputs:
@@ -159,6 +225,12 @@ def responses(loop: PeriodicLoop, flows: list[Flow], name: str) -> list[Response
     if name in loop.sampled:
         entry = column(loop.sampled[name])
         return [Sudden(flow, entry * (not number)) for number, flow in enumerate(flows)]
+    if name in loop.pulses:
+        pulse, count = loop.pulses[name], len(flows)
+        return [
+            Pulsed(flow, column(pulse.entry), pulse, number == pulse.first, (number + 1) % count == pulse.first)
+            for number, flow in enumerate(flows)
+        ]
     fading = loop.fading[name]
     entry = column(fading.entry)
     return [Faded(flow, entry, own) for flow, own in zip(flows, _weights(flows, fading), strict=True)]

@@ -86,4 +86,4 @@ def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:
     """The loop whose responses to the acceleration are e^{ασ} as large."""
     flow = tuple(tuple(v + growth * (i == j) for j, v in enumerate(row)) for i, row in enumerate(loop.flow))
     entry = {"aged": loop.inputs["acceleration"]}
-    return replace(loop, flow=flow, inputs=entry, sampled={}, fading={}, at_once={}, start=())
+    return replace(loop, flow=flow, inputs=entry, sampled={}, fading={}, pulses={}, at_once={}, start=())

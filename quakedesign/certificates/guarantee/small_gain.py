@@ -40,6 +40,25 @@ them at the samples before kT_s, then the inputs up to kT_s, which these samples
 within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do. With
 noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places of E and R, and ε gains δγN1/T_s. ∎
 
+**Jitter.** Let sample k be measured within J of kT_s, the first at 0, and let the valve's pressure leave p_{k−1} within
+A of when p_k is due and go to p_k without turning back, over a time of at most Θ, with |p_k − p_{k−1}|/Θ at least until
+it is there. Keep the nominal loop on schedule. What it is told is then e(kT_s) and what e moves until it is measured:
+|n1| ≤ J(|e2| + r′), r′ where it is compared with the reference at kT_s, and |n2| ≤ J(|e2′| + |r″|), |e2′| ≤ max|s||e1|
++ max|w||e2| + max β|v| + |φ − w·r′ − r″|: both are c and F of the inputs of noise. The valve's pressure is j more than
+on schedule, b·|j| ≤ |u_k|, u_k = b(p_k − p_{k−1}), the output ``stepped``, and only from A before to A + Θ after p_k is
+due: p_k where it is early, p_{k−1} where it is late. The input ``late`` is b·j, which acts as the valve's pressure
+does, F = 0 and c = 1 for u_k. Let f be the share of the step that is made when p_k is due. The areas of b|j| before and
+after that are E and L times |u_k|: where it begins late, E = 0 and L ≤ A + Θ/2; where it begins early, E ≤ f·A and L ≤
+(1 − f)²·Θ/2. So E/A + L/(A + Θ/2) ≤ 1 always, and ``late`` is a `Pulse`. v = b(p − p*) is what the nominal loop has of
+it at the same time or, of the pressure before or after, A + Θ away at most, when p* was d times that time another: the
+output ``push`` (behind a lag ``asked``) has that more.
+
+Some of these bounds are by outputs a little later, up to t + T_s for an input at t. But beyond t let the nominal loop
+go on with no inputs but those that bring what has been measured or has come before t to its instant: they obey the same
+bounds, and beyond t + T_s there is none. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is not more. A root is one of what
+was measured: of e at a time up to which the bounds hold, so that E and R have no more on top than noise, J·r′ and
+J·|r″|, and ε gains δγ(N1 + J·r′)/T_s. ∎
+
 **Slow input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤ κ(2E + r′σ),
 σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Cut the range of β into parts with middles β_i and half widths δ. Fix t, let
 β(t) be in part i, and take β_i in place of β0 in the nominal loop up to t: |β(τ) − β_i| ≤ δ + 2κE + κr′σ, and σ ≤
@@ -87,6 +106,9 @@ _WORDS = {
     ("aged", "push"): "change of the input gain",
     ("drift", "slip_rate_error"): "drift that the input gain makes of the disturbance",
     ("root", "slip_error"): "range of the implicit step's slope",
+    ("late", "stepped"): "jitter or rise of the pressure",
+    **{("rate_noise", output): "jitter of the measurement" for output in OUTPUTS},
+    ("slip_noise", "slip_rate_error"): "jitter of the measurement",
 }
 _LEFT_OUT = "what the modes of the layer leave out"
 _HALVINGS = 96
@@ -106,6 +128,8 @@ class Bounds:
         b·|p − p*| [m/s²].
     asked : Fraction, optional
         The same at the valve [m/s²]; None where that is the fault's.
+    stepped : Fraction, optional
+        b times the change of the pressure that is asked for from sample to sample [m/s²]; None where it does not count.
     small_gain : Fraction
         Spectral radius of M [-] from above, below 1.
     """
@@ -115,6 +139,7 @@ class Bounds:
     push: Fraction
     small_gain: Fraction
     asked: Fraction | None = None
+    stepped: Fraction | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,10 +152,13 @@ class NoGuarantee:
         With the quantity that fails.
     small_gain : UpperBound or None
         At least 1; None where something else fails, such as the stability of the nominal loop.
+    needs : Fraction, optional
+        Change of the pressure from sample to sample that a pump would have to make [Pa].
     """
 
     reason: str
     small_gain: UpperBound | None
+    needs: Fraction | None = None
 
     def check(self) -> Verdict:
         """UNDECIDED."""
@@ -142,18 +170,23 @@ class NoGuarantee:
 
 
 def certified_bounds(
-    task: Task, loop: PeriodicLoop, root: ImplicitRoot | None = None, noise: Mapping[str, Fraction] = NOISELESS
+    task: Task,
+    loop: PeriodicLoop,
+    root: ImplicitRoot | None = None,
+    noise: Mapping[str, Fraction] = NOISELESS,
+    jitter: Fraction = _ZERO,
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem for the loop of `held_loop` or `continuous_loop` with the task's model.
 
-    `noise` has the bounds of those inputs of the loop that are noise, in SI units.
+    `noise` has the bounds of those inputs of the loop that are noise, in SI units, `jitter` that of measurements [s].
 
     Raises
     ------
     ParameterError
         When the nominal loop is not found to be stable.
     """
-    return best_bounds(task, norms(loop) if loop.segments else flow_norms(loop), root, loop.period, noise)
+    gains = norms(loop) if loop.segments else flow_norms(loop)
+    return best_bounds(task, gains, root, loop.period, noise, jitter=jitter)
 
 
 def best_bounds(
@@ -163,10 +196,11 @@ def best_bounds(
     step: Fraction,
     noise: Mapping[str, Fraction] = NOISELESS,
     spread: GainSpread | None = None,
+    jitter: Fraction = _ZERO,
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains; of a disturbance of bounded rate, the better of both classes."""
     classes = [task] if task.change is None else [task, replace(task, change=None)]
-    answers = [bounds_from(one, gains, root, step, noise, spread) for one in classes]
+    answers = [bounds_from(one, gains, root, step, noise, spread, jitter) for one in classes]
     proved = [bounds for bounds in answers if isinstance(bounds, Bounds)]
     if not proved:
         return answers[0]
@@ -182,9 +216,10 @@ def bounds_from(
     step: Fraction,
     noise: Mapping[str, Fraction] = NOISELESS,
     spread: GainSpread | None = None,
+    jitter: Fraction = _ZERO,
 ) -> Bounds | NoGuarantee:
     """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
-    channels = (*channels_of(task, root, step, noise, spread), *beside(task, {name for _, name in gains}))
+    channels = (*channels_of(task, root, step, noise, spread, jitter), *beside(task, {name for _, name in gains}))
     if ("push", "awaited") in gains:
         channels = tuple(through_layer(channels, gains))
     small_gain, peaks = channel_bounds(channels, gains)
@@ -196,6 +231,7 @@ def bounds_from(
         push=Fraction(peaks["push"] + peaks.get("left_out", _ZERO) + _unshifted(task)),
         small_gain=Fraction(small_gain),
         asked=Fraction(peaks["asked"] + _unshifted(task)) if "asked" in peaks else None,
+        stepped=Fraction(peaks["stepped"]) if "stepped" in peaks else None,
     )
 
 

@@ -17,6 +17,7 @@ from quakedesign.certificates.guarantee.task import Task
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.loop import (
     NOISES,
+    Instants,
     Layer,
     LinearLaw,
     Model,
@@ -40,6 +41,8 @@ _MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integral
 _RESTS = Fraction(1, 100)  # of the largest rate of the reference: below that a fault counts as at rest
 _ENDS = ("least_pressure", "largest_pressure", "least_asked", "largest_asked")
 _TURNS = 32  # of claims that follow from themselves
+_RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # times of a pump that are tried, and what each has more than the last needed
+_FIRST = Fraction(1, 64)  # of a step, the first of them
 
 
 class Around(TypedDict, total=False):
@@ -52,6 +55,8 @@ class Around(TypedDict, total=False):
     rate_noise: Fraction
     initial_slip: Fraction
     initial_slip_rate: Fraction
+    jitter: Fraction
+    delay_jitter: Fraction
     pump: Pump | None
 
 
@@ -70,8 +75,12 @@ class Held:
         Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
     initial_slip, initial_slip_rate : Fraction
         Bounds of both at the start, where the reference has none, of either sign [m], [m/s].
+    jitter, delay_jitter : Fraction
+        By how much a measurement is early or late at most, its pressure with it [s], and the pressure besides.
     pump : Pump, optional
         Limits at the valve, which the loop must never reach.
+    ramp : Fraction
+        Time in which the pump goes from one pressure to the next, at most [s].
 
     Raises
     ------
@@ -88,7 +97,10 @@ class Held:
     rate_noise: Fraction = Fraction(0)
     initial_slip: Fraction = Fraction(0)
     initial_slip_rate: Fraction = Fraction(0)
+    jitter: Fraction = Fraction(0)
+    delay_jitter: Fraction = Fraction(0)
     pump: Pump | None = None
+    ramp: Fraction = Fraction(0)
 
     def __post_init__(self) -> None:
         if min(self.start) < 0:
@@ -100,6 +112,11 @@ class Held:
             raise ParameterError(
                 "a bound of noise must be 0 or more. Received "
                 f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s. Check their signs."
+            )
+        if min(self.jitter, self.delay_jitter, self.ramp) < 0:
+            raise ParameterError(
+                f"jitter must be 0 or more. Received {float(self.jitter):.4g} s, of the delay "
+                f"{float(self.delay_jitter):.4g} s. Leave out the sign."
             )
         if self.rate_noise and self.law.of_slip_alone:
             raise ParameterError(
@@ -119,8 +136,31 @@ class Held:
 
     @property
     def noise(self) -> dict[str, Fraction]:
-        """Bounds of the noise that there is, by its input of the loop."""
-        return {name: bound for name in NOISES if (bound := getattr(self, name))}
+        """Bounds of the noise that there is, by its input of the loop; with jitter all that is measured has some."""
+        measured = (NOISES[0], *NOISES[1:] * (not self.law.of_slip_alone)) if self.jitter else ()
+        return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
+
+    @property
+    def instants(self) -> Instants | None:
+        """How far those of the loop may be off; None where they are not, and a pressure may change at once."""
+        if not (self.jitter or self.delay_jitter or (self.pump and self.pump.rate)):
+            return None
+        return Instants(measured=self.jitter, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
+
+    @property
+    def longest_ramp(self) -> Fraction:
+        """Time after a pressure is due and before the next sample is [s]."""
+        off, part = self.jitter + self.delay_jitter, self.delay % self.step
+        return min(self.step - part - off, self.step - 2 * off)
+
+    def told(self, task: Task, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
+        """Bounds of the errors as the law is told them, from those of the true ones at any time [m], [m/s].
+
+        A measurement that is early or late may be compared with the reference at its instant.
+        """
+        off = zip(errors, (self.slip_noise, self.rate_noise), task.reference_rates, strict=True)
+        slip, rate = (error + noise + self.jitter * moves for error, noise, moves in off)
+        return slip, rate
 
     @property
     def controller(self) -> "SampledController":
@@ -138,7 +178,15 @@ class Held:
     def loop(self, task: Task, model: Model | None = None) -> PeriodicLoop:
         """Nominal error loop on a task, of its model or another one."""
         times = {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
-        loop = held_loop(self.law, model or task.model, task.authority, self.step, **times, noisy=self.noise)
+        loop = held_loop(
+            self.law,
+            model or task.model,
+            task.authority,
+            self.step,
+            **times,
+            noisy=self.noise,
+            instants=self.instants,
+        )
         if self.diffusion:
             gain = (model or task.model).gain / task.authority
             loop = with_known_area(loop, gain, Layer(time=self.diffusion))
@@ -164,6 +212,8 @@ class Claims:
         [Pa].
     least_asked, largest_asked : LowerBound and UpperBound, optional
         The same of the pressure at the valve [Pa]; None where that is the fault's.
+    largest_step : UpperBound, optional
+        Change of the pressure that is asked for from sample to sample [Pa]; None where it does not count.
     """
 
     slip_error: UpperBound
@@ -173,6 +223,7 @@ class Claims:
     largest_pressure: UpperBound
     least_asked: LowerBound | None = None
     largest_asked: UpperBound | None = None
+    largest_step: UpperBound | None = None
 
     @classmethod
     def of(cls, task: Task, bounds: Bounds) -> "Claims":
@@ -188,6 +239,7 @@ class Claims:
             largest_pressure=UpperBound(high + push),
             least_asked=None if asked is None else LowerBound(low - asked),
             largest_asked=None if asked is None else UpperBound(high + asked),
+            largest_step=None if bounds.stepped is None else UpperBound(bounds.stepped / task.authority),
         )
 
     @property
@@ -208,15 +260,18 @@ class Claims:
                 name: [low.exact, high.exact]
                 for name, (low, high) in zip(("pressure", "asked_pressure"), self.pressures, strict=False)
             },
+            **({} if self.largest_step is None else {"largest_step": self.largest_step.exact}),
         }
 
     def rounded(self) -> "Claims":
         """The same, a little weaker and with few digits."""
+        step = self.largest_step
         ends: list[Any] = [end for low, high in self.pressures for end in _wider(low, high)]
         return Claims(
             slip_error=UpperBound(_above(self.slip_error * _MARGIN)),
             slip_rate_error=UpperBound(_above(self.slip_rate_error * _MARGIN)),
             peak_slip_rate=UpperBound(_above(self.peak_slip_rate * _MARGIN)),
+            largest_step=None if step is None else UpperBound(_above(step * _MARGIN)),
             **dict(zip(_ENDS, ends, strict=False)),
         )
 
@@ -241,6 +296,7 @@ class Claims:
             and self.slip_rate_error >= other.slip_rate_error
             and self.peak_slip_rate >= other.peak_slip_rate
             and len(self.pressures) <= len(other.pressures)
+            and _covers(self.largest_step, other.largest_step)
             and all(
                 low <= least and high >= largest
                 for (low, high), (least, largest) in zip(self.pressures, other.pressures, strict=False)
@@ -300,7 +356,7 @@ class Guarantee:
             return None
         away = max(largest - high, low - least)
         per_slip = max(map(abs, self.task.slip_chord)) / self.task.authority
-        late = per_slip * held.delay * self.task.reference_rates[0]
+        late = per_slip * (held.delay + held.jitter + held.delay_jitter + held.ramp) * self.task.reference_rates[0]
         width = _above(2 * away + late)
         resolution = _above(2 * held.slip_noise + _RESTS * self.task.reference_rates[0] * held.step)
         return RestLimit(width=width, per_slip=_above(per_slip), resolution=resolution)
@@ -322,7 +378,7 @@ class Guarantee:
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         bounds = self.bounds()
-        if isinstance(bounds, NoGuarantee) or not _root_within(self.held, self.claims):
+        if isinstance(bounds, NoGuarantee) or not _root_within(self.task, self.held, self.claims):
             return Verdict.UNDECIDED
         if _beyond_the_pump(self.held, self.claims):
             return Verdict.UNDECIDED
@@ -338,8 +394,9 @@ class Guarantee:
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
         when += f", through rock of L^2/D = {_seconds(held.diffusion)} from well to fault" if held.diffusion else ""
         when += ", with the slip alone measured" if held.law.of_slip_alone else ""
-        for name, bound in held.noise.items():
+        for name, bound in ((name, bound) for name, bound in held.noise.items() if bound):
             when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
+        when += _off_schedule(held.jitter, held.jitter + held.delay_jitter)
         when += f", {held.pump.words()}" if held.pump else ""
         return sentence_of(self.task, self.claims, when, _start(*held.start))
 
@@ -356,30 +413,47 @@ def sentence_of(task: Task, claims: Claims, when: str, start: str = "from rest")
     if not task.amplitude:
         kind = "without disturbance"
     pressures = [f"between {low.quantity('Pa')} and {high.quantity('Pa')}" for low, high in claims.pressures]
+    largest = claims.largest_step
+    step = "" if largest is None else f", that asked for changes by at most {largest.quantity('Pa')} a sample"
     return (
         f"{start}, {when}, {kind}, for all friction and constant parameters of the box: "
         f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
-        f"{claims.slip_error:.3g} m of the reference, the pressure {', at the valve '.join(pressures)} "
+        f"{claims.slip_error:.3g} m of the reference, the pressure {', at the valve '.join(pressures)}{step} "
         "(for a plant continued to negative slip rates)"
     )
 
 
 def guarantee(task: Task, held: Held, slow_gain: SlowGain | None = None) -> Guarantee | NoGuarantee:
-    """Tightest rounded claims about a loop, or why there are none.
+    """Tightest rounded claims about a loop, or why there are none; of a pump of some rate, with a ramp that will do.
 
     Raises
     ------
     ParameterError
         For a loop without a steady state, or a slow gain and friction of the slip rate.
     """
+    if held.pump is None or held.pump.rate is None or held.ramp:
+        return _proved(task, held, slow_gain)
+    found, longest = _proved(task, replace(held, ramp=_FIRST * held.step), slow_gain), held.longest_ramp
+    for _ in range(_RAMPS):
+        if isinstance(found, Guarantee) or found.needs is None:
+            return found
+        ramp = _above(found.needs / held.pump.rate * _RAMP_ROOM)
+        if ramp > longest:
+            return found
+        found = _proved(task, replace(held, ramp=ramp), slow_gain)
+    return found
+
+
+def _proved(task: Task, held: Held, slow_gain: SlowGain | None) -> Guarantee | NoGuarantee:
     claims = _claims(task, held) if slow_gain is None else _slow_claims(task, held, slow_gain)
     if isinstance(claims, NoGuarantee):
         return claims
-    if not _root_within(held, claims):
+    if not _root_within(task, held, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
         return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
     if reason := claims.opens(task) or _beyond_the_pump(held, claims):
-        return NoGuarantee(reason=reason, small_gain=None)
+        slow = held.pump is not None and bool(held.pump.too_slow(claims.largest_step, held.ramp))
+        return NoGuarantee(reason=reason, small_gain=None, needs=claims.largest_step if slow else None)
     return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
 
 
@@ -417,24 +491,26 @@ def _slow_bounds(
     task: Task, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
 ) -> Bounds | NoGuarantee:
     spread = slow_gain.spread(task, slip_error)
-    return best_bounds(task, gains, held.law.root, held.step, held.noise, spread)
+    return best_bounds(task, gains, held.law.root, held.step, held.noise, spread, held.jitter)
 
 
-def _root_within(held: Held, claims: Claims) -> bool:
+def _root_within(task: Task, held: Held, claims: Claims) -> bool:
     """Whether an implicit root, if there is one, is as said wherever the claims hold."""
     root = held.law.root
-    errors = claims.slip_error + held.slip_noise, claims.slip_rate_error + held.rate_noise
+    errors = held.told(task, (claims.slip_error, claims.slip_rate_error))
     return root is None or sector.holds(root, held.step, *errors)
 
 
 def _beyond_the_pump(held: Held, claims: Claims) -> str:
     """Why the pump cannot do what is claimed; empty where it can."""
-    return held.pump.exceeded(*claims.pressures[-1]) if held.pump else ""
+    if held.pump is None:
+        return ""
+    return held.pump.exceeded(*claims.pressures[-1]) or held.pump.too_slow(claims.largest_step, held.ramp)
 
 
 def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
     try:
-        return certified_bounds(task, loop, held.law.root, held.noise)
+        return certified_bounds(task, loop, held.law.root, held.noise, held.jitter)
     except ParameterError:
         return _unstable(held)
 
@@ -442,6 +518,11 @@ def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
 def _unstable(held: Held) -> NoGuarantee:
     reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
     return NoGuarantee(reason=reason, small_gain=None)
+
+
+def _covers(step: UpperBound | None, other: UpperBound | None) -> bool:
+    """Whether a largest step follows from another."""
+    return step is None or (other is not None and step >= other)
 
 
 def _wider(low: LowerBound, high: UpperBound) -> tuple[LowerBound, UpperBound]:
@@ -455,6 +536,12 @@ def _above(value: Fraction) -> Fraction:
         return value
     scale = Fraction(10) ** (floor(log10(abs(value))) - _DIGITS + 1)
     return ceil(value / scale) * scale
+
+
+def _off_schedule(measured: Fraction, arrived: Fraction) -> str:
+    """Said of jitter; nothing where there is none."""
+    each = f", each measurement within {LowerBound(measured):.6g} s of its instant" if measured else ""
+    return each + (f", each pressure within {LowerBound(arrived):.6g} s of when it is due" if arrived else "")
 
 
 def _start(slip: Fraction, rate: Fraction) -> str:

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.linalg import expm
 
 from quakedesign.cache import search_once
-from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Task
-from quakedesign.loop import NOISES, PeriodicLoop, Segment
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Held, Task
+from quakedesign.loop import NOISES, PeriodicLoop
 from quakedesign.loop.implicit_root import root_of
-from quakedesign.loop.periodic import Row
+from quakedesign.loop.periodic import Matrix, Row
 
 _PERIODS, _MOST_PERIODS = 64, 512
 _FORGOTTEN = 100  # a course is over when what was at first is down to the hundredth part
@@ -24,6 +24,7 @@ _SOON = 1, 2, 4, 8, 16  # periods after which errors are looked at as well where
 _SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
 _LEVELS = 400  # of a disturbance of bounded rate above 0
 _SEED = 7
+_NEARLY = Fraction(31, 32)  # of the time between two events, so that they never meet
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +51,8 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     bounded rate is the best of all for a costate (`_steepest`). With `sticks` the fault does not slide backward:
     friction holds it wherever the loop would, along the reference at its largest rate and at a twentieth of that, and
     courses that switch after random times are tried as well. Noise is at its ends too. An implicit step ends where its
-    equation says, inside its lines or not. A box of starts is left from its corners.
+    equation says, inside its lines or not. A box of starts is left from its corners. With jitter each event is as early
+    or as late as it may be; pressures rise at once, as a pump of any rate may do.
     """
     slip, rate = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     return WorstFound(slip_error=slip, slip_rate_error=rate)
@@ -70,13 +72,65 @@ def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Pieces:
-    """One segment: its jump, for every vertex e^{Ah} and what constant inputs add, and h [s]."""
+class _Event:
+    """A jump and the time after it, `soon` where it may be left to the next one, `late` where that is the same again.
 
+    `samples` where the law is told something.
+    """
+
+    jump: Matrix
+    duration: Fraction
+    samples: bool
+    soon: bool = False
+    late: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Pieces:
+    """One event: its jump, for every vertex e^{Ah} and what constant inputs add, and h [s]."""
+
+    of: _Event
     jump: np.ndarray
     steps: np.ndarray
     added: np.ndarray
     length: float
+
+    def moved_on(self, vertex: int = 0) -> np.ndarray:
+        """Map of the whole time."""
+        return np.linalg.matrix_power(self.steps[vertex], _PIECES)
+
+
+def _on_time(held: Held) -> tuple[Held, Fraction, Fraction]:
+    """The loop without jitter whose events are moved, by how much its samples are, and its pressures before its time.
+
+    Where pressures arrive with a sample they are moved with that. Events keep their order. A first sample that has to
+    be at its instant is as early as the earliest.
+    """
+    off, late, delay = held.jitter, held.jitter + held.delay_jitter, held.delay
+    if any(held.start) or held.law.first:
+        off /= 2
+    part = delay % held.step
+    alone = not off and not part
+    if alone:
+        delay, late = delay + late, late / 2 * _NEARLY  # at its time or later
+    elif part:
+        off = min(off, part / 2, (held.step - part) / 2)
+        late = min(late, _NEARLY * (part - off), _NEARLY * (held.step - part - off))
+        delay += late
+    plain = replace(held, delay=delay, jitter=Fraction(0), delay_jitter=Fraction(0), pump=None, ramp=Fraction(0))
+    return plain, off, 2 * late if alone or part else Fraction(0)
+
+
+def _events(loop: PeriodicLoop, off: Fraction, early: Fraction) -> list[_Event]:
+    """Those of one period from the earliest sample on: samples off by some time, pressures up to some time early."""
+    sample, *others = loop.segments
+    waits = sample.duration - early - off if others else sample.duration - 2 * off
+    found = [_Event(sample.jump, 2 * off, samples=True, soon=True)] if off else []
+    found.append(_Event(sample.jump, waits, samples=True, late=bool(off)))
+    for arrival in others:
+        found += [_Event(arrival.jump, early, samples=False, soon=True)] if early else []
+        found.append(_Event(arrival.jump, arrival.duration - off, samples=False, late=bool(early)))
+    return found
 
 
 @dataclass(slots=True)
@@ -92,14 +146,15 @@ class _Limit:
     last: np.ndarray
 
     @classmethod
-    def of(cls, claim: Guarantee, size: int, back: np.ndarray) -> "_Limit | None":
-        """That of a guarantee along references of some rates [m/s]; None where it has none."""
+    def of(cls, claim: Guarantee, held: Held, size: int, back: np.ndarray) -> "_Limit | None":
+        """That of a guarantee along references of some rates [m/s], in a loop; None where it has none."""
         limit, law, authority = claim.rest_limit, claim.held.law, float(claim.task.authority)
         if limit is None:
             return None
         place, step = 2 + len(law.states), float(claim.held.step)
         told = np.zeros(size)
-        told[: len(claim.loop.states)] = _of_asked(claim)
+        asked = _of_asked(claim.task, held)
+        told[: len(asked)] = asked
         told[2:place] = [float(v) / authority for v in law.applied]
         rests = float(limit.resolution) - back * step  # of the slip error from sample to sample
         moved, none = float(claim.task.drift) * step, np.zeros(len(back))
@@ -109,25 +164,26 @@ class _Limit:
         """At the start of a course."""
         return replace(self, highest=np.zeros_like(self.highest), last=np.zeros_like(self.last))
 
-    def cut(self, state: np.ndarray) -> np.ndarray:
-        """States after a sample, the law told what is applied."""
+    def cut(self, state: np.ndarray, sampled: np.ndarray) -> np.ndarray:
+        """States after a sample of some courses, the law told what is applied."""
         asked, highest = state[:, self.place], self.highest - self.moved
         stuck = state[:, 0] - self.last <= self.rests
         applied = np.where(stuck, np.maximum(asked, highest - self.width), asked)
-        self.highest, self.last = np.maximum(highest, applied), state[:, 0].copy()
-        return np.asarray(state + np.outer(applied - asked, self.told))
+        self.highest = np.where(sampled, np.maximum(highest, applied), self.highest)
+        self.last = np.where(sampled, state[:, 0], self.last)
+        return np.asarray(state + np.outer((applied - asked) * sampled, self.told))
 
     def follow(self, before: np.ndarray, after: np.ndarray) -> None:
         """p* drifts, and with it what all pressures are less it."""
         self.highest = self.highest + after[:, self.place] - before[:, self.place]
 
 
-def _of_asked(claim: Guarantee) -> list[float]:
+def _of_asked(task: Task, held: Held) -> list[float]:
     """What the first jump of a period makes of what is asked for, [m/s²] and all states: of a law that asks for e1."""
-    held, zero = claim.held, Fraction(0)
+    zero = Fraction(0)
     still = tuple((zero, zero) for _ in held.law.states)
-    law = replace(held.law, measured=still, feedback=(1 / claim.task.authority, zero), root=None, first=())
-    jump = replace(held, law=law, rate_noise=zero).loop(claim.task).segments[0].jump
+    law = replace(held.law, measured=still, feedback=(1 / task.authority, zero), root=None, first=())
+    jump = replace(held, law=law, rate_noise=zero).loop(task).segments[0].jump
     return [float(row[0] - (i == 0)) for i, row in enumerate(jump)]
 
 
@@ -138,7 +194,8 @@ class _Search:
         self, claim: Guarantee | ContinuousPeaks, sticks: bool, courses: int, periods: int | None = None
     ) -> None:
         task, loop = claim.task, claim.loop
-        held = claim.held if isinstance(claim, Guarantee) else None
+        held, off, early = _on_time(claim.held) if isinstance(claim, Guarantee) else (None, Fraction(0), Fraction(0))
+        loop = held.loop(task) if held else loop
         root, noise = (held.law.root, held.noise) if held else (None, {})
         self.limit = float(task.amplitude) if task.change is not None else None
         flow, inputs = _with_disturbance(task, loop)
@@ -152,10 +209,9 @@ class _Search:
         push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
         ends = product(task.beta, task.slip_chord, task.rate_chord)
         vertices = [_at(task, flow, push, *map(float, v)) for v in ends]
-        segments = loop.segments or (_flowing(flow),)
-        self.parts = [
-            _pieces(vertices, inputs, _widened(s.jump, self.size), float(s.duration) / _PIECES) for s in segments
-        ]
+        events = _events(loop, off, early) if loop.segments else [_flowing(flow)]
+        self.parts = [_pieces(vertices, inputs, event) for event in events]
+        self.punctual = bool(held and (held.law.first or any(held.start)))  # at first
         if periods is None:
             periods = _periods_to_forget(self.parts, len(loop.states))
             courses = 2 * max(courses // 2 * _PERIODS // periods, _LEAST_COURSES)
@@ -163,7 +219,7 @@ class _Search:
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.rest_limit = None
         if self.back is not None and isinstance(claim, Guarantee):
-            self.rest_limit = _Limit.of(claim, self.size, self.back)
+            self.rest_limit = _Limit.of(claim, held or claim.held, self.size, self.back)
         self.allowed = np.ones((courses, len(vertices)), dtype=bool)
         slow = isinstance(claim, Guarantee) and claim.slow_gain is not None
         if (slow or self.limit is not None) and beta[0] < beta[1]:  # β is slow; it stays at either end
@@ -178,8 +234,8 @@ class _Search:
         """Follow the maximum principle forward and backward."""
         slopes = None
         for left in reversed(range(sweeps)):
-            chosen, held = self._forward(costates, slopes)
-            costates = self._backward(chosen, held)
+            chosen, held, jumped = self._forward(costates, slopes)
+            costates = self._backward(chosen, held, jumped)
             if self.limit is not None and left <= sweeps // 2:  # before, by the sign of its costate
                 slopes = self._slopes(costates, chosen, self.limit)
 
@@ -207,16 +263,22 @@ class _Search:
         found[:, :, 1] = 1 - 2 * ((flips + random.integers(2, size=courses)) % 2)
         return found
 
-    def _forward(self, costates: np.ndarray, slopes: np.ndarray | None) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        state, chosen, held = self._started(costates[0]), [], []
+    def _forward(
+        self, costates: np.ndarray, slopes: np.ndarray | None
+    ) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+        state, chosen, held, jumped = self._started(costates[0]), [], [], []
         limit = self.rest_limit and self.rest_limit.anew()
         self._seen(state)
         for number, costate in enumerate(costates):
             part = self.parts[number // _PIECES % len(self.parts)]
             if number % _PIECES == 0:
-                state = self._sampled(part, state, costate, number)
-                if limit and number // _PIECES % len(self.parts) == 0:
-                    state = limit.cut(state)
+                if not part.of.late:
+                    now = self._soon(part, state, costates, number)
+                jumps = ~now if part.of.late else now
+                after = self._sampled(part, state, costate)
+                after = limit.cut(after, jumps) if limit and part.of.samples else after
+                state = np.where(jumps[:, None], after, state)
+                jumped.append(jumps)
             ahead = np.einsum("vij,cj->cvi", part.steps, state)
             push = _pushes(part.added, costate)
             ways = np.sign(push)
@@ -232,7 +294,16 @@ class _Search:
                 limit.follow(state, following)
             state = following
             self._seen(state)
-        return chosen, held
+        return chosen, held, jumped
+
+    def _soon(self, part: _Pieces, state: np.ndarray, costates: np.ndarray, number: int) -> np.ndarray:
+        """Courses that jump at once: where it may be left to the next event, those for which the costate is better."""
+        if not part.of.soon or number + _PIECES >= len(costates) or (self.punctual and number == 0):
+            return np.ones(len(state), dtype=bool)
+        following = self.parts[(number // _PIECES + 1) % len(self.parts)]
+        on = part.moved_on()
+        gained = state @ (on @ part.jump - part.jump @ on).T
+        return np.asarray(np.einsum("ci,ci->c", costates[number + _PIECES] @ following.steps[0], gained) >= 0)
 
     def _seen(self, state: np.ndarray) -> None:
         slip, rate = np.abs(state[:, :2]).max(axis=0)
@@ -246,10 +317,10 @@ class _Search:
             state[:, 1] = np.maximum(state[:, 1], -self.back)
         return np.asarray(state)
 
-    def _sampled(self, part: _Pieces, state: np.ndarray, costate: np.ndarray, number: int) -> np.ndarray:
-        """After a jump; the first of a period hears noise, for which the costate is that after the first piece."""
+    def _sampled(self, part: _Pieces, state: np.ndarray, costate: np.ndarray) -> np.ndarray:
+        """After a jump; that of a sample hears noise, for which the costate is that after the first piece."""
         after: np.ndarray = state @ part.jump.T
-        if number // _PIECES % len(self.parts):
+        if not part.of.samples:
             return after
         noise = self.noise * np.sign(costate @ part.steps[0] @ self.heard.T)
         return np.asarray(after + noise @ self.heard + self._beside_the_line(state[:, :2] + noise))
@@ -275,14 +346,15 @@ class _Search:
             state[:, -1] = np.clip(state[:, -1], -self.limit, self.limit)
         return mask
 
-    def _backward(self, chosen: list[np.ndarray], held: list[np.ndarray]) -> np.ndarray:
+    def _backward(self, chosen: list[np.ndarray], held: list[np.ndarray], jumped: list[np.ndarray]) -> np.ndarray:
         costate, found = self.aim.copy(), []
         for number in reversed(range(len(chosen))):
             part = self.parts[number // _PIECES % len(self.parts)]
             costate = np.where(held[number], 0, costate)
             found.append(costate)
             costate = np.einsum("cij,ci->cj", part.steps[chosen[number]], costate)
-            costate = costate @ part.jump if number % _PIECES == 0 else costate
+            if number % _PIECES == 0:
+                costate = np.where(jumped[number // _PIECES][:, None], costate @ part.jump, costate)
         return np.array(found[::-1])
 
 
@@ -350,14 +422,14 @@ def _filled(column: Row, size: int) -> np.ndarray:
     return np.array([*column, *[0] * (size - len(column))], dtype=float)
 
 
-def _flowing(flow: np.ndarray) -> Segment:
+def _flowing(flow: np.ndarray) -> _Event:
     """A period of a loop without jumps."""
     still = tuple(tuple(Fraction(i == j) for j in range(len(flow))) for i in range(len(flow)))
-    return Segment(jump=still, duration=Fraction(1 / max(abs(np.linalg.eigvals(flow)))))
+    return _Event(still, Fraction(1 / max(abs(np.linalg.eigvals(flow)))), samples=True)
 
 
-def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, jump: np.ndarray, length: float) -> _Pieces:
-    size, count = inputs.shape
+def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, event: _Event) -> _Pieces:
+    (size, count), length = inputs.shape, float(event.duration) / _PIECES
     steps, added = [], []
     for flow in vertices:
         whole = np.zeros((size + count, size + count))
@@ -365,14 +437,15 @@ def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, jump: np.ndarray, le
         found: Any = expm(whole * length)
         steps.append(found[:size, :size])
         added.append(found[:size, size:])
-    return _Pieces(jump, np.array(steps), np.array(added), length)
+    return _Pieces(event, _widened(event.jump, size), np.array(steps), np.array(added), length)
 
 
 def _periods_to_forget(parts: list[_Pieces], size: int) -> int:
     """How many periods a loop of so many states remembers at the vertex that forgets last, within limits."""
     maps = np.eye(parts[0].jump.shape[0])[None]
     for part in parts:
-        maps = np.linalg.matrix_power(part.steps, _PIECES) @ part.jump @ maps
+        jump = np.eye(len(part.jump)) if part.of.late else part.jump
+        maps = np.linalg.matrix_power(part.steps, _PIECES) @ jump @ maps
     kept = np.abs(np.linalg.eigvals(maps[:, :size, :size])).max()
     pace = -np.log(np.clip(kept, 1e-9, 1 - 1e-9))
     return int(np.clip(np.ceil(np.log(_FORGOTTEN) / pace), _PERIODS, _MOST_PERIODS))

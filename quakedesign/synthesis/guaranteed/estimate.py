@@ -36,7 +36,8 @@ def estimated(task: Task, held: Held) -> Estimate | None:
     gains = gains_of(held.loop(task))
     if gains is None:
         return None
-    return Estimate(bounds_from(task, gains, held.law.root, held.step, held.noise), max(gains["slip_error", "drift"]))
+    bounds = bounds_from(task, gains, held.law.root, held.step, held.noise, None, held.jitter)
+    return Estimate(bounds, max(gains["slip_error", "drift"]))
 
 
 def slowly_estimated(task: Task, held: Held) -> Estimate | None:
@@ -50,7 +51,7 @@ def slowly_estimated(task: Task, held: Held) -> Estimate | None:
         found.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
     whole = {key: tuple(v for gains in found for v in gains[key]) for key in found[0]}
     spread = GainSpread(half=_SPREAD * (high - low), aged=Fraction(0))
-    bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread)
+    bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.jitter)
     return Estimate(bounds, max(whole["slip_error", "drift"]))
 
 
@@ -79,6 +80,9 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
     doublings = int(np.ceil(np.log2(max(np.log(_FORGOTTEN) / np.log(max(slowest.others, 0.1)), 2))))
     rows = np.array(list(loop.outputs.values()), dtype=float)
     gains = {name: _of_input(entry, flows, doublings, rows, enters, slowest) for name, entry, enters in _entries(loop)}
+    for name, entries in _pulses(loop, flows):
+        sides = [_of_input(entry, flows, doublings, rows, loop.pulses[name].first, slowest) for entry in entries]
+        gains[name] = np.sum(sides, axis=0)
     gains |= {START: _free(np.array(loop.start, dtype=float).T, flows, doublings, rows)} if loop.start else {}
     return {
         (output, name): tuple(float(v + loop.at_once.get((output, name), 0)) for v in found)
@@ -129,6 +133,14 @@ def _entries(loop: PeriodicLoop) -> Iterator[tuple[str, np.ndarray, int | None]]
     for name, fading in loop.fading.items():
         area = fading.height / fading.rate + fading.floor * loop.period
         yield name, np.array(fading.entry, float) * float(area), fading.first
+
+
+def _pulses(loop: PeriodicLoop, flows: list[_Flow]) -> Iterator[tuple[str, list[np.ndarray]]]:
+    """Every input that is there near a jump alone, with the half sum and the half difference of both sides of that."""
+    for name, pulse in loop.pulses.items():
+        entry = np.array(pulse.entry, float)
+        before, after = flows[pulse.first].jump @ entry * float(pulse.before), entry * float(pulse.after)
+        yield name, [(before + after) / 2, (before - after) / 2]
 
 
 def _of_input(

@@ -18,6 +18,7 @@ from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import Held, continuous_peaks, guarantee, task_of
 from quakedesign.certificates.guarantee import task as package_task
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, save_guarantee
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.errors import CertificateError
 from quakedesign.fault import load_fault
 from quakedesign.loop import (
@@ -78,6 +79,11 @@ LOOPS = {
     "noisy": Held(law=ESTIMATE, step=STEP, **NOISY),
     "observer": Held(law=OBSERVER, step=STEP, slip_noise=F(1, 10**6)),
     "noisy deadbeat": replace(implicit("1", "1"), **NOISY),
+    "jittery": Held(law=ESTIMATE, step=STEP, jitter=F("0.002"), delay_jitter=F("0.001")),
+    "jittery deadbeat": replace(implicit("1", "1"), jitter=F("0.001")),
+    "jittery lag": Held(law=ESTIMATE, step=F("0.1"), lag=F("0.01"), jitter=F("0.0002"), delay_jitter=F("0.0002")),
+    "jittery and late": Held(law=ESTIMATE, step=STEP, delay=F("0.02"), jitter=F("0.001")),
+    "paced": Held(law=ESTIMATE, step=STEP, pump=Pump(rate=F(20_000_000), least=F(-(10**8)), largest=F(10**8))),
     "noisy sluggish": replace(implicit("4/5", "97/100", "1/1000000"), slip_noise=F(1, 10**6)),
 }
 PATHS_OF = {
@@ -242,6 +248,9 @@ CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "
     [(loop, name) for loop in ("estimate", "sluggish", "continuous") for name in CLAIMS]
     + [("rock", "slip_rate_error"), ("lagging rock", "slip_error")]
     + [pytest.param("rock", "largest_pressure", marks=pytest.mark.slow)]
+    + [("jittery", name) for name in ("slip_rate_error", "largest_pressure", "largest_step")]
+    + [("jittery deadbeat", "slip_error"), ("jittery lag", "largest_asked"), ("paced", "largest_step")]
+    + [("jittery and late", "least_pressure")]
     + [("observer", "slip_rate_error"), ("noisy sluggish", "slip_error"), ("noisy", "least_pressure")],
 )
 def test_one_percent_less_is_refused_by_both(name, loop):
@@ -271,6 +280,16 @@ WORSE += [
     ("noisy", ("loop", "noise", "rate"), F(21, 20)),
     ("noisy deadbeat", ("loop", "noise", "slip"), F(3, 2)),
     ("noisy sluggish", ("loop", "noise", "slip"), F(21, 20)),
+    ("jittery", ("loop", "jitter", "measured"), F(21, 20)),
+    ("jittery", ("loop", "jitter", "delay"), F(21, 20)),
+    ("jittery deadbeat", ("loop", "jitter", "measured"), F(21, 20)),
+    ("jittery lag", ("loop", "jitter", "delay"), F(21, 20)),
+    ("jittery and late", ("loop", "jitter", "measured"), F(21, 20)),
+    ("paced", ("loop", "pump", "rate"), F(9, 10)),
+    ("paced", ("loop", "pump", "ramp"), F(9, 10)),
+    ("paced", ("loop", "pump", "ramp"), F(11, 10)),
+    ("paced", ("loop", "pump", "least"), F(1, 8)),
+    ("paced", ("loop", "pump", "largest"), F(1, 8)),
     ("observer", ("loop", "noise", "slip"), F(21, 20)),
     ("observer", ("loop", "measured", 1, 0), F(3, 2)),
     ("rock", ("loop", "diffusion"), F(11, 10)),
@@ -365,6 +384,10 @@ PATHS += [(NESTED, ("loop", "root", *path)) for path in places(NESTED["loop"]["r
 PATHS += [(NESTED, ("loop", key)) for key in ("feedback", "measured", "update")]
 NOISY_RAW = json.loads(guarantee_text(claim("noisy")))
 PATHS += [(NOISY_RAW, ("loop", "noise", name)) for name in ("slip", "rate")]
+JITTERY_RAW, PACED_RAW = (json.loads(guarantee_text(claim(name))) for name in ("jittery", "paced"))
+PATHS += [(JITTERY_RAW, ("loop", "jitter", *path)) for path in ((), ("measured",), ("delay",))]
+PATHS += [(PACED_RAW, ("loop", "pump", *path)) for path in ((), ("least",), ("largest",), ("rate",), ("ramp",))]
+PATHS += [(PACED_RAW, ("claims", "largest_step"))]
 
 
 @pytest.fixture

@@ -128,7 +128,7 @@ def test_bounds_are_asked_for_the_spread_of_the_slip_error_that_is_claimed(asked
     claim = Guarantee(task=TASK, held=HELD, claims=claims_of(F(1, 3)), slow_gain=SLOW)
     assert claim.bounds() is BOUNDS
     spread = SLOW.spread(TASK, F(1, 3))
-    assert questions == [(TASK, {key: 2 * v for key, v in GAINS.items()}, None, F(1, 10), HELD.noise, spread)]
+    assert questions == [(TASK, {key: 2 * v for key, v in GAINS.items()}, None, F(1, 10), HELD.noise, spread, F(0))]
 
 
 @pytest.mark.parametrize(

@@ -132,3 +132,19 @@ def test_the_reason_is_the_largest_share_in_the_worst_part_of_the_period():
     assert isinstance(found, NoGuarantee)
     assert found.reason.endswith("the range of friction's slope in slip alone makes 3")
     assert 3 + 2 * TASK.half_ranges["push"] <= found.small_gain <= F(1001, 1000) * (3 + 2 * TASK.half_ranges["push"])
+
+
+def test_what_is_measured_at_another_time_is_off_by_what_moves_until_then():
+    """J = 1/50 s: J(|e2| + r′), and J(|r″| + F) with J times the largest slopes for e1, e2 and the push."""
+    jitter, noise = F(1, 50), {"slip_noise": F(1, 3), "rate_noise": F(0)}
+    root = ImplicitRoot(pull=PULL, slopes=(F(1, 2), F(1)), remainder=F(1, 9))
+    found = {c.name: c for c in channels_of(TASK, root, STEP, noise, None, jitter)}
+    first, second = TASK.reference_rates
+    force = TASK.reference_force + TASK.amplitude
+    assert found["slip_noise"].own == F(1, 3) + jitter * first
+    assert found["slip_noise"].shares == {"slip_rate_error": jitter}
+    assert found["rate_noise"].own == jitter * (second + force)
+    largest = [max(map(abs, ends)) for ends in (TASK.slip_chord, TASK.rate_chord, TASK.beta)]
+    assert list(found["rate_noise"].shares) == ["slip_error", "slip_rate_error", "push"]
+    assert list(found["rate_noise"].shares.values()) == [jitter * v for v in largest]
+    assert found["root"].own == F(1, 9) + (F(1, 3) + jitter * first) * F(1, 4) / STEP

@@ -18,10 +18,11 @@ from quakedesign.certificates.guarantee import (
     statement,
     task_of,
 )
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.statement import _above, sentence_of
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.loop import ContinuousLaw, ImplicitRoot, LinearLaw, Power, compensated, summed_integrals
+from quakedesign.loop import ContinuousLaw, ImplicitRoot, Instants, LinearLaw, Power, compensated, summed_integrals
 
 TASK = task_of(load_fault("real-fault"))
 CLAIMS = Claims(
@@ -32,6 +33,7 @@ CLAIMS = Claims(
     largest_pressure=UpperBound(F(20, 3)),
     least_asked=LowerBound(F(-13, 3)),
     largest_asked=UpperBound(F(17, 3)),
+    largest_step=UpperBound(F(5, 3)),
 )
 BOUNDS = Bounds(slip_error=F(0), slip_rate_error=F(1, 7), push=3 * TASK.authority, small_gain=F(1, 2))
 NONE = NoGuarantee(reason="none", small_gain=None)
@@ -127,6 +129,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     )
     quiet = Held(law=alone, step=F(1))
     around = ("delay", "lag", "diffusion", "slip_noise", "rate_noise", "initial_slip", "initial_slip_rate")
+    around += ("jitter", "delay_jitter")
     assert (quiet.noise, quiet.around) == ({}, dict.fromkeys(around, 0) | {"pump": None})
     said = Guarantee(task=TASK, held=quiet, claims=CLAIMS).sentence()
     assert "held over 1 s, with the slip alone measured, for every" in said
@@ -141,7 +144,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
 def test_claims_are_shown_as_the_exact_numbers():
     assert CLAIMS.to_dict() == {
         "slip_error": "1/3", "slip_rate_error": "1/7", "peak_slip_rate": "2/7", "pressure": ["-10/3", "20/3"],
-        "asked_pressure": ["-13/3", "17/3"],
+        "asked_pressure": ["-13/3", "17/3"], "largest_step": "5/3",
     }  # fmt: skip
 
 
@@ -151,7 +154,7 @@ def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     assert said.startswith("from rest, held over 0.1 s, 0.02 s late, through a lag of 0.03 s, for every disturbance")
     assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith("from rest, held over 0.1 s, for every")
     assert "never exceeds 0.286 m/s, the slip stays within 0.334 m of the reference" in said
-    assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa (for" in said
+    assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa, that asked" in said
 
 
 def test_a_law_runs_once_a_step_without_delay_and_lag_unless_it_has_an_implicit_root():
@@ -228,7 +231,7 @@ def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monk
     late = replace(ROOTED, delay=F(1, 3), lag=F(1, 5), rate_noise=F(1, 9))
     claim = Guarantee(task=TASK, held=late, claims=CLAIMS)
     assert claim.bounds() is NONE
-    assert asked == [(TASK, claim.loop, SIGN, {"rate_noise": F(1, 9)})]
+    assert asked == [(TASK, claim.loop, SIGN, {"rate_noise": F(1, 9)}, F(0))]
     assert tuple(claim.loop.sampled) == ("root", "rate_noise")
     assert [segment.duration for segment in claim.loop.segments] == [F(1, 3), F(2, 3)]
 
@@ -249,3 +252,48 @@ def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
     for none in (guarantee(TASK, HELD), continuous.continuous_peaks(TASK, law)):
         assert isinstance(none, NoGuarantee)
         assert none.reason.endswith("the effective normal stress is 50 MPa: the fault may open")
+
+
+def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
+    held = replace(HELD, jitter=F(1, 300), delay_jitter=F(1, 150))
+    said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
+    told = "held over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s of when"
+    assert told in said
+    assert "5.67 Pa, that asked for changes by at most 1.67 Pa a sample (for" in said
+    late = Guarantee(task=TASK, held=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
+    assert "held over 0.1 s, each pressure within 0.00666666 s of when it is due, for every" in late
+    assert (held.noise, HELD.noise) == ({"slip_noise": 0, "rate_noise": 0}, {})
+    assert tuple(held.loop(TASK).sampled) == ("slip_noise", "rate_noise")
+    alone = replace(HELD.law, feedback=(F(1), F(0)), measured=tuple((row[0], F(0)) for row in HELD.law.measured))
+    assert replace(held, law=alone).noise == {"slip_noise": 0}
+    paced = replace(held, pump=Pump(rate=F(5)), ramp=F(1, 50))
+    assert paced.instants == Instants(measured=F(1, 300), arrived=F(1, 100), ramp=F(1, 50))
+    assert (HELD.instants, replace(HELD, pump=Pump(least=F(-1), largest=F(1))).instants) == (None, None)
+    assert "with a pump of 5 Pa/s, whose limits are never" in Guarantee(task=TASK, held=paced, claims=CLAIMS).sentence()
+    for name in ("jitter", "delay_jitter", "ramp"):
+        with pytest.raises(ParameterError, match="jitter must be 0 or more"):
+            replace(HELD, **{name: F(-1, 10**9)})
+
+
+def test_what_a_law_is_told_is_off_by_noise_and_by_the_reference_until_it_is_measured():
+    held = replace(HELD, slip_noise=F(1, 3), rate_noise=F(1, 7), jitter=F(1, 50))
+    first, second = TASK.reference_rates
+    assert held.told(TASK, (F(1), F(2))) == (F(4, 3) + first / 50, F(15, 7) + second / 50)
+
+
+def test_what_comes_late_may_leave_a_root_its_lines(monkeypatch):
+    """w = e2 − sign(e1 + w)/3 is 0 where |e2| ≤ 1/3, of what is compared with a reference r″ away as well."""
+    told = replace(BOUNDS, slip_rate_error=F(1, 3) - F(1, 10**12))
+    monkeypatch.setattr(statement, "certified_bounds", lambda *_: told)
+    for jitter, verdict in ((F(0), Verdict.PROVED), (F(1, 10), Verdict.UNDECIDED)):
+        late = Guarantee(task=TASK, held=replace(ROOTED, jitter=jitter), claims=Claims.of(TASK, told))
+        assert late.check() is verdict
+
+
+@pytest.mark.parametrize("changes", [{"jitter": F(1, 50)}, {"delay_jitter": F(1, 50)}, {"ramp": F(1, 50)}])
+def test_a_limit_at_rest_waits_for_what_is_late(changes):
+    held = replace(HELD, law=replace(HELD.law, applied=(F(0), F(0))))
+    plain = Guarantee(task=TASK, held=held, claims=Claims.of(TASK, BOUNDS))
+    later = replace(plain, held=replace(plain.held, **changes))
+    moved = later.rest_limit.width - plain.rest_limit.width
+    assert float(moved) == pytest.approx(float(plain.rest_limit.per_slip * TASK.reference_rates[0]) / 50, rel=0.01)

@@ -40,6 +40,18 @@ class Held:
     first: object = None
 
 
+@dataclass(frozen=True)
+class Moved:
+    """By how many small steps every measurement and every pressure of every course is late (periods × courses).
+
+    A pressure that arrives is reached at a rate [m/s³], from b·p of the one before, or at once.
+    """
+
+    measured: np.ndarray
+    arrived: np.ndarray
+    rate: object = None
+
+
 def numbers(claim, force=None):
     """What a guarantee says of its loop; a bound of φ of its own in place of amplitude and reference."""
     held, law, task = claim.held, claim.held.law, claim.task
@@ -79,13 +91,14 @@ def middle(ends):
     return (ends[0] + ends[1]) / 2
 
 
-def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None, start=None):
+def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None, start=None, off=None):
     """Largest |e1| and |e2| of every course and the errors at the end.
 
     choose(k, e, v) gives s, w, β and φ for one small step from its number, the errors (2 × courses) and b·p; kick(k) is
     an amount added to e2 before a step, hear(k) to both errors that the law is told
     (2 × courses); start has the errors at first (2 × courses), 0 unless given; back is the slip rate of the reference
-    on a plant that never slides backward.
+    on a plant that never slides backward; off says what is late, all else being on time. Then what is told is the error
+    at that time, and a pressure arrives no sooner than it is measured.
     """
     size, h = len(held.C), held.step / pieces
     late = round(held.delay / h)
@@ -97,8 +110,11 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None,
     )
     fade, spread = np.exp(-rates * h / 2)[:, None], np.zeros((len(shares), courses))
     waiting, largest = [], np.abs(e)
+    schedule = None if off is None else _Schedule(held, off, pieces, late, courses)
     for k in range(periods * pieces):
-        if k % pieces == 0:
+        if schedule is not None:
+            v = schedule.pressure(k, e)
+        elif k % pieces == 0:
             told = e if hear is None else e + hear(k)
             z = held.first @ told if k == 0 and held.first is not None else z
             y = told if held.ends is None else np.vstack([told, held.ends(told[0], told[1])])
@@ -126,6 +142,37 @@ def run(held, periods, pieces, choose, courses, kick=None, back=None, hear=None,
             e[1] = np.maximum(e[1], -back)
         largest = np.maximum(largest, np.abs(e))
     return largest, e
+
+
+class _Schedule:
+    """Measurements and pressures of courses that differ in when they happen."""
+
+    def __init__(self, held, off, pieces, late, courses):
+        self.held, self.off, self.pieces, self.late = held, off, pieces, late
+        self.z, self.v = np.zeros((len(held.C), courses)), np.zeros(courses)
+        self.asked = np.zeros((len(off.measured), courses))
+        self.target = np.zeros(courses)
+        self.most = np.inf if off.rate is None else off.rate * held.step / pieces
+
+    def measured(self, n):
+        """When measurement n is made; the first is on time."""
+        return n * self.pieces + self.off.measured[n] * (n > 0)
+
+    def pressure(self, k, e):
+        """b·p over a small step; measurements that are due in it are made first."""
+        for n in range(max(k // self.pieces - 1, 0), min(k // self.pieces + 2, len(self.asked))):
+            now = self.measured(n) == k
+            if now.any():
+                y = e if self.held.ends is None else np.vstack([e, self.held.ends(e[0], e[1])])
+                asked = self.held.b * (self.held.C @ self.z + self.held.D @ y)
+                self.asked[n] = np.where(now, asked, self.asked[n])
+                self.z = np.where(now, self.held.F @ self.z + self.held.G @ y, self.z)
+        first = (k - self.late) // self.pieces
+        for n in range(max(first - 1, 0), min(first + 2, len(self.asked))):
+            due = np.maximum(n * self.pieces + self.late + self.off.arrived[n], self.measured(n))
+            self.target = np.where(due == k, self.asked[n], self.target)
+        self.v = self.v + np.clip(self.target - self.v, -self.most, self.most)
+        return self.v
 
 
 def nominal(held):
