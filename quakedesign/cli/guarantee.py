@@ -271,7 +271,7 @@ def _slowly(fault: Any, around: dict[str, Any], *, usual: bool, **asked: Any) ->
     if not usual or any(value for name, value in around.items() if name not in taken):
         raise ParameterError(
             "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
-            "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class or an initial "
-            "slip or slip rate. Leave them out."
+            "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class, an initial slip "
+            "or slip rate, or jitter. Leave them out."
         )
     return partial(answer_sliding, fault, **asked, **taken)

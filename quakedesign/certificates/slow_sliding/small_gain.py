@@ -174,8 +174,12 @@ def loop_of(held: Held, model: SlidingModel, task: SlidingTask) -> PeriodicLoop:
     Raises
     ------
     ParameterError
-        For a law that uses the slip rate, or a pressure that jumps in the fault.
+        For a law that uses the slip rate, a pressure that jumps in the fault, jitter or the rate of a pump.
     """
+    if held.instants is not None:
+        raise ParameterError(
+            "jitter and the rate of a pump are not known of slow sliding. Received some. Leave it out."
+        )
     if not held.law.of_slip_alone or not (held.lag or held.diffusion):
         raise ParameterError(
             "slow sliding is guaranteed of a law of the slip alone whose pressure reaches the fault through rock or a "

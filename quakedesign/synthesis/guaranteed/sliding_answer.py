@@ -131,6 +131,10 @@ def answer_sliding(
     held_over = rational(fault.sampling_time) if step is None else step
     task = sliding_task(fault, stress or Fraction(1), spread)
     pump, answers = around.pop("pump", None), []
+    if pump is not None and pump.rate is not None:
+        raise ParameterError(
+            f"the rate of a pump is not known of slow sliding. Received {float(pump.rate):g} Pa/s. Leave it out."
+        )
     for log_rate in LOG_RATES:
         answers.append(_answer(task, held_over, log_rate, around, pump, given=stress is not None))
         if answers[-1].proved:

@@ -17,6 +17,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.slow_sliding import (
     SlidingClaims,
     SlidingGuarantee,
@@ -767,3 +768,11 @@ def test_the_task_is_that_of_the_fault():
     assert exact.drift < F(1, 10**8)
     with pytest.raises(UnsupportedError):
         sliding_task(load_fault("real-fault"), F(1))
+
+
+@pytest.mark.parametrize("changes", [{"jitter": F(1)}, {"delay_jitter": F(1)}, {"pump": Pump(rate=F(1)), "ramp": F(1)}])
+def test_jitter_and_the_rate_of_a_pump_are_refused_not_ignored(changes):
+    known = parse_guarantee((PROOFS / "certificates" / "sliding_crustal-patch.json").read_text())
+    off = replace(known, held=replace(known.held, **changes))
+    with pytest.raises(ParameterError, match="are not known of slow sliding"):
+        off.check()
