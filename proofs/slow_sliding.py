@@ -131,7 +131,8 @@ def read_path(value: Any) -> tuple[Loop, Path]:
     plain |= {"noise": {"slip": given["slip_noise"], "rate": "0"}}
     still, zero = (Fraction(0), Fraction(0)), Fraction(0)
     one = Fraction(1)
-    nothing = Task("", one, still, still, (one, one), still, zero, zero, zero, True, zero, zero, zero, None, zero, True)
+    ranges, moves = (still, still, (one, one), one, still), (zero, zero, zero, True, zero, zero, zero, None)
+    nothing = Task("", one, *ranges, *moves, zero, True)
     return read_loop(plain, nothing), path
 
 

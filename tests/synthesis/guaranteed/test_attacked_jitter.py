@@ -106,10 +106,10 @@ def test_the_search_with_stick_stays_inside():
     [
         ({"jitter": "1/100"}, "0", "1/100", "0"),  # with the sample
         ({"jitter": "1/100", "delay_jitter": "1/50"}, "0", "1/100", "0"),
-        ({"delay_jitter": "1/50"}, "1/50", "0", "1/50"),  # after a sample on time
+        ({"delay_jitter": "1/50"}, "1/50", "0", "31/1600"),  # after a sample on time
         ({"jitter": "1/100", "delay": "1/20"}, "3/50", "1/100", "1/50"),
         ({"jitter": "1/100", "delay_jitter": "1/100", "delay": "1/20"}, "7/100", "1/100", "1/25"),
-        ({"jitter": "1/20", "delay": "1/20"}, "3/40", "1/40", "1/20"),  # events keep their order
+        ({"jitter": "1/20", "delay": "1/20"}, "19/256", "1/40", "31/640"),  # events keep their order
         ({"jitter": "1/100", "delay": "184/1000"}, "184/1000", "1/100", "0"),
         ({"jitter": "1/100", "initial_slip": "1"}, "0", "1/200", "0"),  # the first one is on time
     ],
@@ -141,6 +141,6 @@ def test_a_pump_is_as_slow_as_it_may_be_where_it_has_a_ramp_that_closes():
     slower = replace(claim.held, pump=Pump(rate=F(1_000_000)), ramp=F(0))
     none = guarantee(claim.task, slower, claim.slow_gain)
     assert isinstance(none, NoGuarantee)
-    assert "jitter or rise of the pressure alone needs" in none.reason
+    assert "jitter or rise of the pressure alone makes" in none.reason
     narrow = replace(claim, held=replace(claim.held, pump=Pump(rate=claim.held.pump.rate * F(9, 10))))
     assert narrow.check() is Verdict.UNDECIDED
