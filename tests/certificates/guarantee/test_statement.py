@@ -240,7 +240,7 @@ def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monk
 def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
     """With claims as wide as one likes: what counts is how far below σ′ the pressure follows to stay."""
     ends = {"least_pressure": LowerBound(F(-(10**9))), "largest_pressure": UpperBound(F(10**9))}
-    wide = replace(CLAIMS, **ends, least_asked=None, largest_asked=None)
+    wide = replace(CLAIMS, **ends, least_asked=None, largest_asked=None, largest_step=None)
     bounds = replace(BOUNDS, push=(TASK.normal_stress - off - TASK.rest_pressure[1]) * TASK.authority)
     assert wide.verdict(TASK, bounds) is (Verdict.PROVED if proved else Verdict.UNDECIDED)
     monkeypatch.setattr(statement, "_bounds", lambda *_: bounds)
