@@ -15,6 +15,7 @@ DOUBLINGS = 12  # at most 4096 periods are summed
 SHARE = 1024  # what is left of the past after those is below a 1024th, but for what the slowest mode leaves
 TURNS, ROOM = 8, 1 << 40  # of sums that are solved for to bound themselves
 MAX_WORK = 3 * 10**7  # products of integers
+MAX_SUMS = 10**8  # the same, most of them of 60 bits, many at once; a package that stops at half of it is understood
 
 
 @dataclass
@@ -178,7 +179,7 @@ def past(flows: list[Flow], rows: int) -> Past:
     sums = sums_of_product(seen, columns)
     for _ in range(DOUBLINGS):
         width = len(columns.rows[0])
-        need(2 * width * size * (size + rows) <= MAX_WORK, "the loop must forget its past sooner: it takes too long")
+        need(2 * width * size * (size + rows) <= MAX_SUMS, "the loop must forget its past sooner: it takes too long")
         following = coarse_product(period, columns)
         sums = [a + b for a, b in zip(sums, sums_of_product(seen, following), strict=True)]
         columns, period = columns.beside(following), period * period

@@ -493,9 +493,20 @@ def test_loops_that_forget_nothing_are_refused(monkeypatch):
 def test_loops_that_take_too_much_work_are_refused(events, monkeypatch):
     loop = checker.Loop([[F(-1)]], events, [[F(1)]] * 3, [], None, F(1))
     assert checker.gains(loop, [F(1)], False)
-    monkeypatch.setattr(checker, "MAX_WORK", 10)
+    monkeypatch.setattr(checker, "MAX_SUMS" if events else "MAX_WORK", 10)
     with pytest.raises(checker.Refused, match=r"must be stable, and seen to be|takes too long"):
         checker.gains(loop, [F(1)], False)
+
+
+def test_the_package_proves_nothing_that_takes_the_checker_too_long(monkeypatch):
+    """The package stops at half of the work, so that whatever it counts differently is no more."""
+    assert 2 * package._MOST_SUMS == checker.MAX_SUMS
+    given = [[-1]], [[[F(1, 2)]]], [1], [1], [1]
+    gains_of_both(*given)
+    package._norms.cache_clear()
+    monkeypatch.setattr(package, "_MOST_SUMS", 10)
+    with pytest.raises(ParameterError, match="nominal loop must be stable"):
+        gains_of_both(*given)
 
 
 # ---------------------------------------------------------------- the last unit

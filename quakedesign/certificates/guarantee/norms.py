@@ -64,6 +64,7 @@ from quakedesign.loop import PeriodicLoop
 
 _BITS = 128
 _SMALL = Fraction(1, 1 << 10)  # share of the sums that the tail may be, but for the slowest mode
+_MOST_SUMS = 5 * 10**7  # products for one input: half of what the standalone checker takes before it gives up
 _ROOM = Fraction((1 << 32) + 1, 1 << 32)  # for sums that are solved for to bound themselves
 
 
@@ -90,8 +91,9 @@ def _norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
         bounds: dict[tuple[str, str], tuple[Fraction, ...]] = {}
         flows, earlier = ([Flow.of(flow, part, past=past) for part in loop.segments] for past in (False, True))
         slow = slowest(earlier)
+        places = sum(rows.nrows() * (len(part.lengths) + 1) + rows.ncols() for part in flows)
         for name in (*loop.inputs, *loop.sampled, *loop.fading, *loop.pulses):
-            gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name), slow), rows)
+            gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name), slow, places), rows)
             bounds |= {
                 (output, name): tuple(map(upper, worst)) for output, worst in zip(loop.outputs, gains, strict=True)
             }
@@ -108,19 +110,22 @@ class _Past:
     bound: Any
 
     @classmethod
-    def of(cls, parts: list[Response], slow: list[Any]) -> "_Past":
+    def of(cls, parts: list[Response], slow: list[Any], rows: int) -> "_Past":
         size = parts[0].of.jump.nrows()
         later, ends, rest = identity(size), list[Any](), arb_mat(size, 1)
         for part in reversed(parts):
             own, remainder = part.columns(later)
             ends, rest, later = [*own, *ends], rest + remainder, later * part.of.whole
-        return cls._summed(parts, later, beside([*ends, _diagonal(rest)]), slow)
+        return cls._summed(parts, later, beside([*ends, _diagonal(rest)]), slow, rows)
 
     @classmethod
-    def _summed(cls, parts: list[Response], period: Any, columns: Any, slow: list[Any]) -> "_Past":
+    def _summed(cls, parts: list[Response], period: Any, columns: Any, slow: list[Any], rows: int) -> "_Past":
+        size = period.nrows()
         place, seen, back = seen_alone(slow, _row_sums(columns))
         sums = _row_sums(seen * columns)
         for _ in range(MOST_DOUBLINGS):
+            if 2 * columns.ncols() * size * (size + rows) > _MOST_SUMS:
+                break
             following = period * columns
             sums = [a + b for a, b in zip(sums, _row_sums(seen * following), strict=True)]
             columns, period = beside([columns, following]), period * period
