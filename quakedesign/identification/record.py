@@ -28,6 +28,7 @@ COLUMNS = {
 
 _SHEAR = {"shear_stress": "normal_stress", "shear_force": "normal_force"}
 _LARGEST_FILE = 1 << 24
+_PLAUSIBLE = 0.01, 3.0  # median friction [-]
 MOST_SAMPLES = 10000
 _HEADING = re.compile(r"\s*(\w[\w \-]*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))?\s*")
 _BETWEEN_WORDS = re.compile(r"[ \-]+")
@@ -194,7 +195,29 @@ def _friction(given: dict[str, "np.ndarray"], stress: float | None) -> "tuple[np
         raise RecordError(f"{measured} needs the column {across}{remedy}. Received {', '.join(given)}. {then}")
     if np.any(normal <= 0):
         raise RecordError(f"{across} must be positive. Received {np.min(normal):.6g} {unit}. Compression is positive.")
-    return given[measured] / (1 if measured == "friction" else normal), normal, unit
+    friction = given[measured] / (1 if measured == "friction" else normal)
+    _require_plausible(friction, measured, across)
+    return friction, normal, unit
+
+
+def _require_plausible(friction: "np.ndarray", measured: str, across: str) -> None:
+    """Refuse a friction that no rock has, which costs minutes of a fit, with its likely cause.
+
+    Raises
+    ------
+    RecordError
+    """
+    middle = float(np.median(friction))
+    least, largest = _PLAUSIBLE
+    if middle <= 0:
+        raise RecordError(
+            f"{measured} must be positive. Received a median of {middle:.3g} of friction. Change its sign."
+        )
+    if not least <= middle <= largest:
+        by = "column" if measured == "friction" else f"units of {measured} and {across}, of --normal-stress too"
+        raise RecordError(
+            f"friction must have a median from {least:g} to {largest:g}. Received {middle:.3g}. Check the {by}."
+        )
 
 
 def _load_point(given: dict[str, "np.ndarray"]) -> "np.ndarray | None":

@@ -15,6 +15,7 @@ from quakedesign.report.figure_files import FORMATS, figure_bytes
 
 _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _MOST_OUTLIERS = 8
+_LONG = 0.01  # D_c [m] that no gouge of a laboratory has
 
 
 def identification_lines(identification: Identification) -> list[str]:
@@ -45,7 +46,12 @@ def _row(estimate: Estimate) -> str:
 
 
 def _warnings(identification: Identification) -> list[str]:
-    told = []
+    told, critical = [], identification.estimates.get("critical_slip")
+    if critical is not None and identification.law.state_names and critical.value > _LONG:
+        told.append(
+            f"D_c of {100 * critical.value:.3g} cm is far longer than the some 10 to 100 um of laboratories: check the "
+            "unit of the displacement"
+        )
     if identification.fit.correlation > 2:
         told.append(
             f"residuals are correlated over {identification.fit.correlation:.1f} samples: law or machine explain the "

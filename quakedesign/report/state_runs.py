@@ -10,6 +10,9 @@ if TYPE_CHECKING:
 
 _YEAR = 31_557_600.0
 _MOST_EVENTS = 8
+FASTEST_PLATE = 1e-8
+"""Rate of loading [m/s] that no plate has: 0.3 m a year."""
+_LABORATORY = 10.0  # length of a fault [m] below which what loads it is a machine
 
 
 def state_run_lines(answer: dict[str, Any]) -> list[str]:
@@ -44,7 +47,19 @@ def cycle_sentence(run: "StateRun") -> str:
         return f"Without control: the fault creeps, {peak}"
     size = "" if cycle["magnitude"] is None else f" of magnitude {cycle['magnitude']:.2f}"
     again = "" if cycle["recurrence_interval"] is None else f" every {_time(cycle['recurrence_interval'])}"
-    return f"Without control: {run.outcome.kind}{size}{again}, {peak}, loaded at {run.loading_rate:.3g} m/s"
+    return f"Without control: {run.outcome.kind}{size}{again}, {peak}, {_loading(run)}"
+
+
+def _loading(run: "StateRun") -> str:
+    """The rate of loading of a cycle, its plant, and that the rate may be one that nobody has chosen."""
+    moved = "with inertia" if run.provenance["plant"] == "smooth" else "quasi-dynamic"
+    loaded = f"loaded at {run.loading_rate:.3g} m/s ({moved})"
+    if run.loading_rate <= FASTEST_PLATE or run.fault.length < _LABORATORY:
+        return loaded
+    return (
+        f"{loaded}, FASTER than any plate: that is reference_rate of [friction]; for how often it breaks put in the "
+        "rate of the plates there, such as '1 nm/s' (30 mm a year)"
+    )
 
 
 def left_out_lines(comparison: "Compared") -> list[str]:

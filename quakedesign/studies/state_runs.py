@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.errors import ParameterError, SimulationError, UnknownNameError, require_known
 from quakedesign.fault import Disturbance, Fault, SlidingReference
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop import SlidingModel
@@ -29,6 +29,7 @@ from quakedesign.synthesis.linear.plant.sliding_model import growth_rate, slidin
 from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
 
 _RTOL = 1e-8
+_NATURAL = (True, "radau"), (True, "cvodes"), (False, "cvodes")  # inertia, method: of cycles, in this order
 _UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
 _SWINGS = 4  # of the stress at least, in a run over a task
 
@@ -193,11 +194,25 @@ def run_state(
 
 
 def natural_run(fault: Fault) -> StateRun:
-    """What a fault does that is loaded at the reference rate of its law, with inertia: its cycle, or that it creeps."""
+    """What a fault does that is loaded at the reference rate of its law, with inertia: its cycle, or that it creeps.
+
+    Where one method cannot go on another one is taken, and without inertia if there is none: the run says which.
+
+    Raises
+    ------
+    SimulationError
+        Where none can.
+    """
     began, rate = perf_counter(), fault.friction.operating_rate
-    run = cycles(fault, rate, inertia=True, method="radau", rtol=_RTOL)
     start = disturbed(fault, rate)
-    return StateRun(fault=fault, loading_rate=rate, start=start, trajectory=run, seconds=perf_counter() - began)
+    for inertia, method in _NATURAL:
+        try:
+            run = cycles(fault, rate, inertia=inertia, method=method, rtol=_RTOL)
+        except SimulationError as error:
+            failed = error
+            continue
+        return StateRun(fault=fault, loading_rate=rate, start=start, trajectory=run, seconds=perf_counter() - began)
+    raise SimulationError(f"the natural cycle could not be computed: {failed}") from failed
 
 
 def designed_run(design: Design, natural_peak: float | None, progress: Callable[[float], None]) -> SlidingRun:

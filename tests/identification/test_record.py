@@ -1,9 +1,12 @@
 """Records are read with their units; what is wrong is said in one line."""
 
+import re
+
 import numpy as np
 import pytest
 
 from quakedesign.errors import QuakedesignError, RecordError
+from quakedesign.fault.units import si_value
 from quakedesign.identification import read_record
 
 HEAD = "time [ms], load_point_displacement [um], shear_stress [MPa], normal_stress [kPa]"
@@ -95,3 +98,18 @@ def test_other_signs_between_columns_are_named(tmp_path, sign):
     path.write_text(f"time [s]{sign} friction\n0{sign} 0.6\n")
     with pytest.raises(RecordError, match="Put commas between columns"):
         read_record(path)
+
+
+@pytest.mark.parametrize(
+    ("shear", "normal", "said"),
+    [
+        ("-15", "25 MPa", "shear_stress must be positive. Received a median of -0.6 of friction. Change its sign."),
+        ("15", "25 Pa", "median from 0.01 to 3. Received 6e+05. Check the units"),
+        ("0.2", "25 MPa", "Received 0.008. Check the units of shear_stress and normal_stress, of --normal-stress too."),
+    ],
+)
+def test_friction_that_no_rock_has_is_refused_with_its_likely_cause(shear, normal, said, tmp_path):
+    path = tmp_path / "wrong.csv"
+    path.write_text("time [s], load_point_displacement [um], shear_stress [MPa]\n" + f"0, 0, {shear}\n1, 1, {shear}\n")
+    with pytest.raises(RecordError, match=re.escape(said)):
+        read_record(path, normal_stress=si_value(normal, "Pa", "normal stress"))

@@ -15,10 +15,11 @@ from rich.console import Console
 from quakedesign import compare
 from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.cli import main
-from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.errors import ParameterError, SimulationError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.report.folder import write_folder
 from quakedesign.report.sliding_figures import cycle
+from quakedesign.report.state_runs import cycle_sentence
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
 from quakedesign.simulation.starting_state import sliding
@@ -184,3 +185,31 @@ def test_a_cycle_is_drawn_in_a_unit_that_suits_it(last, unit):
     assert drawn.axes[0].lines[0].get_xdata()[-1] == pytest.approx(
         last / {"min": 60, "s": 1, "years": 31_557_600}[unit]
     )
+
+
+def test_a_cycle_that_one_method_cannot_follow_is_computed_by_another(monkeypatch):
+    still = simulate_state(SHORT, 1e-9, duration=1e7, inertia=False, method="dop853")
+    tried = []
+
+    def cycles(fault, rate, *, inertia, method, rtol):
+        tried.append((inertia, method))
+        if inertia:
+            raise SimulationError("the integration stopped")
+        return still
+
+    monkeypatch.setattr(state_runs, "cycles", cycles)
+    assert state_runs.natural_run(SHORT).trajectory is still
+    assert tried == [(True, "radau"), (True, "cvodes"), (False, "cvodes")]
+    monkeypatch.setattr(state_runs, "_NATURAL", ((True, "radau"),))
+    with pytest.raises(SimulationError, match="natural cycle could not be computed: the integration stopped"):
+        state_runs.natural_run(SHORT)
+
+
+@pytest.mark.parametrize(("rate", "length", "warned"), [(1e-6, 4e3, True), (1e-6, 1.0, False), (1e-9, 4e3, False)])
+def test_a_fault_that_is_loaded_faster_than_any_plate_is_told_which_key_says_so(rate, length, warned):
+    event = {"magnitude": 5.7, "recurrence_interval": 9e5}
+    outcome = SimpleNamespace(kind="earthquake", peak_slip_rate=0.3)
+    run = {"cycle": event, "outcome": outcome, "slip_events": (event,), "provenance": {"plant": "smooth"}}
+    said = cycle_sentence(SimpleNamespace(fault=SimpleNamespace(length=length), loading_rate=rate, **run))
+    assert f"loaded at {rate:.3g} m/s (with inertia)" in said
+    assert ("FASTER than any plate: that is reference_rate of [friction]" in said) == warned

@@ -34,7 +34,7 @@ class RateAndState(FrictionLaw):
     critical_slip : float
         d_c [m], slip over which the state evolves, positive.
     reference_rate : float
-        v_0 [m/s], positive.
+        v_0 [m/s], positive, at which the fault is loaded in its natural cycle.
     slowest_rate, fastest_rate : float
         v_s and v_f [m/s], ends of the working range, 0 < v_s ≤ v_0 ≤ v_f.
     stress_sensitivity : float
