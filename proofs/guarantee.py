@@ -100,6 +100,7 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         off = f", measured slip within {loop['noise']['slip']} m of the true one{rate}"
     if "jitter" in loop:
         measured, late = (loop["jitter"][name] for name in ("measured", "delay"))
+        off += f", each a mean over {loop['jitter']['mean']} s around its time" if "mean" in loop["jitter"] else ""
         off += f", measurements within {measured} s of their instants, pressures within that and {late} s more"
     if "pump" in loop:
         parts = [f"from {loop['pump']['least']} Pa to {loop['pump']['largest']} Pa"] if "least" in loop["pump"] else []

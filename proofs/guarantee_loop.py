@@ -86,7 +86,7 @@ class Held:
     root: Root | None
     noise: tuple[Fraction, Fraction]
     first: list[Row]  # what the law makes of slip and slip rate before its first sample
-    jitter: Row  # of measurements, and of pressures besides
+    jitter: Row  # of measurements, of pressures besides, and over how long a measurement is a mean
     pump: dict[str, Fraction]
 
     def __post_init__(self) -> None:
@@ -95,6 +95,7 @@ class Held:
         self.waiting = int(whole) + (self.part > 0)
         self.valve = 2 + self.own + self.waiting
         layered = self.diffusion > 0
+        self.off = self.jitter[0] + self.jitter[2] / 2
         self.watched = any(self.jitter) or "rate" in self.pump
         self.well, self.stepped = self.valve + 1, self.watched or (layered and self.lag == 0)
         self.path = range(self.well, self.well + (self.lag > 0) + MODES * layered)
@@ -121,14 +122,14 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     events += [(arrival, step - law.part)] if law.part else []
     inputs = [unit(size)[1], drift_of(law, task.b), *([[line[size] for line in sample]] if root else [])]
     told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
-    heard = [k for k in (0, 1) if law.noise[k] or (law.jitter[0] and (k == 0 or root or uses_rate(*law.fed)))]
+    heard = [k for k in (0, 1) if law.noise[k] or (law.off and (k == 0 or root or uses_rate(*law.fed)))]
     inputs += [told[k] for k in heard]
     outputs = [unit(size)[0], unit(size)[1], push]
     cuts = BENT if law.lag else EVEN
     loop = Loop(flow, events, outputs, inputs, root, step, law.noise, cuts, start=starts_of(law, errors), pump=law.pump)
     loop = with_left_out(loop, law) if law.diffusion else loop
     loop = replace(loop, outputs=[*loop.outputs, unit(size)[law.valve]], asked=True) if law.path else loop
-    loop = replace(loop, off=law.jitter[0], told=heard)
+    loop = replace(loop, off=law.off, told=heard)
     if not law.watched:
         return loop
     return replace(loop, outputs=[*loop.outputs, unit(size)[-1]], stepped=True, pulse=pulse_of(law))
@@ -151,7 +152,7 @@ def read_held(value: Any) -> Held:
     time = number(given.get("diffusion", "0"), "diffusion")
     need("diffusion" not in more or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
     first = matrix(given["first"], "first", n, 2) if "first" in more else [[Fraction(0)] * 2] * n
-    jitter = read_jitter(given["jitter"]) if "jitter" in more else [Fraction(0)] * 2
+    jitter = read_jitter(given["jitter"]) if "jitter" in more else [Fraction(0)] * 3
     pump = read_pump(given["pump"]) if "pump" in more else {}
     law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first, jitter, pump)
     need(not (law.watched and time), "jitter and the rate of a pump must not be told of a loop through rock")
@@ -160,10 +161,12 @@ def read_held(value: Any) -> Held:
 
 
 def read_jitter(value: Any) -> Row:
-    """Read by how much measurements are early or late, and pressures besides."""
-    found = [*numbers(value, "jitter", "measured", "delay").values()]
+    """Read by how much measurements are early or late, pressures besides, and over how long one is a mean."""
+    mean = ("mean",) if type(value) is dict and "mean" in value else ()
+    found = [*numbers(value, "jitter", "measured", "delay", *mean).values()]
     need(min(found) >= 0 and any(found), "jitter must be >= 0, some of it above")
-    return found
+    need(not mean or found[2] > 0, "a mean must be over some time")
+    return found if mean else [*found, Fraction(0)]
 
 
 def read_pump(value: Any) -> dict[str, Fraction]:
@@ -180,9 +183,9 @@ def read_pump(value: Any) -> dict[str, Fraction]:
 
 def pulse_of(law: Held) -> Pulse | None:
     """When the valve's pressure may differ from that on schedule; refused where that reaches another sample."""
-    off, ramp, before = sum(law.jitter), law.pump.get("ramp", Fraction(0)), law.part or law.step
+    off, ramp, before = sum(law.jitter[:2]), law.pump.get("ramp", Fraction(0)), law.part or law.step
     after = law.step - law.part
-    apart = off <= before and off + ramp <= after and 2 * off + ramp <= law.step and 2 * law.jitter[0] <= law.step
+    apart = off <= before and off + ramp <= after and 2 * off + ramp <= law.step and 2 * law.off <= law.step
     need(apart, "a pressure must begin and end to change between two samples, and those must keep their order")
     return Pulse(int(law.part > 0), off, off + ramp, off, off + ramp / 2) if off or ramp else None
 

@@ -56,6 +56,8 @@ class Surroundings:
         By how much a measurement is early or late at most, and its pressure with it, such as '2 ms'.
     delay_jitter
         The same of the delay alone.
+    averaging_time
+        Over which the law is told means of slip and slip rate, up to each sample; the delay counts from its end.
     saturation
         Largest pressure of the pump, such as '20 MPa', and largest withdrawal unless that is given: a proof is one that
         these limits are never reached.
@@ -75,6 +77,7 @@ class Surroundings:
     initial_slip_rate: ExactMetresPerSecond = "0"
     jitter: ExactSeconds = "0"
     delay_jitter: ExactSeconds = "0"
+    averaging_time: ExactSeconds = "0"
     saturation: ExactPascals | None = None
     withdrawal: ExactPascals | None = None
     rate_limit: ExactPascalsPerSecond | None = None
@@ -89,6 +92,8 @@ class Surroundings:
         """
         told = {name: text for name, text in asdict(self).items() if text is not None}
         values: dict[str, Any] = {name: rational(text, name.replace("_", " ")) for name, text in told.items()}
+        averaging = values.pop("averaging_time")
+        values |= {"averaging": averaging, "delay": values["delay"] + max(averaging, 0) / 2}
         pump = [values.pop(name, None) for name in ("saturation", "withdrawal", "rate_limit")]
         return {**values, "pump": _pump(*pump)}
 
@@ -272,6 +277,6 @@ def _slowly(fault: Any, around: dict[str, Any], *, usual: bool, **asked: Any) ->
         raise ParameterError(
             "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
             "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class, an initial slip "
-            "or slip rate, or jitter. Leave them out."
+            "or slip rate, jitter or averaging. Leave them out."
         )
     return partial(answer_sliding, fault, **asked, **taken)

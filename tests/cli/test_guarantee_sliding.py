@@ -80,7 +80,7 @@ def test_a_stress_far_beyond_what_a_law_stands_has_no_guarantee():
     ("arguments", "said"),
     [
         (("guarantee", "crustal-patch"), "through rock or a lag"),
-        (("guarantee", "crustal-patch", "--diffusion", "833 s", "--jitter", "1 s"), "or jitter. Leave them out"),
+        (("guarantee", "crustal-patch", "--diffusion", "833 s", "--jitter", "1 s"), "jitter or averaging. Leave"),
         (("guarantee", "crustal-patch", "--diffusion", "833 s", "--rate-limit", "1 Pa/s"), "the rate of a pump is not"),
         ((*LAGGED, "--stress", "0 Pa"), "a stress above 0"),
         ((*LAGGED, "--spread", "1"), "a spread must be from 0 to below 1"),

@@ -138,6 +138,10 @@ LIMITS = [
      [{"measured": "0", "delay": "0"}, {"measured": "-1/9", "delay": "1/2"}, {"measured": "1/2", "delay": "-1/9"},
       {"measured": "51/100", "delay": "0"}, {"measured": "1/4", "delay": "26/100"}, {"measured": "1/9"},
       {"delay": "1/9"}, {"measured": "1/9", "delay": "0", "more": "0"}, {}, [], "1/9", None]),
+    (JITTERY, ("loop", "jitter"),
+     [{"measured": "0", "delay": "0", "mean": "1"}, {"measured": "1/4", "delay": "0", "mean": "1/2"}],
+     [{"measured": "0", "delay": "0", "mean": "101/100"}, {"measured": "1/4", "delay": "0", "mean": "51/100"},
+      {"measured": "1/9", "delay": "0", "mean": "0"}, {"measured": "1/9", "delay": "0", "mean": "-1"}, {"mean": "1"}]),
     (LATE, ("loop", "jitter"), [{"measured": "1/4", "delay": "0"}, {"measured": "0", "delay": "1/4"}],
      [{"measured": "26/100", "delay": "0"}, {"measured": "0", "delay": "26/100"}]),
     (changed(LATE, (("loop", "delay"), "7/4")), ("loop", "jitter", "delay"), ["5/36"], ["6/36"]),
@@ -221,6 +225,8 @@ def test_a_largest_step_is_claimed_where_it_counts_alone_and_has_to_be_for_a_pum
     assert checker.verify(changed(JITTERY, (("claims",), missing)))[2].endswith(
         "measurements within 1/9 s of their instants, pressures within that and 1/7 s more"
     )
+    mean = changed(JITTERY, (("loop", "jitter", "mean"), "1/9"), (("claims",), missing))
+    assert ", each a mean over 1/9 s around its time, measurements within 1/9 s" in checker.verify(mean)[2]
     assert read_guarantee(changed(JITTERY, (("claims",), missing))).claims.largest_step is None
 
 

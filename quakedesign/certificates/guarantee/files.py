@@ -157,6 +157,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         noise = claim.held.noise
         own |= {"noise": {name: str(noise.get(f"{name}_noise", 0)) for name in _NOISE}} if noise else {}
         jitter = dict(zip(_JITTER, (claim.held.jitter, claim.held.delay_jitter), strict=True))
+        jitter |= {"mean": claim.held.averaging} if claim.held.averaging else {}
         own |= {"jitter": {name: str(v) for name, v in jitter.items()}} if any(jitter.values()) else {}
         own |= {"pump": _pump_document(claim.held)} if claim.held.pump else {}
     return {
@@ -288,11 +289,19 @@ def _held(raw: Any, start: dict[str, Fraction]) -> Held:
     need(diffusion > 0 or "diffusion" not in given, "diffusion must be positive where it is given")
     times: dict[str, Any] = {name: read_rational(raw[name]) for name in _TIMES}
     times |= {f"{name}_noise": v for name, v in noise.items()} | start
-    jitter, delay_jitter = read_exactly(raw["jitter"], _JITTER).values() if "jitter" in given else (_ZERO, _ZERO)
-    need(min(jitter, delay_jitter) >= 0, "jitter must be 0 or more")
-    need(jitter + delay_jitter > 0 or "jitter" not in given, "jitter must be there where it is given")
+    times |= _jitter(raw["jitter"]) if "jitter" in given else {}
     times |= _pump(raw["pump"]) if "pump" in given else {}
-    return Held(law=law, diffusion=diffusion, jitter=jitter, delay_jitter=delay_jitter, **times)
+    return Held(law=law, diffusion=diffusion, **times)
+
+
+def _jitter(raw: Any) -> dict[str, Fraction]:
+    """That of measurements and of the delay, and over how long measurements are means."""
+    mean = ("mean",) * (isinstance(raw, dict) and "mean" in raw)
+    measured, delay, *over = read_exactly(raw, (*_JITTER, *mean)).values()
+    need(min(measured, delay) >= 0, "jitter must be 0 or more")
+    need(measured + delay > 0 or bool(over), "jitter must be there where it is given")
+    need(min(over, default=1) > 0, "a mean must be over some time where it is given")
+    return {"jitter": measured, "delay_jitter": delay, "averaging": over[0] if over else _ZERO}
 
 
 def _pump_document(held: Held) -> dict[str, str]:

@@ -57,7 +57,8 @@ Some of these bounds are by outputs a little later, up to t + T_s for an input a
 go on with no inputs but those that bring what has been measured or has come before t to its instant: they obey the same
 bounds, and beyond t + T_s there is none. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is not more. A root is one of what
 was measured: of e at a time up to which the bounds hold, so that E and R have no more on top than noise, J·r′ and
-J·|r″|, and ε gains δγ(N1 + J·r′)/T_s. ∎
+J·|r″|, and ε gains δγ(N1 + J·r′)/T_s. What is told may as well be a mean of e, with any weights, over times within J of
+kT_s: it is as near e(kT_s), and within the bounds if e is. ∎
 
 **Slow input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤ κ(2E + r′σ),
 σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Cut the range of β into parts with middles β_i and half widths δ. Fix t, let

@@ -57,6 +57,7 @@ class Around(TypedDict, total=False):
     initial_slip_rate: Fraction
     jitter: Fraction
     delay_jitter: Fraction
+    averaging: Fraction
     pump: Pump | None
 
 
@@ -77,6 +78,8 @@ class Held:
         Bounds of both at the start, where the reference has none, of either sign [m], [m/s].
     jitter, delay_jitter : Fraction
         By how much a measurement is early or late at most, its pressure with it [s], and the pressure besides.
+    averaging : Fraction
+        Each measurement but the first is a mean over a time around its own, at most half of this away [s].
     pump : Pump, optional
         Limits at the valve, which the loop must never reach.
     ramp : Fraction
@@ -99,6 +102,7 @@ class Held:
     initial_slip_rate: Fraction = Fraction(0)
     jitter: Fraction = Fraction(0)
     delay_jitter: Fraction = Fraction(0)
+    averaging: Fraction = Fraction(0)
     pump: Pump | None = None
     ramp: Fraction = Fraction(0)
 
@@ -113,10 +117,10 @@ class Held:
                 "a bound of noise must be 0 or more. Received "
                 f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s. Check their signs."
             )
-        if min(self.jitter, self.delay_jitter, self.ramp) < 0:
+        if min(self.jitter, self.delay_jitter, self.averaging, self.ramp) < 0:
             raise ParameterError(
-                f"jitter must be 0 or more. Received {float(self.jitter):.4g} s, of the delay "
-                f"{float(self.delay_jitter):.4g} s. Leave out the sign."
+                f"jitter must be 0 or more, and averaging too. Received {float(self.jitter):.4g} s, of the delay "
+                f"{float(self.delay_jitter):.4g} s, and {float(self.averaging):.4g} s. Leave out the sign."
             )
         if self.rate_noise and self.law.of_slip_alone:
             raise ParameterError(
@@ -137,15 +141,20 @@ class Held:
     @property
     def noise(self) -> dict[str, Fraction]:
         """Bounds of the noise that there is, by its input of the loop; with jitter all that is measured has some."""
-        measured = (NOISES[0], *NOISES[1:] * (not self.law.of_slip_alone)) if self.jitter else ()
+        measured = (NOISES[0], *NOISES[1:] * (not self.law.of_slip_alone)) if self.off else ()
         return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
+
+    @property
+    def off(self) -> Fraction:
+        """How far from its instant a measurement may tell of, at most [s]."""
+        return self.jitter + self.averaging / 2
 
     @property
     def instants(self) -> Instants | None:
         """How far those of the loop may be off; None where they are not, and a pressure may change at once."""
-        if not (self.jitter or self.delay_jitter or (self.pump and self.pump.rate)):
+        if not (self.off or self.delay_jitter or (self.pump and self.pump.rate)):
             return None
-        return Instants(measured=self.jitter, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
+        return Instants(measured=self.off, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
 
     @property
     def longest_ramp(self) -> Fraction:
@@ -159,7 +168,7 @@ class Held:
         A measurement that is early or late may be compared with the reference at its instant.
         """
         off = zip(errors, (self.slip_noise, self.rate_noise), task.reference_rates, strict=True)
-        slip, rate = (error + noise + self.jitter * moves for error, noise, moves in off)
+        slip, rate = (error + noise + self.off * moves for error, noise, moves in off)
         return slip, rate
 
     @property
@@ -396,6 +405,8 @@ class Guarantee:
         when += ", with the slip alone measured" if held.law.of_slip_alone else ""
         for name, bound in ((name, bound) for name, bound in held.noise.items() if bound):
             when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
+        mean = LowerBound(held.averaging)
+        when += f", each measurement a mean over {mean:.6g} s around its time" if mean else ""
         when += _off_schedule(held.jitter, held.jitter + held.delay_jitter)
         when += f", {held.pump.words()}" if held.pump else ""
         return sentence_of(self.task, self.claims, when, _start(*held.start))
@@ -491,7 +502,7 @@ def _slow_bounds(
     task: Task, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
 ) -> Bounds | NoGuarantee:
     spread = slow_gain.spread(task, slip_error)
-    return best_bounds(task, gains, held.law.root, held.step, held.noise, spread, held.jitter)
+    return best_bounds(task, gains, held.law.root, held.step, held.noise, spread, held.off)
 
 
 def _root_within(task: Task, held: Held, claims: Claims) -> bool:
@@ -510,7 +521,7 @@ def _beyond_the_pump(held: Held, claims: Claims) -> str:
 
 def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
     try:
-        return certified_bounds(task, loop, held.law.root, held.noise, held.jitter)
+        return certified_bounds(task, loop, held.law.root, held.noise, held.off)
     except ParameterError:
         return _unstable(held)
 

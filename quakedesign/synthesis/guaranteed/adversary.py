@@ -52,7 +52,7 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     friction holds it wherever the loop would, along the reference at its largest rate and at a twentieth of that, and
     courses that switch after random times are tried as well. Noise is at its ends too. An implicit step ends where its
     equation says, inside its lines or not. A box of starts is left from its corners. With jitter each event is as early
-    or as late as it may be; pressures rise at once, as a pump of any rate may do.
+    or as late as it may be; pressures rise at once, as a pump of any rate may do, and means are of their middle alone.
     """
     slip, rate = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     return WorstFound(slip_error=slip, slip_rate_error=rate)
@@ -100,6 +100,9 @@ class _Pieces:
         return np.linalg.matrix_power(self.steps[vertex], _PIECES)
 
 
+_ON_TIME: dict[str, Any] = dict.fromkeys(("jitter", "delay_jitter", "averaging", "ramp"), Fraction(0))
+
+
 def _on_time(held: Held) -> tuple[Held, Fraction, Fraction]:
     """The loop without jitter whose events are moved, by how much its samples are, and its pressures before its time.
 
@@ -117,7 +120,7 @@ def _on_time(held: Held) -> tuple[Held, Fraction, Fraction]:
         off = min(off, part / 2, (held.step - part) / 2)
         late = min(late, _NEARLY * (part - off), _NEARLY * (held.step - part - off))
         delay += late
-    plain = replace(held, delay=delay, jitter=Fraction(0), delay_jitter=Fraction(0), pump=None, ramp=Fraction(0))
+    plain = replace(held, delay=delay, pump=None, **_ON_TIME)
     return plain, off, 2 * late if alone or part else Fraction(0)
 
 

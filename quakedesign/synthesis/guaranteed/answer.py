@@ -165,6 +165,7 @@ class Answer:
             "initial_slip_rate": str(self.found.held.initial_slip_rate),
             "jitter": str(self.found.held.jitter),
             "delay_jitter": str(self.found.held.delay_jitter),
+            "averaging": str(self.found.held.averaging),
             "pump": None if self.found.held.pump is None else self.found.held.pump.to_dict(),
             "law": _law(self.found.held.law),
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),

@@ -36,7 +36,7 @@ def estimated(task: Task, held: Held) -> Estimate | None:
     gains = gains_of(held.loop(task))
     if gains is None:
         return None
-    bounds = bounds_from(task, gains, held.law.root, held.step, held.noise, None, held.jitter)
+    bounds = bounds_from(task, gains, held.law.root, held.step, held.noise, None, held.off)
     return Estimate(bounds, max(gains["slip_error", "drift"]))
 
 
@@ -51,7 +51,7 @@ def slowly_estimated(task: Task, held: Held) -> Estimate | None:
         found.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
     whole = {key: tuple(v for gains in found for v in gains[key]) for key in found[0]}
     spread = GainSpread(half=_SPREAD * (high - low), aged=Fraction(0))
-    bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.jitter)
+    bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
     return Estimate(bounds, max(whole["slip_error", "drift"]))
 
 

@@ -80,6 +80,7 @@ LOOPS = {
     "observer": Held(law=OBSERVER, step=STEP, slip_noise=F(1, 10**6)),
     "noisy deadbeat": replace(implicit("1", "1"), **NOISY),
     "jittery": Held(law=ESTIMATE, step=STEP, jitter=F("0.002"), delay_jitter=F("0.001")),
+    "mean": Held(law=ESTIMATE, step=STEP, delay=F("0.002"), averaging=F("0.004")),
     "jittery deadbeat": replace(implicit("1", "1"), jitter=F("0.001")),
     "jittery lag": Held(law=ESTIMATE, step=F("0.1"), lag=F("0.01"), jitter=F("0.0002"), delay_jitter=F("0.0002")),
     "jittery and late": Held(law=ESTIMATE, step=STEP, delay=F("0.02"), jitter=F("0.001")),
@@ -281,6 +282,7 @@ WORSE += [
     ("noisy deadbeat", ("loop", "noise", "slip"), F(3, 2)),
     ("noisy sluggish", ("loop", "noise", "slip"), F(21, 20)),
     ("jittery", ("loop", "jitter", "measured"), F(21, 20)),
+    ("mean", ("loop", "jitter", "mean"), F(21, 20)),
     ("jittery", ("loop", "jitter", "delay"), F(21, 20)),
     ("jittery deadbeat", ("loop", "jitter", "measured"), F(21, 20)),
     ("jittery lag", ("loop", "jitter", "delay"), F(21, 20)),
@@ -388,6 +390,7 @@ JITTERY_RAW, PACED_RAW = (json.loads(guarantee_text(claim(name))) for name in ("
 PATHS += [(JITTERY_RAW, ("loop", "jitter", *path)) for path in ((), ("measured",), ("delay",))]
 PATHS += [(PACED_RAW, ("loop", "pump", *path)) for path in ((), ("least",), ("largest",), ("rate",), ("ramp",))]
 PATHS += [(PACED_RAW, ("claims", "largest_step"))]
+PATHS += [(json.loads(guarantee_text(claim("mean"))), ("loop", "jitter", "mean"))]
 
 
 @pytest.fixture

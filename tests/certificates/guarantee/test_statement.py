@@ -129,7 +129,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     )
     quiet = Held(law=alone, step=F(1))
     around = ("delay", "lag", "diffusion", "slip_noise", "rate_noise", "initial_slip", "initial_slip_rate")
-    around += ("jitter", "delay_jitter")
+    around += ("jitter", "delay_jitter", "averaging")
     assert (quiet.noise, quiet.around) == ({}, dict.fromkeys(around, 0) | {"pump": None})
     said = Guarantee(task=TASK, held=quiet, claims=CLAIMS).sentence()
     assert "held over 1 s, with the slip alone measured, for every" in said
@@ -270,7 +270,12 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     assert paced.instants == Instants(measured=F(1, 300), arrived=F(1, 100), ramp=F(1, 50))
     assert (HELD.instants, replace(HELD, pump=Pump(least=F(-1), largest=F(1))).instants) == (None, None)
     assert "with a pump of 5 Pa/s, whose limits are never" in Guarantee(task=TASK, held=paced, claims=CLAIMS).sentence()
-    for name in ("jitter", "delay_jitter", "ramp"):
+    mean = replace(HELD, averaging=F(1, 30), jitter=F(1, 300))
+    assert (mean.off, mean.instants) == (F(1, 50), Instants(measured=F(1, 50), arrived=F(1, 300)))
+    assert tuple(mean.noise) == ("slip_noise", "rate_noise")
+    said = Guarantee(task=TASK, held=mean, claims=CLAIMS).sentence()
+    assert "held over 0.1 s, each measurement a mean over 0.0333333 s around its time, each measurement within" in said
+    for name in ("jitter", "delay_jitter", "averaging", "ramp"):
         with pytest.raises(ParameterError, match="jitter must be 0 or more"):
             replace(HELD, **{name: F(-1, 10**9)})
 

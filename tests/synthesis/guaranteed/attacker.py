@@ -44,12 +44,14 @@ class Held:
 class Moved:
     """By how many small steps every measurement and every pressure of every course is late (periods × courses).
 
-    A pressure that arrives is reached at a rate [m/s³], from b·p of the one before, or at once.
+    A pressure that arrives is reached at a rate [m/s³], from b·p of the one before, or at once. What is told may be the
+    mean over so many small steps up to the measurement.
     """
 
     measured: np.ndarray
     arrived: np.ndarray
     rate: object = None
+    mean: int = 0
 
 
 def numbers(claim, force=None):
@@ -152,6 +154,7 @@ class _Schedule:
         self.z, self.v = np.zeros((len(held.C), courses)), np.zeros(courses)
         self.asked = np.zeros((len(off.measured), courses))
         self.target = np.zeros(courses)
+        self.past = []
         self.most = np.inf if off.rate is None else off.rate * held.step / pieces
 
     def measured(self, n):
@@ -160,6 +163,8 @@ class _Schedule:
 
     def pressure(self, k, e):
         """b·p over a small step; measurements that are due in it are made first."""
+        self.past = [*self.past[-self.off.mean :], e] if self.off.mean else []
+        e = np.mean(self.past, axis=0) if self.past else e
         for n in range(max(k // self.pieces - 1, 0), min(k // self.pieces + 2, len(self.asked))):
             now = self.measured(n) == k
             if now.any():

@@ -27,6 +27,7 @@ ROWS = {
     "jitter": ("real-fault", {"jitter": F("0.004")}, 1.75),
     "of the delay": ("real-fault", {"delay_jitter": F("0.008")}, 1.6),
     "late": ("late_real-fault", {"jitter": F("0.004")}, 2.6),
+    "means": ("real-fault", {"averaging": F("0.016"), "delay": F("0.008")}, 2.2),
     "slow pump": ("real-fault", {"pump": Pump(rate=F(8_000_000))}, 1.6),
     "both": ("real-fault", {"jitter": F("0.004"), "pump": Pump(rate=F(20_000_000))}, 2.4),
     "sliding mode": ("cta_real-fault", {"jitter": F("0.004")}, 2.2),
@@ -56,7 +57,10 @@ def moved(claim, held, periods, courses, seed, along=None):
     grain = held.step / PIECES
     off, more = (round(float(v) / grain) for v in (claim.held.jitter, claim.held.delay_jitter))
     others = np.where(random.random(courses) < 0.5, signs, 1 - 2 * random.integers(2, size=count))
-    return attacker.Moved(measured=off * signs, arrived=off * signs + more * others, rate=_rate(claim))
+    mean = round(float(claim.held.averaging) / grain)
+    return attacker.Moved(
+        measured=off * signs + mean // 2, arrived=off * signs + more * others, rate=_rate(claim), mean=mean
+    )
 
 
 def _rate(claim):
