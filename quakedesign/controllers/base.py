@@ -56,16 +56,22 @@ class Sampling:
         Of `quakedesign.loop.schemes`.
     settings : tuple of (str, Fraction)
         Numbers of the scheme by name, in its own units.
-    lag, diffusion : Fraction
-        Time constant of the pump and L²/D of the rock [s] for which it is meant. A run of friction with a state brings
-        the pressure through them unless told; other runs are told.
+    delay, lag, diffusion : Fraction
+        From measurement to valve, time constant of the pump and L²/D of the rock [s] for which it is meant: between law
+        and fault in every run, and in `loop_transfer`, unless told.
     """
 
     step: Fraction
     scheme: str = "explicit"
     settings: tuple[tuple[str, Fraction], ...] = ()
+    delay: Fraction = Fraction(0)
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
+
+    @property
+    def path(self) -> dict[str, Any]:
+        """Delay, lag and L²/D [s] between law and fault."""
+        return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
 
     def __str__(self) -> str:
         numbers = "".join(f", {name} {float(value)!r}" for name, value in self.settings)

@@ -1,7 +1,7 @@
 """A linear law of samples as a controller that simulations run."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
@@ -26,7 +26,7 @@ class SampledController(Controller):
     law : LinearLaw
     step : Fraction
         T_s [s] for which it is meant.
-    lag, diffusion : Fraction
+    delay, lag, diffusion : Fraction
         As of `Sampling` [s].
     rest_limit : RestLimit, optional
         Of its pressure; its states are then told what is applied, and those of the limit follow them.
@@ -41,6 +41,7 @@ class SampledController(Controller):
     gains: Mapping[str, Fraction] = field(default_factory=dict, init=False)
     law: LinearLaw
     step: Fraction
+    delay: Fraction = Fraction(0)
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
     rest_limit: RestLimit | None = None
@@ -50,13 +51,13 @@ class SampledController(Controller):
         object.__setattr__(self, "gains", MappingProxyType(dict(zip(self.gain_units, values, strict=True))))
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
-        told = {name: getattr(self, name) for name in ("law", "step", "lag", "diffusion", "rest_limit")}
+        told = {part.name: getattr(self, part.name) for part in fields(self) if part.init}
         return partial(type(self), **told), ()
 
     @property
     def sampling(self) -> Sampling:
         """By the scheme ``explicit``, once every T_s."""
-        return Sampling(step=self.step, lag=self.lag, diffusion=self.diffusion)
+        return Sampling(step=self.step, delay=self.delay, lag=self.lag, diffusion=self.diffusion)
 
     @property
     def of_slip(self) -> LinearLaw | None:

@@ -1,5 +1,7 @@
 """Faults and loops about an equilibrium, as python-control's StateSpace."""
 
+from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -8,6 +10,7 @@ from quakedesign.controllers import Controller
 from quakedesign.errors import UnsupportedError
 from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.checks import require_finite
+from quakedesign.loop.actuators import Actuator, Delay
 from quakedesign.simulation.interop import to_iosystem
 
 _LINEAR = 1e-9  # relative difference of twice the answer and the answer to twice
@@ -57,7 +60,7 @@ def to_statespace(fault: Fault, at: float = 0.0) -> Any:
     return control.ss(linear, name=fault.name, inputs=["p"], outputs=seen, states=seen)
 
 
-def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0) -> Any:
+def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actuator: Actuator | None = None) -> Any:
     """Return the transfer function of the loop, opened at the pressure, for Bode plots and margins.
 
     Parameters
@@ -67,17 +70,21 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0) -> Any:
         A linear law, as it is while the fault moves. One of samples has a pressure that is held over its T_s.
     at : float
         Slip [m] about which the fault is linearised.
+    actuator : Actuator, optional
+        A delay, lag and rock between law and fault, which are in L; those for which a law of samples is designed unless
+        given, and none of them for an `Actuator` without stages.
 
     Returns
     -------
     control.StateSpace
-        L, from the pressure [Pa] at the fault to the pressure that the law asks for, with negative feedback: the
-        closed loop is ``control.feedback(L, 1)``; in discrete time for a law of samples.
+        L, from the pressure [Pa] that enters the actuator to the pressure that the law asks for, with negative
+        feedback: the closed loop is ``control.feedback(L, 1)``; in discrete time for a law of samples.
 
     Raises
     ------
     UnsupportedError
-        For a law that is not linear, or needs more than slip and slip rate.
+        For a law that is not linear, or needs more than slip and slip rate; for a stage that is not linear, or acts
+        once per sample around a law in continuous time.
     ParameterError
         As `to_statespace`.
 
@@ -87,14 +94,84 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0) -> Any:
     """
     import control
 
-    plant, law = to_statespace(fault, at), _linear(to_iosystem(controller.while_moving))
-    if law.dt:
-        plant = control.sample_system(plant, law.dt, method="zoh")
+    law = _linear(to_iosystem(controller.while_moving), ("slip", "slip_rate"))
+    late, flowing = _between(controller, actuator)
+    plant = _series(to_statespace(fault, at), _linear(_flow_system(flowing), ("p",)))
+    if controller.sampling is not None:
+        plant = _held(plant, controller.sampling.step, late)
     return control.ss(-law * plant, name=f"{controller.name} around {fault.name}", inputs=["p"], outputs=["answer"])
 
 
-def _linear(system: Any) -> Any:
-    """StateSpace from slip and slip rate to pressure of a system whose answers are linear, read off unit vectors."""
+def _between(controller: Controller, actuator: Actuator | None) -> tuple[Fraction, Actuator]:
+    """Delay [s] and flowing stages between a law and its fault."""
+    own = controller.sampling
+    if actuator is None:
+        meant = Actuator() if own is None else Actuator.meant_for(replace(own, delay=Fraction(0)))
+        return Fraction(0) if own is None else own.delay, meant
+    late = [stage for stage in actuator.sampled if isinstance(stage, Delay) and not stage.jitter and own]
+    if others := [stage.name for stage in actuator.sampled if stage not in late]:
+        raise UnsupportedError(
+            "a loop transfer function has a lag, rock and, for a law of samples, a delay without jitter. Received "
+            f"{', '.join(others)}. Leave them out, or simulate."
+        )
+    return sum((stage.samples * own.step for stage in late if own), Fraction(0)), Actuator(stages=actuator.flowing)
+
+
+def _flow_system(actuator: Actuator) -> Any:
+    """Flowing stages from the pressure that is held, ``p``, to that in the fault."""
+    import control
+
+    numbers = [value for stage in actuator.flowing for value in stage.numbers]
+
+    def flow(x: Any, u: Any) -> Any:
+        return actuator.flow(numbers, list(x), u[0])
+
+    return control.NonlinearIOSystem(
+        lambda t, x, u, _: np.array(flow(x, u)[0]),
+        lambda t, x, u, _: np.array([flow(x, u)[1]]),
+        dt=0,
+        name="actuator",
+        inputs=["p"],
+        outputs=["fault"],
+        states=len(actuator.flow_start),
+    )
+
+
+def _series(plant: Any, before: Any) -> Any:
+    """A plant behind another, or alone behind one that lets everything pass at once."""
+    return plant * before if before.nstates else plant
+
+
+def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:
+    """A plant as it is seen every step [s] under a pressure that is held as long, from a delay [s] later on.
+
+    Exact: with the delay m + f steps the held pressure of m + 1 samples ago acts for f steps, then that of m ago. Those
+    that wait are further states.
+    """
+    import control
+
+    whole, part = divmod(delay, step)
+    n, waiting = plant.nstates, int(whole) + (part > 0)
+    early, late = (control.sample_system(plant, float(time), method="zoh") for time in (part or step, step - part))
+    arriving = np.zeros((n, waiting + 1))  # of the pressure of now, of one sample ago, and so on
+    arriving[:, int(whole)] = late.B[:, 0]
+    A, B = np.zeros((n + waiting, n + waiting)), np.zeros((n + waiting, 1))
+    A[:n, :n] = late.A
+    if part:
+        A[:n, :n], arriving[:, waiting] = late.A @ early.A, late.A @ early.B[:, 0]
+    A[:n, n:], B[:n] = arriving[:, 1:], arriving[:, :1]
+    A[n + 1 :, n:-1], B[n : n + 1] = np.eye(max(waiting - 1, 0)), 1.0
+    C = np.column_stack([plant.C, np.zeros((plant.noutputs, waiting))])
+    return control.ss(A, B, C, plant.D, float(step), inputs=["p"], outputs=plant.output_labels)
+
+
+def _linear(system: Any, names: tuple[str, ...]) -> Any:
+    """StateSpace from the first inputs, named, to pressure of a system whose answers are linear, read off unit vectors.
+
+    Raises
+    ------
+    UnsupportedError
+    """
     import control
 
     n, seen = system.nstates, system.ninputs
@@ -112,5 +189,5 @@ def _linear(system: Any) -> Any:
     )
     if not straight:
         raise UnsupportedError(f"a loop transfer function needs a linear law. Received {system.name}. Simulate it.")
-    A, B, C, D = once[:n, :n], once[:n, n : n + 2], once[n:, :n], once[n:, n : n + 2]
-    return control.ss(A, B, C, D, system.dt or 0, inputs=["slip", "slip_rate"], outputs=["p"], name=system.name)
+    A, B, C, D = once[:n, :n], once[:n, n : n + len(names)], once[n:, :n], once[n:, n : n + len(names)]
+    return control.ss(A, B, C, D, system.dt or 0, inputs=list(names), outputs=system.output_labels, name=system.name)

@@ -8,10 +8,12 @@ from typing import Any
 
 import casadi as ca
 
+from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, simulation_scheme
 from quakedesign.loop.sensing import Sensor
+from quakedesign.loop.steps.sampled import MOST_SUBSTEPS
 from quakedesign.simulation import kept_runs
 from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
 from quakedesign.simulation.assembly import trajectory
@@ -56,6 +58,23 @@ def sampled_scheme(
             f"a scheme that is no name has its own {', '.join(settings)}. Received both. Set them in the scheme."
         )
     return scheme
+
+
+def own_path(
+    controller: Controller | None, actuator: Actuator | None, substeps: int = 1
+) -> tuple[Actuator | None, int]:
+    """Actuator and substeps of a named scheme: as told, else what a law of samples is designed for, and what it needs.
+
+    Raises
+    ------
+    ParameterError
+        For a law whose delay is no whole number of periods.
+    """
+    sampling = controller.sampling if controller else None
+    if actuator is not None or sampling is None:
+        return actuator, substeps
+    meant = Actuator.meant_for(sampling)
+    return meant, max(substeps, min(meant.substeps(float(sampling.step)), MOST_SUBSTEPS))
 
 
 def loop_class(plant: str) -> type[ClosedLoop]:

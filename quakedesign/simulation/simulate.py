@@ -17,7 +17,7 @@ from quakedesign.simulation.loading import Load
 from quakedesign.simulation.memoryless_earthquake import natural_peak
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import loop_class, run, run_adaptive, sampled_scheme
+from quakedesign.simulation.run import loop_class, own_path, run, run_adaptive, sampled_scheme
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.sliding_conditions import PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
@@ -98,9 +98,10 @@ def simulate(
     substeps : int
         Steps of the integrator per `step`, for a named scheme that samples.
     actuator : Actuator, optional
-        What lies between the pressure that is asked for and that in the fault, for a named scheme that samples. Of
-        friction with a state stages that act once a sample, then a lag, rock, or both; those two which the law is
-        designed for unless given.
+        What lies between the pressure that is asked for and that in the fault, for a named scheme that samples. Unless
+        given, the delay, lag and rock for which a law of samples is designed, with the substeps that they need; an
+        `Actuator` without stages brings the pressure to the fault at once. Of friction with a state stages that act
+        once a sample, then a lag, rock, or both; those two which the law is designed for unless given.
     measurement : Measurement, Sensor or Transducer, optional
         Noise of what the controller sees, or a sensor that tells it estimates from the slip alone, for a named scheme
         that samples. Of friction with a state the transducer that the slip is read with.
@@ -142,6 +143,8 @@ def simulate(
     criterion = OutcomeCriterion.of(fault, natural_peak(fault))
     loop = loop_class(plant)(fault, controller, load=load or Load(), factors=factors)
     require_nonnegative(initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
+    if isinstance(scheme, str):
+        actuator, substeps = own_path(controller, actuator, substeps)
     carried = sampled_scheme(scheme, substeps, actuator, measurement, **own)
     recorder = Recorder(loop, carried, setting.step, (float(initial_slip), float(initial_slip_rate)))
     chosen = any_integrator(method)

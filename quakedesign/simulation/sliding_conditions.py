@@ -108,7 +108,8 @@ class PressurePath:
         ------
         ParameterError
         """
-        stages, flowing = (actuator.sampled, actuator.flowing) if actuator else ((), ())
+        given = Actuator.meant_for(replace(meant, lag=Fraction(0), diffusion=Fraction(0))) if actuator is None else actuator
+        stages, flowing = given.sampled, given.flowing
         if not flowing:
             return cls(lag=meant.lag, diffusion=meant.diffusion, stages=stages)
         if [type(stage) for stage in flowing] not in ([Lag], [Diffusion], [Lag, Diffusion]):

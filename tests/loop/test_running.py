@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from quakedesign import simulate
+from quakedesign import assess, simulate
 from quakedesign.certificates.guarantee import Guarantee, Held, guarantee, task_of
 from quakedesign.controllers import Signals
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop import ErrorPrediction, Prediction, SampledController, disturbance_estimate, slip_observer
+from quakedesign.loop.actuators import Actuator, Delay, Diffusion, Lag
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Variation, export_controller, to_casadi, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
@@ -178,3 +179,38 @@ def test_its_expressions_are_those_of_the_matrices():
     assert law.sampling_time == 0.184
     assert law.integral_units == ("-", "-")
     assert law.gain_units == {"k1": "Pa/m", "k2": "Pa s/m", "predicted_rate": "Pa", "disturbance": "Pa"}
+
+
+@pytest.mark.parametrize(
+    ("around", "stages", "substeps"),
+    [
+        ({"lag": F(1, 5)}, (Lag(time_constant=0.2),), 1),
+        ({"lag": F(1, 100)}, (Lag(time_constant=0.01),), 8),
+        ({"delay": 2 * STEP, "lag": F(1, 5)}, (Delay(samples=2), Lag(time_constant=0.2)), 1),
+        ({"diffusion": F(20)}, (Diffusion.of_time(20.0),), 4),
+    ],
+)
+def test_what_a_law_is_designed_for_stands_in_every_run_unless_told(around, stages, substeps):
+    law, told = Held(law=LAW, step=STEP, **around).controller, Actuator(stages=stages)
+    short = {"duration": 9.2, "samples": 51}
+    own, same = simulate(REAL, law, **short), simulate(REAL, law, actuator=told, substeps=substeps, **short)
+    free = simulate(REAL, law, actuator=Actuator(), **short)
+    assert own.pressure.tolist() == same.pressure.tolist()
+    assert own.slip.tolist() == same.slip.tolist()
+    assert (own.provenance["actuator"], own.provenance["substeps"]) == (repr(told)[17:-2].rstrip(","), substeps)
+    assert np.abs(own.pressure - free.pressure).max() > 0.01 * np.abs(free.pressure).max()
+    assert free.pressure.tolist() == simulate(REAL, HELD.controller, **short).pressure.tolist()
+    assert campaign_problem(REAL, law).scheme.actuator == told
+
+
+def test_a_delay_between_samples_is_not_run():
+    law = Held(law=LAW, step=STEP, delay=STEP / 3).controller
+    with pytest.raises(ParameterError, match="delay must be a whole number of sampling periods"):
+        simulate(REAL, law, duration=1.84)
+
+
+def test_a_verdict_on_a_law_of_samples_is_about_what_it_is_designed_for():
+    late = Held(law=LAW, step=STEP, lag=F(1, 50))
+    found = assess(REAL, late.controller).guarantee
+    assert found.held.lag == F(1, 50)
+    assert found.claims.slip_rate_error > assess(REAL, HELD.controller).guarantee.claims.slip_rate_error

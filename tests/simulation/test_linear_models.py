@@ -1,6 +1,8 @@
 """Linear models for python-control against closed forms, automatic derivatives and another discretisation."""
 
 import math
+from dataclasses import replace
+from fractions import Fraction as F
 
 import casadi as ca
 import control
@@ -11,6 +13,8 @@ from scipy.optimize import brentq
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.loop import Prediction, SampledController, disturbance_estimate
+from quakedesign.loop.actuators import Actuator, Delay, Diffusion, Lag, Saturation
 from quakedesign.simulation.linear_models import resting_pressure
 
 REAL = qd.load_fault("real-fault")
@@ -105,3 +109,93 @@ def test_a_run_is_resampled_at_uniform_instants():
     for wrong in (0.0, 1e-3, 31.0, float("nan")):
         with pytest.raises(ParameterError, match=r"dt must be between"):
             run.resample(wrong)
+
+
+STEP = F(23, 125)
+SAMPLED = disturbance_estimate(
+    (F(672300000), F(206000000)),
+    F("0.57"),
+    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),)),
+    F("2.282e-8"),
+)
+AT_ONCE = SampledController(law=SAMPLED, step=STEP)
+
+
+def same_loop(found, expected):
+    """Whether two loops answer alike, at frequencies up to that of the samples, and have the same closed poles."""
+    places = np.exp(1j * np.geomspace(1e-4, 3.1, 40))
+    answers = [np.array([complex(loop(z)) for z in places]) for loop in (found, expected)]
+    assert answers[0] == pytest.approx(answers[1], rel=1e-6)
+    poles = [np.sort(abs(control.feedback(loop, 1).poles()))[-3:] for loop in (found, expected)]
+    assert poles[0] == pytest.approx(poles[1], rel=1e-6)
+
+
+def matrices():
+    parts = SAMPLED.update, SAMPLED.measured, SAMPLED.output, SAMPLED.feedback
+    return [np.array(part, dtype=float) for part in parts]
+
+
+def behind(path):
+    """The loop by python-control alone: a continuous path before the plant, both sampled together."""
+    plant = control.sample_system(qd.to_statespace(REAL) * path, float(STEP), "zoh")
+    update, measured, output, feedback = matrices()
+    return -control.ss(update, measured, output[None, :], feedback[None, :], float(STEP)) * plant
+
+
+@pytest.mark.parametrize("lag", [F(1, 50), F(2, 25), F(1, 2)])
+def test_the_lag_for_which_a_law_is_designed_stands_in_its_loop(lag):
+    law = replace(AT_ONCE, lag=lag)
+    same_loop(qd.loop_transfer(REAL, law), behind(control.ss(control.tf(1, [float(lag), 1]))))
+    told = Actuator(stages=(Lag(time_constant=float(lag)),))
+    same_loop(qd.loop_transfer(REAL, AT_ONCE, actuator=told), qd.loop_transfer(REAL, law))
+    same_loop(qd.loop_transfer(REAL, law, actuator=Actuator()), qd.loop_transfer(REAL, AT_ONCE))
+
+
+@pytest.mark.parametrize("whole", [1, 3])
+def test_a_delay_of_whole_steps_is_a_power_of_z(whole):
+    law, shift = replace(AT_ONCE, delay=whole * STEP), control.tf([1], [1, *[0] * whole], float(STEP))
+    expected = qd.loop_transfer(REAL, AT_ONCE) * control.ss(shift)
+    same_loop(qd.loop_transfer(REAL, law), expected)
+    same_loop(qd.loop_transfer(REAL, AT_ONCE, actuator=Actuator(stages=(Delay(samples=whole),))), expected)
+
+
+@pytest.mark.parametrize("tenths", [3, 15])
+def test_a_delay_of_no_whole_steps_is_that_of_a_finer_grid(tenths):
+    """A tenth of a step at a time: what is held changes `tenths` after the sample that asked for it."""
+    found = qd.loop_transfer(REAL, replace(AT_ONCE, delay=tenths * STEP / 10, lag=F(2, 25)))
+    path = qd.to_statespace(REAL) * control.ss(control.tf(1, [0.08, 1]))
+    fine, late = control.sample_system(path, float(STEP) / 10, "zoh"), -(-tenths // 10)
+    n, (update, measured, output, feedback) = fine.nstates, matrices()
+
+    def period(z):  # plant, law, pressures that wait
+        x, own, waiting = z[:n], z[n : n + 2], list(z[n + 2 :])
+        seen = fine.C @ x
+        asked = [output @ own + feedback @ seen, *waiting]
+        for k in range(10):
+            x = fine.A @ x + fine.B[:, 0] * asked[-(-(tenths - k) // 10) if tenths > k else 0]
+        return np.concatenate([x, update @ own + measured @ seen, asked[:late]])
+
+    expected = np.linalg.eigvals(np.column_stack([period(e) for e in np.eye(n + 2 + late)]))
+    poles = control.feedback(found, 1).poles()
+    assert np.sort(abs(poles))[-4:] == pytest.approx(np.sort(abs(expected))[-4:], rel=1e-7)
+
+
+def test_rock_answers_as_its_cells_do():
+    rock = Diffusion.of_time(2.0)
+    found = qd.loop_transfer(REAL, LAW, actuator=Actuator(stages=(rock,)))
+    direct = qd.loop_transfer(REAL, LAW)
+    for omega in (0.01, 0.3, 4.0):
+        assert complex(found(1j * omega)) == pytest.approx(
+            complex(direct(1j * omega)) * rock.response(omega)[0], rel=1e-7
+        )
+    meant = qd.loop_transfer(REAL, replace(AT_ONCE, diffusion=F(2)))
+    same_loop(meant, qd.loop_transfer(REAL, AT_ONCE, actuator=Actuator(stages=(rock,))))
+
+
+@pytest.mark.parametrize(
+    ("law", "stage"),
+    [(AT_ONCE, Saturation(lowest=-1e7, highest=1e7)), (AT_ONCE, Delay(samples=1, jitter=1)), (LAW, Delay(samples=1))],
+)
+def test_stages_that_are_not_linear_and_delays_without_samples_have_no_transfer_function(law, stage):
+    with pytest.raises(UnsupportedError, match=rf"has a lag, rock and.*Received {stage.name}"):
+        qd.loop_transfer(REAL, law, actuator=Actuator(stages=(stage,)))

@@ -134,6 +134,11 @@ class Held:
         return cast(Around, {name: getattr(self, name) for name in Around.__annotations__})
 
     @property
+    def path(self) -> dict[str, Any]:
+        """Delay, lag and L²/D [s] between law and fault."""
+        return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
+
+    @property
     def start(self) -> tuple[Fraction, Fraction]:
         """Bounds of the errors at the start [m], [m/s]; 0 and 0 at rest."""
         return self.initial_slip, self.initial_slip_rate
@@ -173,7 +178,7 @@ class Held:
 
     @property
     def controller(self) -> "SampledController":
-        """The law for `simulate`, with the scheme ``explicit`` and the step T_s; delay and lag are the actuator's.
+        """The law for `simulate`, with the scheme ``explicit``, the step T_s, and the delay, lag and rock around it.
 
         Raises
         ------
@@ -182,17 +187,16 @@ class Held:
         """
         if self.law.root is not None:
             raise UnsupportedError("a law with an implicit root has no explicit run. Simulate its own controller.")
-        return loops.SampledController(law=self.law, step=self.step, lag=self.lag, diffusion=self.diffusion)
+        return loops.SampledController(law=self.law, step=self.step, **self.path)
 
     def loop(self, task: Task, model: Model | None = None) -> PeriodicLoop:
         """Nominal error loop on a task, of its model or another one."""
-        times = {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
         loop = held_loop(
             self.law,
             model or task.model,
             task.authority,
             self.step,
-            **times,
+            **self.path,
             noisy=self.noise,
             instants=self.instants,
         )

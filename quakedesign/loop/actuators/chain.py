@@ -5,8 +5,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from quakedesign.controllers import Sampling
 from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
+from quakedesign.loop.actuators.delay import Delay
+from quakedesign.loop.actuators.diffusion import Diffusion
+from quakedesign.loop.actuators.lag import Lag
 
 LONGEST = 2.5  # of a substep times the fastest rate: below the limits 2.78 and 3.3 of the Runge–Kutta methods
 
@@ -46,6 +50,26 @@ class Actuator:
             names = ", ".join(stage.name for stage in self._stores)
             raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Leave one out.")
 
+    @classmethod
+    def meant_for(cls, sampling: Sampling) -> "Actuator":
+        """Delay, lag and rock for which a law of samples is designed; without stages where it is for none.
+
+        Raises
+        ------
+        ParameterError
+            For a delay that is no whole number of periods.
+        """
+        step, kinds = float(sampling.step), {kind.name: kind for kind in (Delay, Lag, Diffusion)}
+        times = {name: float(time) for name, time in sampling.path.items() if time}
+        return cls(stages=tuple(kinds[name].asked(step, **{name: time}) for name, time in times.items()))
+
+    def completed(self, other: "Actuator") -> "Actuator":
+        """The same, and along the signal those stages of another one of whose kind it has none."""
+        known = {stage.name for stage in self.stages}
+        more = (stage for stage in other.stages if stage.name not in known)
+        along = sorted((*self.stages, *more), key=lambda stage: (isinstance(stage, FlowStage), stage.place))
+        return Actuator(stages=tuple(along))
+
     @property
     def sampled(self) -> tuple[SampledStage, ...]:
         """Stages that act once per sample."""
@@ -69,6 +93,10 @@ class Actuator:
     @property
     def _stores(self) -> list[FlowStage]:
         return [stage for stage in self.flowing if stage.stores]
+
+    def substeps(self, step: float) -> int:
+        """Least number of substeps of a step [s] that no stage is too fast for."""
+        return max((math.ceil(step * stage.fastest / LONGEST) for stage in self.flowing), default=1)
 
     def require_resolved(self, substep: float) -> None:
         """Refuse a substep [s] that a stage is too fast for.

@@ -15,7 +15,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.executors import crew_of
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_seed
-from quakedesign.loop.schemes import Scheme, own_way, simulation_scheme
+from quakedesign.loop.schemes import Scheme, own_way
 from quakedesign.rationals import rational
 from quakedesign.simulation.campaign.dispatch import dispatch
 from quakedesign.simulation.campaign.ledger import Ledger
@@ -28,6 +28,7 @@ from quakedesign.simulation.campaign.stepped import SteppedProblem
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.integrators.dormand_prince import DormandPrince
 from quakedesign.simulation.loading import Load
+from quakedesign.simulation.run import own_path, sampled_scheme
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.sliding_conditions import TIDE
 from quakedesign.temporary import temporary_folder
@@ -88,11 +89,14 @@ def campaign_problem(
         When a value is out of range, or a scheme or integrator is unknown.
     """
     require_seed(seed)
-    scheme, step, own = own_way(controller, scheme, step)
+    way, step, own = own_way(controller, scheme, step)
+    if isinstance(way, str):
+        actuator, substeps = (None, 1) if fault.friction.state_names else own_path(controller, None)
+        way = sampled_scheme(way, substeps, actuator, **own)
     told: dict[str, Any] = {
         "fault": fault,
         "controller": controller,
-        "scheme": simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme,
+        "scheme": way,
         "setting": Setting.of(fault, step, duration, 1, settled_from),
         "plant": plant,
         "seed": seed,

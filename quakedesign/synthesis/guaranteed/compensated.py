@@ -165,7 +165,8 @@ def design_compensated(
     require_ordinary(step=step)
     weight, authority, errors = _deadbeat(task, step, objective, weights, **around)
     settings = ("weight", weight), ("authority", authority)
-    sampling = Sampling(step=step, scheme=GUARANTEED, settings=settings)
+    path: dict[str, Any] = {name: around.get(name, Fraction(0)) for name in ("delay", "lag", "diffusion")}
+    sampling = Sampling(step=step, scheme=GUARANTEED, settings=settings, **path)
     law = replace(controller, gains=dict(controller.gains), sampling=sampling)
     try:
         if errors is not None:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from typing import Unpack
+from typing import Any, Unpack
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
@@ -24,7 +24,8 @@ def guarantee_of(task: Task, law: SlidingMode, **noise: Unpack[Around]) -> Guara
     if not {"weight", "authority"} <= settings.keys():
         reason = f"the scheme {GUARANTEED} has a guarantee with a weight and an authority. Give both in its settings"
         return NoGuarantee(reason=reason, small_gain=None)
-    return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, **noise))
+    around: Any = {**own.path, **noise}
+    return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, **around))
 
 
 def sliding_mode(

@@ -31,5 +31,5 @@ class Samples(Method[SampledController]):
     def guarantee(
         self, fault: Fault, task: Task, controller: SampledController, noise: Around
     ) -> Guarantee | NoGuarantee:
-        """At its own T_s."""
-        return best_guarantee(task, Held(law=controller.law, step=controller.step, **noise))
+        """At its own T_s, behind its own delay, lag and rock."""
+        return best_guarantee(task, Held(law=controller.law, step=controller.step, **controller.sampling.path, **noise))
