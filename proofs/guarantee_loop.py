@@ -137,7 +137,8 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
 
 def read_held(value: Any) -> Held:
     """Read step, delay, lag and diffusion, the law's matrices, the implicit step, the noise and the pump."""
-    more = [k for k in ("root", "noise", "diffusion", "first", "jitter", "pump") if type(value) is dict and k in value]
+    optional = ("root", "noise", "diffusion", "first", "jitter", "pump", "applied")
+    more = [k for k in optional if type(value) is dict and k in value]
     parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
     given = keys(value, "loop", *parts, *more)
     implicit = "root" in more
@@ -152,6 +153,8 @@ def read_held(value: Any) -> Held:
     time = number(given.get("diffusion", "0"), "diffusion")
     need("diffusion" not in more or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
     first = matrix(given["first"], "first", n, 2) if "first" in more else [[Fraction(0)] * 2] * n
+    if "applied" in more:  # of limits that are never reached: read, and no part of the proof
+        row(given["applied"], "applied", n)
     jitter = read_jitter(given["jitter"]) if "jitter" in more else [Fraction(0)] * 3
     pump = read_pump(given["pump"]) if "pump" in more else {}
     law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first, jitter, pump)

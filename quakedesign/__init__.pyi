@@ -1,6 +1,7 @@
 from quakedesign.certificates import Certificate as Certificate
 from quakedesign.certificates import Verdict as Verdict
 from quakedesign.certificates import load_certificate as load_certificate
+from quakedesign.certificates import load_guarantee as load_guarantee
 from quakedesign.controllers import Controller as Controller
 from quakedesign.controllers import published as published
 from quakedesign.fault import Disturbance as Disturbance
@@ -29,6 +30,7 @@ from quakedesign.synthesis import Design as Design
 from quakedesign.synthesis import assess as assess
 from quakedesign.synthesis import certify as certify
 from quakedesign.synthesis import design as design
+from quakedesign.synthesis import guarantee as guarantee
 from quakedesign.synthesis.gains.synthesise import synthesise as synthesise
 
 __version__: str

@@ -18,5 +18,7 @@ if TYPE_CHECKING:
     from quakedesign.certificates.covering import covers as covers
     from quakedesign.certificates.files import certificate_text as certificate_text
     from quakedesign.certificates.files import save_certificate as save_certificate
+    from quakedesign.certificates.guarantee.files import load_guarantee as load_guarantee
+    from quakedesign.certificates.guarantee.files import save_guarantee as save_guarantee
 
 face(__name__)

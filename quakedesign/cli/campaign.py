@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.cli.hardware import ActuatorOptions, SensorOptions
+from quakedesign.cli.hardware import ActuatorOptions, SensorOptions, surroundings
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, LawOptions, Output, RunOptions, Scheduler
 from quakedesign.cli.shared import app, console, progress
 from quakedesign.cli.state import SpreadOptions
@@ -76,13 +76,15 @@ def campaign(
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
     loaded = load_fault(fault, box=box)
-    controller, told = state.choose(loaded, law, actuator.told()["diffusion"])
+    chosen, told = state.choose(loaded, law, run.step, actuator.path())
+    controller = chosen.controller if chosen else None
     way, step, own = run.way(controller)
     period = loaded.sampling_time if step is None else step
+    around = surroundings(None if loaded.friction.state_names else chosen, period, run, actuator, sensors, 0)
     problem = campaign_problem(
         loaded,
         controller,
-        scheme=sampled_scheme(way, run.substeps, actuator.build(period), sensors.build(period), **own),
+        scheme=sampled_scheme(way, *around, **own),
         step=step,
         method=run.method,
         duration=run.duration,

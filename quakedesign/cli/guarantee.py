@@ -1,9 +1,6 @@
 """The command about the loop that runs."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from fractions import Fraction
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, Literal
@@ -11,7 +8,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Scheduler, Shaking
-from quakedesign.cli.shared import app, new_file, progress
+from quakedesign.cli.shared import app, given, new_file, progress
 from quakedesign.cli.units import (
     ExactMetres,
     ExactMetresPerSecond,
@@ -24,9 +21,6 @@ from quakedesign.cli.units import (
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.output import require_room
 from quakedesign.rationals import rational
-
-_USUAL = ("tracking", "amplitude")
-_SLOWLY = ("delay", "lag", "diffusion", "slip_noise", "pump")
 
 
 @Parameter(name="*")
@@ -90,30 +84,9 @@ class Surroundings:
         ParameterError
             For a withdrawal without a largest pressure.
         """
-        told = {name: text for name, text in asdict(self).items() if text is not None}
-        values: dict[str, Any] = {name: rational(text, name.replace("_", " ")) for name, text in told.items()}
-        averaging = values.pop("averaging_time")
-        values |= {"averaging": averaging, "delay": values["delay"] + max(averaging, 0) / 2}
-        pump = [values.pop(name, None) for name in ("saturation", "withdrawal", "rate_limit")]
-        return {**values, "pump": _pump(*pump)}
+        from quakedesign.synthesis.guarantee import exact_surroundings
 
-
-def _pump(largest: Fraction | None, withdrawn: Fraction | None, rate: Fraction | None) -> Any:
-    """The pump, None without limits.
-
-    Raises
-    ------
-    ParameterError
-    """
-    from quakedesign.certificates.guarantee.pump import Pump
-
-    if largest is None and withdrawn is None:
-        return None if rate is None else Pump(rate=rate)
-    if largest is None:
-        raise ParameterError(
-            "a withdrawal belongs to a saturation, the largest pressure. Received it alone. Give both."
-        )
-    return Pump(least=-(largest if withdrawn is None else withdrawn), largest=largest, rate=rate)
+        return exact_surroundings(**given(asdict(self)))
 
 
 _ALONE = Surroundings()
@@ -176,19 +149,18 @@ def guarantee(
     """
     from quakedesign.fault import load_fault
     from quakedesign.synthesis import answers
+    from quakedesign.synthesis.guarantee import question
 
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     files = _files(out, [one.name for one in faults], force=force)
-    held: dict[str, Any] = {"controller": controller, "step": None if step is None else rational(step, "step")}
-    laws = {"gains": gains, "objective": objective, "scheme": scheme, "measured": measured}
-    usual = not gains and scheme is None and (objective, disturbance_class) == _USUAL
-    slowly = {"stress": None if stress is None else rational(stress, "stress"), "spread": rational(spread, "spread")}
-    questions = [
-        _slowly(one, around.exact(), usual=usual, **held, **slowly)
-        if one.friction.state_names
-        else _swiftly(one, around.exact(), slowly, disturbance_class=disturbance_class, **held, **laws)
-        for one in faults
-    ]
+    asked: dict[str, Any] = {"controller": controller, "gains": gains, "objective": objective, "scheme": scheme}
+    exact: dict[str, Any] = {
+        "step": None if step is None else rational(step, "step"),
+        "spread": rational(spread, "spread"),
+    }
+    exact["stress"] = None if stress is None else rational(stress, "stress")
+    asked |= {"measured": measured, "disturbance_class": disturbance_class, **around.exact()}
+    questions = [question(one, **asked, **exact) for one in faults]
     with progress() as tell:
         found = answers(questions, workers=workers, scheduler=scheduler, tell=tell if more else None)
     said = {"class": disturbance_class, "seconds": perf_counter() - began}
@@ -245,38 +217,3 @@ def _facts(answer: Any, path: Path | None) -> dict[str, Any]:
         written.parent.mkdir(parents=True, exist_ok=True)
         save_guarantee(answer.found, written)
     return {**answer.to_dict(), "certificate": written and str(written)}
-
-
-def _swiftly(fault: Any, around: dict[str, Any], pushed: dict[str, Any], **asked: Any) -> Callable[[], Any]:
-    """Guarantee along the reference; refuses what is meant for slow sliding.
-
-    Raises
-    ------
-    ParameterError
-    """
-    from quakedesign.synthesis import answer
-
-    if any(pushed.values()):
-        raise ParameterError(
-            f"stress and spread need friction with a state. Received {fault.friction.name}. Leave them out."
-        )
-    return partial(answer, fault, **asked, **around)
-
-
-def _slowly(fault: Any, around: dict[str, Any], *, usual: bool, **asked: Any) -> Callable[[], Any]:
-    """Guarantee of slow sliding; refuses what it has no use for.
-
-    Raises
-    ------
-    ParameterError
-    """
-    from quakedesign.synthesis import answer_sliding
-
-    taken: dict[str, Any] = {name: around[name] for name in _SLOWLY}
-    if not usual or any(value for name, value in around.items() if name not in taken):
-        raise ParameterError(
-            "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
-            "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class, an initial slip "
-            "or slip rate, jitter or averaging. Leave them out."
-        )
-    return partial(answer_sliding, fault, **asked, **taken)

@@ -13,7 +13,9 @@ from quakedesign.loop.actuators import Actuator, Stage, stages
 from quakedesign.loop.actuators.base import Option
 
 if TYPE_CHECKING:
+    from quakedesign.cli.options import RunOptions
     from quakedesign.simulation import Sensor
+    from quakedesign.studies.single import Choice
 
 _ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
 _SENSORS = Group("Sensors (schemes that sample)")
@@ -42,6 +44,11 @@ class ActuatorOptions:
     def told(self) -> dict[str, Any]:
         """Values in SI units, by the names of the options."""
         return dict(vars(self))
+
+    def path(self) -> dict[str, float]:
+        """Delay, lag and diffusion [s] that are given: what a law can be designed for."""
+        told = self.told()
+        return {name: told[name] for name in ("delay", "lag", "diffusion") if told[name]}
 
     def build(self, step: float, seed: int = 0) -> Actuator:
         """Stages of an actuator in the order of the signal, for a sampling period [s] and a seed of the jitter.
@@ -150,3 +157,25 @@ class SensorOptions(EstimateOptions):
             quantum=self.slip_quantum,
             inner_steps=self.differentiator_steps,
         )
+
+
+def surroundings(
+    chosen: "Choice | None",
+    step: float,
+    run: "RunOptions",
+    actuator: ActuatorOptions,
+    sensors: SensorOptions,
+    seed: int,
+) -> "tuple[int, Actuator, Sensor]":
+    """Substeps, actuator and sensor of a run with a sampling period [s].
+
+    Stages for which a law of samples is designed, with the substeps that they need, and the noise of its certificate
+    stand where none is given.
+    """
+    from quakedesign.simulation.run import own_path
+
+    told, seen = actuator.build(step, seed), sensors.build(step, seed)
+    if chosen is None:
+        return run.substeps, told, seen
+    meant, substeps = own_path(chosen.controller, None, run.substeps)
+    return substeps, told.completed(meant) if meant else told, seen if seen.noisy else chosen.noise(seed)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from quakedesign.cli.hardware import ActuatorOptions, EstimateOptions, SensorOptions
+from quakedesign.cli.hardware import ActuatorOptions, EstimateOptions, SensorOptions, surroundings
 from quakedesign.cli.options import (
     PLAIN,
     FaultName,
@@ -15,7 +15,7 @@ from quakedesign.cli.options import (
     RunOptions,
     StartOptions,
 )
-from quakedesign.cli.shared import app, console, given, new_file, print_json, print_lines, progress
+from quakedesign.cli.shared import app, console, given, new_file, print_lines, progress
 from quakedesign.cli.state import NO_STATE, StateOptions, require_no_state_options, show_state_run
 from quakedesign.cli.units import Gains, Seconds, Texts, Whole
 from quakedesign.errors import ParameterError
@@ -68,10 +68,10 @@ def simulate(
         return show_state_run(loaded, simulate, options)
     require_no_state_options(state, loaded)
     loaded = start.task(loaded)
-    chosen, load = law.choose(loaded), run.load()
+    chosen, load = law.choose(loaded, run.step, actuator.path()), run.load()
     way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
     period = loaded.sampling_time if step is None else step
-    chain, told = actuator.build(period, seed), sensors.build(period, seed)
+    substeps, chain, told = surroundings(chosen, period, run, actuator, sensors, seed)
     with progress() as tell:
         tell("compiling", 0.0)
         trajectory, premises = run_single(
@@ -84,7 +84,7 @@ def simulate(
             scheme=way,
             method=run.method,
             plant=run.plant,
-            substeps=run.substeps,
+            substeps=substeps,
             actuator=chain,
             noise=told,
             initial=start.state(),
@@ -92,10 +92,9 @@ def simulate(
         )
     if out is not None:
         trajectory.save(out)
-    if output.json:
-        print_json(_answer(trajectory, loaded, premises))
-    else:
-        _print_run(trajectory, loaded, premises)
+    proved = chosen.claim.sentence() if chosen and chosen.claim else None
+    answer = _answer(trajectory, loaded, premises) | {"guarantee": proved}
+    output.show(answer, lambda: _print_run(trajectory, loaded, premises, proved))
     return 0
 
 
@@ -120,13 +119,14 @@ def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
     }
 
 
-def _print_run(trajectory: Any, fault: Any, premises: Any) -> None:
+def _print_run(trajectory: Any, fault: Any, premises: Any, proved: str | None) -> None:
     from quakedesign.report.terminal import print_run
 
     print_run(trajectory, fault, premises, console())
     if trajectory.energy:
         lost = f"{trajectory.energy.relative_residual:.2g} of the largest share"
         print_lines([f"  energy that the integration loses: {lost}"])
+    print_lines([f"  proved: {proved}"] if proved else [])
 
 
 @app.command
@@ -212,7 +212,7 @@ def export(
     Parameters
     ----------
     step
-        Sampling period; the fault's unless given.
+        Sampling period, for which designed gains are designed; the fault's unless given.
     scheme
         explicit (unless given), implicit, semi-implicit or compensated.
     fmu
@@ -225,7 +225,7 @@ def export(
     from quakedesign.studies.exporting import export_answer
 
     loaded = load_fault(fault)
-    chosen = law.choose(loaded)
+    chosen = law.choose(loaded, step)
     if chosen is None:
         raise ParameterError("export needs a controller. Received none. Give --controller.")
     folder = out or Path(f"quakedesign-{loaded.name}-{chosen.controller.name}")
@@ -236,6 +236,7 @@ def export(
         step=step,
         scheme=scheme,
         **sensors.told(),
+        remarks=(f"proved: {chosen.claim.sentence()}",) if chosen.claim else (),
         fmu=fmu,
         force=force,
     )

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from quakedesign.cli.shared import hush, print_json, print_lines
 from quakedesign.cli.units import Gains, Metres, MetresPerSecond, Push, Seconds, Whole
+from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:
     from quakedesign.controllers import Controller
@@ -103,24 +105,46 @@ class LawOptions:
     controller
         cta, dia or elqr, or module:Class of your own; none where a command can do without.
     gains
-        published, designed, continuous (designed in continuous time), or those of the law (λ = 1, divisor μ_res·N̂_min);
-        for friction with a state designed.
+        published, designed (for the T_s, delay, lag and diffusion of the command), continuous (designed in continuous
+        time), or those of the law (λ = 1, divisor μ_res·N̂_min); for friction with a state designed.
     scale
         λ of a sliding mode in place of that of the gains, decimal or p/q.
     feedforward
         none, nominal or centred: what a sliding mode adds to ν from what is known of the fault; not to designed gains.
+    certificate
+        File that guarantee --out has written of an e-LQR, in place of the above: its law runs, with its T_s, limit and
+        noise, behind the delay, lag and rock that it is proved for.
     """
 
     controller: str = "cta"
     gains: Gains = ("published",)
     scale: str | None = None
     feedforward: str = "none"
+    certificate: Path | None = None
 
-    def choose(self, fault: "Fault") -> "Choice | None":
-        """Controller for a fault and what is certified of it; None where none is asked for."""
-        from quakedesign.studies.single import optional_choice
+    def choose(
+        self, fault: "Fault", step: float | None = None, path: dict[str, float] | None = None
+    ) -> "Choice | None":
+        """Controller for a fault and what is certified of it; None where none is asked for.
 
-        return optional_choice(fault, self.controller, self.gains, scale=self.scale, feedforward=self.feedforward)
+        A designed one is for a T_s [s], the fault's unless given, and a path, see `quakedesign.studies.single.choice`.
+        """
+        from quakedesign.studies.single import certified_choice, optional_choice
+
+        told = {"scale": self.scale, "feedforward": self.feedforward}
+        if self.certificate is None:
+            return optional_choice(fault, self.controller, self.gains, **told, step=step, path=path)
+        usual = [type(self)().controller, "elqr"]
+        if (
+            self.controller not in usual
+            or self.gains != ("published",)
+            or told != {"scale": None, "feedforward": "none"}
+        ):
+            raise ParameterError(
+                "a certificate holds its law, an e-LQR. Received another controller, gains, a scale or a feedforward "
+                f"with {self.certificate}. Leave them out."
+            )
+        return certified_choice(fault, self.certificate)
 
 
 @Parameter(name="*")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
-from quakedesign.cli.shared import given
+from quakedesign.cli.shared import given, refuse
 from quakedesign.cli.units import Pascals, Seconds
 from quakedesign.errors import ParameterError
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from quakedesign.cli.options import LawOptions
     from quakedesign.fault import Fault
     from quakedesign.simulation.recording import Recording
+    from quakedesign.studies.single import Choice
 
 _GROUP = Group("Friction with a state (rate-and-state)")
 _BOTH = {"duration": "duration", "plant": "plant", "method": "method"}
@@ -127,7 +128,9 @@ class SpreadOptions:
     stress: Pascals | None = None
     stress_period: Seconds | None = None
 
-    def choose(self, fault: "Fault", law: "LawOptions", diffusion: float | None) -> tuple[Any, dict[str, Any]]:
+    def choose(
+        self, fault: "Fault", law: "LawOptions", step: float | None, path: dict[str, float]
+    ) -> tuple["Choice | None", dict[str, Any]]:
         """Law of a campaign, and what it is told of spread and stress, which friction without a state does not have.
 
         With a state it is the law that `design` finds for the nominal normal stress, stiffness and damping, whatever
@@ -142,18 +145,22 @@ class SpreadOptions:
                 raise ParameterError(
                     f"spread and stress need friction with a state. Received {fault.friction.name}. Leave them out."
                 )
-            chosen = law.choose(fault)
-            return chosen and chosen.controller, {}
+            return law.choose(fault, step, path), {}
         from quakedesign.rationals import rational
+        from quakedesign.studies.single import Choice
         from quakedesign.synthesis import design
 
+        refuse({"certificate": law.certificate}, "friction with a state")
         _require_designed({"controller": law.controller, "gains": law.gains})
         off = rational(self.spread, "spread")
+        diffusion = path.get("diffusion")
         designed = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=self.stress, spread=off)
         if designed.controller is None or designed.sliding is None:
             raise ParameterError(f"a campaign needs a law. Received none from design: {designed.details['reason']}.")
         told = {"spread": off, "stress": float(designed.sliding.task.stress)}
-        return designed.controller, told | ({} if self.stress_period is None else {"stress_period": self.stress_period})
+        return Choice(controller=designed.controller), told | (
+            {} if self.stress_period is None else {"stress_period": self.stress_period}
+        )
 
 
 def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:

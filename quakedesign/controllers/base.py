@@ -265,6 +265,12 @@ class Controller(Law):
         """T_s [s] of a law of samples; None in continuous time."""
         return float(self.sampling.step) if self.sampling else None
 
+    def other_step(self, fault: Fault) -> str:
+        """That a law of samples does not run at the T_s of a fault, for which it is not proved; empty if it does."""
+        if self.sampling_time in (None, fault.sampling_time):
+            return ""
+        return f"NOT for the fault's T_s = {fault.sampling_time:g} s: it runs once every {self.sampling_time:.4g} s"
+
     @property
     def of_slip(self) -> Any:
         """Matrices of a linear law of samples that is told the slip alone (`quakedesign.loop.LinearLaw`), or None."""

@@ -2,12 +2,14 @@
 
 import re
 from decimal import Decimal
+from fractions import Fraction
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from quakedesign.errors import UnitError
+from quakedesign.errors import ParameterError, UnitError
+from quakedesign.rationals import rational
 from quakedesign.text import nearest_name, shown
 
 _TIMES = {"s": "1", "ms": "0.001", "us": "0.000001", "min": "60", "h": "3600", "hour": "3600", "day": "86400"}
@@ -137,6 +139,22 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
             f"{name} must be an angular frequency in rad/s. Received {quantity!r}. Give 2π times it in rad/s."
         )
     return float(converted.magnitude)
+
+
+def exact_value(quantity: str | float | Fraction, unit: str, name: str) -> Fraction:
+    """Exact number of a quantity: one in the SI unit, decimal or p/q, or a text with a unit.
+
+    Raises
+    ------
+    ParameterError
+        Also `UnitError`, as of `si_value`.
+    """
+    try:
+        return rational(quantity, name)
+    except ParameterError:
+        if not isinstance(quantity, str):
+            raise
+    return rational(si_value(quantity, unit, name), name)
 
 
 def _plain_number(number: float, unit: str, received: str) -> float:

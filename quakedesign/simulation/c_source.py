@@ -37,6 +37,8 @@ class ControllerStep:
         Sampling period T_s [s].
     facts : mapping of str to str
         Where it comes from: fault, law, gains, scheme, versions.
+    remarks : tuple of str
+        What is said first of it, a sentence each.
     """
 
     function: Any
@@ -44,6 +46,7 @@ class ControllerStep:
     start: Mapping[str, float]
     step: float
     facts: Mapping[str, str]
+    remarks: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able facts."""
@@ -52,6 +55,7 @@ class ControllerStep:
             "measurement": dict(self.measurement),
             "memory": dict(self.start),
             "facts": dict(self.facts),
+            "remarks": list(self.remarks),
         }
 
 
@@ -60,7 +64,18 @@ def header_text(exported: ControllerStep) -> str:
     measured = (f"measurement[{i}]: {name} [{unit}]" for i, (name, unit) in enumerate(exported.measurement.items()))
     kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(exported.start.items()))
     facts = (f"{name}: {value}" for name, value in exported.facts.items())
-    lines = ["A sampled controller for a fault, in SI units.", "", *_wrapped(_USE), "", _COMPILE, "", *measured, *kept]
+    said = [part for remark in exported.remarks for part in (*_wrapped(remark), "")]
+    lines = [
+        *said,
+        "A sampled controller for a fault, in SI units.",
+        "",
+        *_wrapped(_USE),
+        "",
+        _COMPILE,
+        "",
+        *measured,
+        *kept,
+    ]
     comment = _comment([*lines, "", "Where it comes from:", *facts])
     sizes = {"step": repr(exported.step), "measurements": len(exported.measurement), "memory": len(exported.start)}
     return comment + c_file("controller.h", **sizes)

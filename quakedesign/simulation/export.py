@@ -26,7 +26,12 @@ _TOLD = ("gains", "sampling")  # in other words
 
 
 def controller_step(
-    fault: Fault, controller: Controller, *, step: float | None = None, scheme: str | Scheme | None = None
+    fault: Fault,
+    controller: Controller,
+    *,
+    step: float | None = None,
+    scheme: str | Scheme | None = None,
+    remarks: tuple[str, ...] = (),
 ) -> ControllerStep:
     """Sampled step of a controller, built from that of `simulate` with the same scheme, without noise.
 
@@ -41,6 +46,8 @@ def controller_step(
         One that samples; that of a law of samples, or ``explicit``, unless given. Of its measurement the part that runs
         on the controller is kept: with a `Sensor` the slip is measured alone, else slip and slip rate, if the step uses
         it.
+    remarks : tuple of str
+        Further sentences to be said first, after what is said of the T_s and of what stands behind the law.
 
     Returns
     -------
@@ -63,7 +70,12 @@ def controller_step(
     function, start = _function(loop, chosen, float(period), len(measurement))
     facts = _facts(fault, controller, chosen)
     return ControllerStep(
-        function=expanded(function), measurement=measurement, start=start, step=float(period), facts=facts
+        function=expanded(function),
+        measurement=measurement,
+        start=start,
+        step=float(period),
+        facts=facts,
+        remarks=(*_remarks(fault, controller), *remarks),
     )
 
 
@@ -74,6 +86,7 @@ def export_controller(
     *,
     step: float | None = None,
     scheme: str | Scheme | None = None,
+    remarks: tuple[str, ...] = (),
     fmu: bool = False,
     force: bool = False,
 ) -> ControllerStep:
@@ -88,7 +101,7 @@ def export_controller(
         As in `controller_step`.
     folder : str or Path
         New folder in an existing one.
-    step, scheme
+    step, scheme, remarks
         As in `controller_step`; step [s].
     fmu : bool
         Write ``controller.fmu`` beside them: the same step for co-simulation with FMI 2.0, with a binary for this
@@ -109,7 +122,7 @@ def export_controller(
     """
     target = Path(folder)
     _require_free(target, force)
-    exported = controller_step(fault, controller, step=step, scheme=scheme)
+    exported = controller_step(fault, controller, step=step, scheme=scheme, remarks=remarks)
     contents: dict[str, str | bytes] = {HEADER: header_text(exported), SOURCE: source_text(exported, HEADER)}
     if fmu:
         contents[UNIT], platform = model_unit(exported)
@@ -168,6 +181,15 @@ def _uses_rate(function: Any) -> bool:
 def _after(loop: ClosedLoop, scheme: Sampled, counter: Any, state: Any, step: float) -> Any:
     """Integral states and memory at the next sample; they do not depend on how the plant moves meanwhile."""
     return scheme.advance(loop, integrator("rk4"), counter, state, step)[2:]
+
+
+def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
+    """That a law of samples is for another T_s than the fault's, and behind what its pressure is meant to act."""
+    own = controller.sampling
+    path = {"a delay of": own.delay, "a lag of": own.lag, "rock of L^2/D =": own.diffusion} if own else {}
+    between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
+    behind = f"designed for {between} between its answer and the fault: the pressure is that to ask of the valve"
+    return tuple(filter(None, (controller.other_step(fault), behind if between else "")))
 
 
 def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, str]:

@@ -108,7 +108,9 @@ class PressurePath:
         ------
         ParameterError
         """
-        given = Actuator.meant_for(replace(meant, lag=Fraction(0), diffusion=Fraction(0))) if actuator is None else actuator
+        given = (
+            Actuator.meant_for(replace(meant, lag=Fraction(0), diffusion=Fraction(0))) if actuator is None else actuator
+        )
         stages, flowing = given.sampled, given.flowing
         if not flowing:
             return cls(lag=meant.lag, diffusion=meant.diffusion, stages=stages)

@@ -26,6 +26,7 @@ def export_answer(
     filter_order: int = 0,
     averaging: int = 1,
     differentiator_steps: int = 1,
+    remarks: tuple[str, ...] = (),
     fmu: bool = False,
     force: bool = False,
 ) -> dict[str, Any]:
@@ -33,7 +34,7 @@ def export_answer(
 
     Parameters
     ----------
-    fault, law, folder, step, fmu, force
+    fault, law, folder, step, remarks, fmu, force
         As in `quakedesign.simulation.export_controller`.
     scheme : str, optional
         That of a law of samples, or ``explicit``, unless given.
@@ -51,7 +52,7 @@ def export_answer(
     Returns
     -------
     dict
-        ``step, measurement, memory, facts, files, premises``.
+        ``step, measurement, memory, facts, remarks, files, premises``.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def export_answer(
     inner = {"order": differentiator_order, "averaging": averaging, "inner_steps": differentiator_steps}
     seen = sensor(period, EXACT, differentiator_bound, filter_order, **inner)
     chosen = sampled_scheme(way, measurement=seen, **own)
-    exported = export_controller(fault, law, folder, step=step, scheme=chosen, fmu=fmu, force=force)
+    exported = export_controller(fault, law, folder, step=step, scheme=chosen, remarks=remarks, fmu=fmu, force=force)
     premises = []
     if isinstance(seen, OutputFeedback):
         premises.append(differentiator_premise(fault, law, seen, scheme=chosen.name))

@@ -1,25 +1,29 @@
 """One run of one controller, as the command line asks for it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
+from quakedesign.certificates import Verdict, load_guarantee
+from quakedesign.certificates.guarantee import Guarantee, task_of
+from quakedesign.certificates.guarantee.about import differences
 from quakedesign.certificates.premises import Premise, least_authority
-from quakedesign.controllers import Controller, control_law, published
+from quakedesign.controllers import Controller, Sampling, control_law, published
 from quakedesign.controllers.feed_forward import feed_forward
-from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.errors import CertificateError, ParameterError, UnknownNameError, require_known
 from quakedesign.fault import Fault
 from quakedesign.loop.actuators import DIRECT
 from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.loop.sensing import OutputFeedback, Sensor
-from quakedesign.loop.sensing.measurement import EXACT
+from quakedesign.loop.sensing.measurement import EXACT, Measurement
 from quakedesign.rationals import rational
 from quakedesign.simulation import Actuator, Load, Trajectory, natural_earthquake
 from quakedesign.simulation import simulate as run_loop
 from quakedesign.studies.estimation import differentiator_premise
 from quakedesign.studies.on_trajectory import certified_bound, trajectory_premise
-from quakedesign.synthesis import design
+from quakedesign.synthesis import answer, design
 
 PUBLISHED, DESIGNED, CONTINUOUS = ("published",), ("designed",), ("continuous",)
 
@@ -33,10 +37,19 @@ class Choice:
     controller : Controller
     lipschitz : Fraction or None
         Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law.
+    claim : Guarantee or None
+        What is proved of the law as it runs, where it comes from the file of that.
     """
 
     controller: Controller
     lipschitz: Fraction | None = None
+    claim: Guarantee | None = None
+
+    def noise(self, seed: int) -> Measurement:
+        """What the controller is told wrongly at most by its guarantee, anywhere within that; none without one."""
+        held = self.claim.held if self.claim else None
+        off = {name: float(bound) for name, bound in held.noise.items()} if held else {}
+        return Measurement(**off, seed=seed, bounded=True) if off else EXACT
 
 
 def chosen_controller(
@@ -46,9 +59,36 @@ def chosen_controller(
     return choice(fault, name, gains, scale=scale, feedforward=feedforward).controller
 
 
-def optional_choice(
-    fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
-) -> Choice | None:
+def certified_choice(fault: Fault, path: str | Path) -> Choice:
+    """Law of a file of `guarantee`, which must be about the fault and hold; its proof is checked anew.
+
+    Raises
+    ------
+    CertificateError
+        When the file cannot be read, is about something else, or does not hold.
+    UnsupportedError
+        For a sliding mode.
+    """
+    claim = load_guarantee(path)
+    if not isinstance(claim, Guarantee):
+        raise CertificateError(
+            "the law of a certificate runs once per sample and follows a reference. Received "
+            f"{path}, a law in continuous time or one of slow sliding. Give a file of guarantee FAULT --out FILE; "
+            "slow sliding is run in Python, by qd.simulate(fault, qd.load_guarantee(path).controller)."
+        )
+    apart = differences(claim.task, task_of(fault, rate_limited=claim.task.change is not None))
+    if apart:
+        raise CertificateError(
+            f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
+            f"{'; '.join(apart)}. Give the fault that it is about, or prove a new one with guarantee."
+        )
+    controller = claim.controller
+    if claim.check() is not Verdict.PROVED:
+        raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
+    return Choice(controller=controller, claim=claim)
+
+
+def optional_choice(fault: Fault, name: str, gains: tuple[str, ...], **more: Any) -> Choice | None:
     """A `choice`, which see, or None for the name ``none``.
 
     Raises
@@ -57,14 +97,21 @@ def optional_choice(
         Also for gains, a scale or a feed-forward of no controller.
     """
     if name != "none":
-        return choice(fault, name, gains, scale=scale, feedforward=feedforward)
-    if gains != PUBLISHED or scale is not None or feedforward != "none":
+        return choice(fault, name, gains, **more)
+    if gains != PUBLISHED or more.get("scale") is not None or more.get("feedforward", "none") != "none":
         raise ParameterError("gains, scale and feedforward need a controller. Received none. Give --controller.")
     return None
 
 
 def choice(
-    fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
+    fault: Fault,
+    name: str,
+    gains: tuple[str, ...],
+    *,
+    scale: str | None = None,
+    feedforward: str = "none",
+    step: float | None = None,
+    path: Mapping[str, float] | None = None,
 ) -> Choice:
     """Controller from a law's name and ``("published",)``, ``("designed",)``, ``("continuous",)`` or exact gains.
 
@@ -80,12 +127,16 @@ def choice(
         λ of a sliding mode in place of that of the gains.
     feedforward : str
         ``none``, ``nominal`` or ``centred``; for a sliding mode.
+    step : float, optional
+        T_s [s] of a design; the fault's unless given.
+    path : mapping of str to float, optional
+        Delay, lag and diffusion [s] for which a law is designed as it runs, as `answer` does; none unless given.
 
     Raises
     ------
     UnknownNameError, ParameterError
     """
-    law, base = _with_gains(fault, name, gains)
+    law, base = _with_gains(fault, name, gains, step, path or {})
     if law.divisor is None:
         if scale is None and feedforward == "none":
             return Choice(controller=law, lipschitz=base)
@@ -103,7 +154,9 @@ def choice(
     )
 
 
-def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> tuple[Controller, Fraction | None]:
+def _with_gains(
+    fault: Fault, name: str, gains: tuple[str, ...], step: float | None, path: Mapping[str, float]
+) -> tuple[Controller, Fraction | None]:
     """Law, and the bound on |h'| that is certified for λ = 1."""
     law = control_law(name)
     if len(gains) == 1 and gains[0].isalpha():
@@ -116,12 +169,37 @@ def _with_gains(fault: Fault, name: str, gains: tuple[str, ...]) -> tuple[Contro
                 "Give --gains designed, or the gains of the law."
             )
         return known[name], None
+    if gains == DESIGNED and step is not None:
+        fault = replace(fault, sampling_time=step)
+    if gains == DESIGNED and path:
+        return _designed_behind(fault, name, path), None
     if gains in (DESIGNED, CONTINUOUS):
         designed = design(fault, name, continuous=gains == CONTINUOUS)
         if designed.controller is None:
             raise ParameterError(f"no gains with a proof were found for {name} on {fault.name}. Give --gains.")
         return designed.controller, certified_bound(designed)
     return law.for_authority(gains, least_authority(fault)), None
+
+
+def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Controller:
+    """Law that is designed for a delay, a lag and rock, as it runs at the fault's T_s.
+
+    Raises
+    ------
+    ParameterError
+        Where none has a proof, or the delay is no whole number of periods.
+    """
+    around: Any = {part: rational(time, part) for part, time in path.items()}
+    Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **around))
+    found = answer(fault, controller=name, **around)
+    if not isinstance(found.found, Guarantee):
+        told = ", ".join(f"{part} {time:g} s" for part, time in path.items())
+        sooner = f"--step '{float(found.shorter.held.step):g} s', where it has, " if found.shorter else ""
+        raise ParameterError(
+            f"designed gains must have a proof behind what is around them. Received {name} with {told}, "
+            f"T_s = {fault.sampling_time:g} s: {found.found.reason}. Give {sooner}gains as numbers, or see limits."
+        )
+    return found.compensation.limited if found.compensation else found.found.controller
 
 
 def run_single(

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from quakedesign.synthesis.gains.synthesise import synthesise as synthesise
     from quakedesign.synthesis.guarantee import answer as answer
     from quakedesign.synthesis.guarantee import answers as answers
+    from quakedesign.synthesis.guarantee import guarantee as guarantee
     from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding as answer_sliding
     from quakedesign.synthesis.methods.base import designable as designable
     from quakedesign.synthesis.methods.base import left_out as left_out

@@ -95,10 +95,7 @@ class Design:
     @property
     def other_step(self) -> str:
         """That a law of samples does not run at the fault's T_s, for which it is not proved; empty if it does."""
-        step = self.controller.sampling_time if self.controller else None
-        if step is None or step == self.fault.sampling_time:
-            return ""
-        return f"NOT for the fault's T_s = {self.fault.sampling_time:g} s: it runs once every {step:.4g} s"
+        return self.controller.other_step(self.fault) if self.controller else ""
 
     def with_premise(self, premise: Premise) -> "Design":
         """Return the design with one more premise, such as one read off a run."""

@@ -3,18 +3,22 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from fractions import Fraction
-from typing import TypeVar, Unpack
+from functools import partial
+from typing import Any, TypeVar, Unpack
 
 from quakedesign.certificates.guarantee import NoGuarantee, task_of
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.impossibility import hopeless
 from quakedesign.controllers import Controller, control_law
 from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.executors import crew_or_here
 from quakedesign.fault import Fault
+from quakedesign.fault.units import exact_value
 from quakedesign.rationals import rational
-from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, Answer
+from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, OBJECTIVES, Answer
 from quakedesign.synthesis.guaranteed.families import require_surroundings
+from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer, answer_sliding
 from quakedesign.synthesis.methods.base import Wanted, method_of
 
 Found = TypeVar("Found")
@@ -119,3 +123,156 @@ def answer(
         return Answer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None))
     wanted = Wanted(gains=gains, objective=objective, scheme=scheme, measured=measured, around=around)
     return method_of(law).sampled(fault, task, law, period, wanted)
+
+
+_UNITS = {
+    "delay": "s",
+    "lag": "s",
+    "diffusion": "s",
+    "slip_noise": "m",
+    "rate_noise": "m/s",
+    "initial_slip": "m",
+    "initial_slip_rate": "m/s",
+    "jitter": "s",
+    "delay_jitter": "s",
+    "averaging_time": "s",
+}
+_SLOWLY = ("delay", "lag", "diffusion", "slip_noise", "pump")
+Quantity = str | float | Fraction
+
+
+def guarantee(
+    fault: Fault,
+    controller: str | type[Controller] = "elqr",
+    *,
+    objective: str = "tracking",
+    gains: tuple[str, ...] = (),
+    scheme: str | None = None,
+    step: Quantity | None = None,
+    measured: str = MEASURED[0],
+    disturbance_class: str = CLASSES[0],
+    saturation: Quantity | None = None,
+    withdrawal: Quantity | None = None,
+    rate_limit: Quantity | None = None,
+    stress: Quantity | None = None,
+    spread: Quantity = 0,
+    **around: Quantity,
+) -> Answer | SlidingAnswer:
+    """Prove how far slip, slip rate and pressure of the loop that runs can go, as the command `guarantee` does.
+
+    Every quantity is a number in SI units, a decimal or p/q as text, or a text with its unit, such as ``"80 ms"``.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : str or type of Controller
+        ``elqr``, or a sliding mode, ``cta`` or ``dia``.
+    objective : str
+        Of a design: ``tracking``, or ``peak`` for the smallest proved slip-rate error.
+    gains : tuple of str
+        k1 to k4 of an e-LQR whose integrals are summed once per sample, base gains of a sliding mode; none to design.
+    scheme : str, optional
+        As in `answer`.
+    step : str, float or Fraction, optional
+        T_s [s]; the fault's unless given.
+    measured : str
+        ``slip-and-rate``, or ``slip`` for a designed e-LQR with an observer.
+    disturbance_class : str
+        ``amplitude`` or ``rate``.
+    saturation, withdrawal : str, float or Fraction, optional
+        Largest pressure of the pump, and largest decrease unless that is the same [Pa]: limits that are never reached.
+    rate_limit : str, float or Fraction, optional
+        How fast the pump goes from one pressure to the next [Pa/s].
+    stress : str, float or Fraction, optional
+        Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that the design stands unless
+        given.
+    spread : str, float or Fraction
+        Of friction with a state: by how much of their values a, b and D_c may be off [-].
+    **around : str, float or Fraction
+        ``delay``, ``lag`` and ``diffusion`` (L²/D) [s], ``slip_noise`` [m] and ``rate_noise`` [m/s] as bounds, and
+        ``initial_slip`` [m] and ``initial_slip_rate`` [m/s] as bounds of the start, ``jitter``, ``delay_jitter``
+        and ``averaging_time`` [s]; 0 unless given.
+
+    Returns
+    -------
+    Answer or SlidingAnswer
+        Its ``lines()`` are what the command prints; ``found`` is the guarantee, which has a ``controller`` for
+        `simulate`, `loop_transfer` and `export_controller`, or the reason why there is none.
+
+    Raises
+    ------
+    ParameterError, UnsupportedError
+    """
+    return question(
+        fault,
+        controller=controller,
+        objective=objective,
+        gains=gains,
+        scheme=scheme,
+        step=None if step is None else exact_value(step, "s", "step"),
+        measured=measured,
+        disturbance_class=disturbance_class,
+        stress=None if stress is None else exact_value(stress, "Pa", "stress"),
+        spread=exact_value(spread, "", "spread"),
+        **exact_surroundings(saturation=saturation, withdrawal=withdrawal, rate_limit=rate_limit, **around),
+    )()
+
+
+def exact_surroundings(
+    *,
+    saturation: Quantity | None = None,
+    withdrawal: Quantity | None = None,
+    rate_limit: Quantity | None = None,
+    **around: Quantity,
+) -> dict[str, Any]:
+    """What is around a law as rationals in SI units, and the pump, None without limits.
+
+    Raises
+    ------
+    ParameterError
+        For another name, or a withdrawal without a largest pressure.
+    """
+    for name in around:
+        require_known(name, _UNITS, "part of what is around a law")
+    values: Any = {name: exact_value(given, _UNITS[name], name.replace("_", " ")) for name, given in around.items()}
+    averaging = values.pop("averaging_time", Fraction(0))
+    if averaging:
+        values |= {"averaging": averaging, "delay": values.get("delay", Fraction(0)) + max(averaging, Fraction(0)) / 2}
+    asked = {"saturation": (saturation, "Pa"), "withdrawal": (withdrawal, "Pa"), "rate_limit": (rate_limit, "Pa/s")}
+    told = {name: exact_value(given, unit, name) for name, (given, unit) in asked.items() if given is not None}
+    largest, rate = told.get("saturation"), told.get("rate_limit")
+    if largest is None and "withdrawal" in told:
+        raise ParameterError(
+            "a withdrawal belongs to a saturation, the largest pressure. Received it alone. Give both."
+        )
+    least = None if largest is None else -told.get("withdrawal", largest)
+    return {**values, "pump": Pump(least=least, largest=largest, rate=rate) if told else None}
+
+
+def question(
+    fault: Fault, *, step: Fraction | None, stress: Fraction | None, spread: Fraction, **asked: Any
+) -> Callable[[], Answer | SlidingAnswer]:
+    """What `guarantee` is asked, known to other processes; refuses what the friction of the fault has no use for.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not fault.friction.state_names:
+        if stress is not None or spread:
+            raise ParameterError(
+                f"stress and spread need friction with a state. Received {fault.friction.name}. Leave them out."
+            )
+        return partial(answer, fault, step=step, **asked)
+    usual = {"gains": (), "scheme": None, "objective": OBJECTIVES[0], "disturbance_class": CLASSES[0]}
+    foreign = [name for name, value in asked.items() if name not in (*_SLOWLY, "controller", "measured") and value]
+    if [name for name in foreign if asked[name] != usual.get(name)]:
+        raise ParameterError(
+            "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
+            "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class, an initial slip "
+            "or slip rate, jitter or averaging. Leave them out."
+        )
+    taken: Any = {name: asked[name] for name in _SLOWLY if name in asked}
+    return partial(
+        answer_sliding, fault, controller=asked["controller"], step=step, stress=stress, spread=spread, **taken
+    )

@@ -123,6 +123,8 @@ LIMITS = [
     (CONTINUOUS, ("loop", "noise"), [], [{"slip": "0", "rate": "0"}]),
     (CONTINUOUS, ("loop", "diffusion"), [], ["1"]),
     (CONTINUOUS, ("loop", "pump"), [], [PUMPED["loop"]["pump"]]),
+    (CONTINUOUS, ("loop", "applied"), [], [["0"]]),
+    (HELD, ("loop", "applied"), [["0"], ["-1/3"]], [[], ["0", "1"], ["0.5"], [0], [["0"]], "0", None, 5, {"0": 1}]),
     (PUMPED, ("loop", "pump"), [{"least": "0", "largest": "5"}, {"least": "-4", "largest": "0"}],
      [{"least": "0", "largest": "0"}, {"least": "1/9", "largest": "5"}, {"least": "-4", "largest": "-1/9"},
       {"least": "-4"}, {"largest": "5"}, {"least": "-4", "largest": "5", "rate": "1"}, {}, [], "5", None, 5]),

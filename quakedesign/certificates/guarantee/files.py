@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from quakedesign.bounds import LowerBound, UpperBound
+from quakedesign.certificates.files import read_json
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
 from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.slow_gain import SlowGain
@@ -47,6 +48,7 @@ _SLIDING_REFERENCE = ("rate", "distance", "ramp")
 _NOISE = ("slip", "rate")
 _LIMITS, _JITTER = ("least", "largest"), ("measured", "delay")
 _LAW = ("states", "measured", "output", "feedback")
+_MORE = {"root", "noise", "diffusion", "first", "jitter", "pump", "applied"}
 _FAULT = re.compile(r"\w[\w .+-]{0,59}")
 _MOST_COEFFICIENTS = 13
 _MOST_STATES = 20
@@ -59,6 +61,27 @@ def guarantee_text(claim: Claim) -> str:
     bounds = {part.name: getattr(claim.claims, part.name) for part in fields(claim.claims)}
     claims = {name: bound.exact for name, bound in bounds.items() if bound is not None}
     return json.dumps({"format": 1, **about, "claims": claims}, indent=1) + "\n"
+
+
+def load_guarantee(path: str | Path) -> Claim:
+    """Read a file of `guarantee`; reading verifies nothing, `check` of what is read does.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Guarantee, ContinuousPeaks or SlidingGuarantee
+        The first has a ``controller`` for `simulate`, `export_controller` and `loop_transfer`: the law with its T_s and
+        its limit at rest, behind the delay, lag and rock that it is proved for.
+
+    Raises
+    ------
+    CertificateError
+        When the file cannot be read or breaks a rule of FORMAT.md.
+    """
+    return read_guarantee(read_json(path))
 
 
 def save_guarantee(claim: Claim, path: str | Path) -> None:
@@ -152,6 +175,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         times |= {"diffusion": str(claim.held.diffusion)} if claim.held.diffusion else {}
         own = {"update": [texts(row) for row in claim.held.law.update]}
         own |= {"first": [texts(row) for row in claim.held.law.first]} if claim.held.law.first else {}
+        own |= {"applied": texts(claim.held.law.applied)} if claim.held.law.applied else {}
         root = claim.held.law.root
         own |= {} if root is None else {"root": _root_document(root)}
         noise = claim.held.noise
@@ -277,13 +301,12 @@ def _start(raw: Any) -> dict[str, Fraction]:
 
 
 def _held(raw: Any, start: dict[str, Fraction]) -> Held:
-    more = {"root", "noise", "diffusion", "first", "jitter", "pump"}
-    given = more & set(raw) if isinstance(raw, dict) else set[str]()
+    given = _MORE & set(raw) if isinstance(raw, dict) else set[str]()
     with_keys(raw, {*_TIMES, "update", *_LAW} | given)
     root = _read_root(raw["root"]) if "root" in given else None
-    law = LinearLaw(
-        update=_square(raw, "update"), root=root, first=_first(raw) if "first" in given else (), **_rest(raw)
-    )
+    first = _first(raw) if "first" in given else ()
+    applied = read_row(raw["applied"], "applied", length=_count(raw)) if "applied" in given else ()
+    law = LinearLaw(update=_square(raw, "update"), root=root, first=first, applied=applied, **_rest(raw))
     noise = read_exactly(raw["noise"], _NOISE) if "noise" in given else {}
     diffusion = read_rational(raw["diffusion"]) if "diffusion" in given else _ZERO
     need(diffusion > 0 or "diffusion" not in given, "diffusion must be positive where it is given")
@@ -346,7 +369,7 @@ def _cut(entry: list[Any]) -> tuple[str, Fraction]:
 
 
 def _first(raw: dict[str, Any]) -> tuple[tuple[Fraction, ...], ...]:
-    rows = listed(raw["first"], "first", length=len(listed(raw["states"], "states", _MOST_STATES)))
+    rows = listed(raw["first"], "first", length=_count(raw))
     return tuple(read_ends(row, "first") for row in rows)
 
 
@@ -358,8 +381,12 @@ def _continuous(raw: Any) -> ContinuousLaw:
 
 
 def _square(raw: dict[str, Any], name: str) -> tuple[tuple[Fraction, ...], ...]:
-    size = len(listed(raw["states"], "states", _MOST_STATES))
+    size = _count(raw)
     return tuple(read_row(row, name, length=size) for row in listed(raw[name], name, length=size))
+
+
+def _count(raw: dict[str, Any]) -> int:
+    return len(listed(raw["states"], "states", _MOST_STATES))
 
 
 def _rest(raw: dict[str, Any]) -> dict[str, Any]:

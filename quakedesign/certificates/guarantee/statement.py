@@ -186,7 +186,10 @@ class Held:
             For a law with an implicit root, which is a controller of its own with a scheme.
         """
         if self.law.root is not None:
-            raise UnsupportedError("a law with an implicit root has no explicit run. Simulate its own controller.")
+            raise UnsupportedError(
+                "what is proved of a sliding mode tells its implicit root, not its gains. Received one. Take the "
+                "controller of its design, or its gains, scale, weight and authority in the scheme compensated."
+            )
         return loops.SampledController(law=self.law, step=self.step, **self.path)
 
     def loop(self, task: Task, model: Model | None = None) -> PeriodicLoop:

@@ -408,6 +408,8 @@ def test_entries_of_another_kind_are_refused_by_both_at_every_place(new):
             continue  # a state may have the name x
         if new is None and path[:3] == TERMS and len(path) == 4:
             continue  # a sum with one term less is a sum
+        if new is None and path == ("loop", "applied"):
+            continue  # a law need not look after limits
         text = json.dumps(changed(raw, path, new))
         assert standalone(text).startswith("invalid"), path
         assert package(text).startswith("invalid"), path

@@ -161,7 +161,7 @@ def test_a_law_runs_once_a_step_without_delay_and_lag_unless_it_has_an_implicit_
     held = Held(law=HELD.law, step=F(1, 10))
     assert (held.delay, held.lag) == (0, 0)
     assert (held.controller.law, held.controller.step) == (held.law, F(1, 10))
-    with pytest.raises(UnsupportedError, match="no explicit run"):
+    with pytest.raises(UnsupportedError, match="tells its implicit root, not its gains"):
         _ = ROOTED.controller
 
 

@@ -1,0 +1,112 @@
+"""A law from the file of its guarantee: run, exported and sampled as it is proved, for its fault alone."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction as F
+
+import pytest
+import xarray as xr
+
+import quakedesign as qd
+from quakedesign.certificates import save_guarantee
+from quakedesign.certificates.guarantee import Guarantee, Held, guarantee, task_of
+from quakedesign.cli import main
+from quakedesign.loop import Prediction, disturbance_estimate
+
+REAL = qd.load_fault("real-fault")
+STEP = F(3, 20)
+LAW = disturbance_estimate(
+    (F(672300000), F(206000000)),
+    F("0.57"),
+    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),)),
+    F("2.282e-8"),
+)
+HELD = Held(law=LAW, step=STEP, lag=F(1, 50), slip_noise=F(1, 10**7))
+CLAIM = guarantee(task_of(REAL), HELD)
+SHORT = ("--duration", "30 s")
+
+
+@pytest.fixture
+def file(tmp_path):
+    assert isinstance(CLAIM, Guarantee)
+    save_guarantee(CLAIM, tmp_path / "law.json")
+    return tmp_path / "law.json"
+
+
+def told(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main([*map(str, arguments)])
+    out, err = capsys.readouterr()
+    return stop.value.code, out, err
+
+
+def test_a_file_holds_its_law_with_the_limit_at_rest_and_what_stands_around_it(file):
+    law = qd.load_guarantee(file).controller
+    assert law.rest_limit == CLAIM.controller.rest_limit is not None
+    assert (law.law.applied, law.sampling) == (LAW.applied, CLAIM.controller.sampling)
+    assert law.sampling.path == {"delay": 0, "lag": F(1, 50), "diffusion": 0}
+    assert qd.loop_transfer(REAL, law).nstates == 2 + 1 + 2
+
+
+def test_it_runs_behind_its_lag_with_its_noise(file, capsys):
+    code, out, _ = told(capsys, "simulate", "real-fault", "--certificate", file, *SHORT, "--json")
+    answer = json.loads(out)
+    assert (code, answer["guarantee"]) == (0, CLAIM.sentence())
+    assert (answer["run"]["step"], answer["run"]["actuator"]) == (0.15, "Lag(time_constant=0.02)")
+    assert answer["run"]["measurement"] == "Measurement(slip_noise=1e-07, rate_noise=0.0, seed=0, bounded=True)"
+    code, out, _ = told(
+        capsys, "simulate", "real-fault", "--certificate", file, *SHORT, "--slip-noise", "1 nm", "--lag", "0.1 s",
+        "--saturation", "20 MPa", "--json",
+    )  # fmt: skip
+    run = json.loads(out)["run"]
+    assert run["actuator"] == "Saturation(lowest=-20000000.0, highest=20000000.0), Lag(time_constant=0.1)"
+    assert run["measurement"].startswith("Measurement(slip_noise=1e-09, ")
+
+
+def test_what_is_exported_says_first_what_it_is_for(file, capsys, tmp_path):
+    code, out, _ = told(capsys, "export", "real-fault", "--certificate", file, "--out", tmp_path / "c")
+    lines = out.splitlines()
+    assert (code, lines[0]) == (0, "NOT for the fault's T_s = 0.184 s: it runs once every 0.15 s")
+    assert lines[1].startswith("designed for a lag of 0.02 s between its answer and the fault")
+    assert "".join(lines[2:5]).replace(" ", "") == f"proved: {CLAIM.sentence()}".replace(" ", "")
+    header = (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")
+    assert header.startswith(
+        "/*\n * NOT for the fault's T_s = 0.184 s: it runs once every 0.15 s\n *\n * designed for a lag"
+    )
+    assert "rest_limit: width" in header
+    assert "#define CONTROLLER_STEP 0.15 /* s */" in header
+
+
+def test_a_campaign_runs_it_as_it_is_proved(file, capsys, tmp_path):
+    arguments = "--samples", "1", "--rerun", "0", "--workers", "1", "--duration", "3 s", "--out", tmp_path / "samples"
+    code, _, err = told(capsys, "campaign", "real-fault", "--certificate", file, *arguments)
+    assert (code, err) == (0, "")
+    with xr.open_dataset(tmp_path / "samples" / "sample-0.nc") as run:
+        assert run.attrs["actuator"] == "Lag(time_constant=0.02)"
+        assert run.attrs["measurement"].startswith("Measurement(slip_noise=1e-07, ")
+
+
+@pytest.mark.parametrize(
+    ("fault", "more", "said"),
+    [
+        ("lab-fault", (), "shear_modulus [Pa] 3.00000e+10 there"),
+        ("real-fault", ("--target-slip", "0.5 m"), "target_slip [m] 0.785 there, 0.5 here"),
+        ("real-fault", ("--gains", "designed"), "a certificate holds its law"),
+        ("real-fault", ("--controller", "cta"), "a certificate holds its law"),
+        ("real-fault", ("--step", "0.1 s"), "a law of samples runs with the scheme explicit and the step 0.15 s"),
+        ("crustal-patch", (), "certificate"),
+    ],
+)
+def test_it_is_for_its_fault_and_as_it_is(file, capsys, fault, more, said):
+    code, out, err = told(capsys, "simulate", fault, "--certificate", file, *more)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+def test_a_file_that_does_not_hold_is_not_run(file, capsys):
+    better = replace(CLAIM, claims=replace(CLAIM.claims, slip_error=type(CLAIM.claims.slip_error)(F(1, 10**9))))
+    save_guarantee(better, file)
+    code, _, err = told(capsys, "export", "real-fault", "--certificate", file, "--out", file.parent / "c")
+    assert code == 2
+    assert "whose claims do not follow" in err
+    assert not (file.parent / "c").exists()
