@@ -1,14 +1,19 @@
 """One run as the command line asks for it: gains, options, premises."""
 
 from fractions import Fraction
+from fractions import Fraction as F
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
+from quakedesign.certificates.guarantee import Guarantee, NoGuarantee
 from quakedesign.controllers import published
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import load_fault
 from quakedesign.simulation import Actuator, Lag, Load, Measurement, simulate, simulation_scheme
+from quakedesign.studies import single
 from quakedesign.studies.estimation import sensor
 from quakedesign.studies.single import Choice, choice, chosen_controller, run_single
 
@@ -142,3 +147,49 @@ def test_a_scheme_is_tuned_as_its_guarantee_says():
             run_single(LAB, law, tell=lambda _: None, tuning={"weight": 0.35}, **(USUAL | {"scheme": scheme}))
     with pytest.raises(ParameterError, match="Received weight"):
         run_single(LAB, None, tell=lambda _: None, tuning={"weight": 0.35}, **USUAL)
+
+
+def designs_in_place_of_searches(monkeypatch, found):
+    """What is asked of searches, which answer at once."""
+    asked = []
+
+    def answered(fault, *names, controller=None, continuous=False, **around):
+        asked.append((fault.sampling_time, *names, controller, around))
+        return found
+
+    monkeypatch.setattr(single, "answer", answered)
+    monkeypatch.setattr(single, "design", answered)
+    return asked
+
+
+def test_a_design_is_for_what_stands_around_it_in_the_run(monkeypatch):
+    law = single.Controller
+    proved = SimpleNamespace(found=Mock(spec=Guarantee, controller=law), compensation=None)
+    asked = designs_in_place_of_searches(monkeypatch, proved)
+    assert choice(LAB, "elqr", ("designed",), path={"lag": 0.02, "delay": 0.05}, step=0.025).controller is law
+    assert asked == [(0.025, "elqr", {"lag": F(1, 50), "delay": F(1, 20)})]
+    with pytest.raises(ParameterError, match="delay must be a whole number of sampling periods"):
+        choice(LAB, "elqr", ("designed",), path={"delay": 0.03}, step=0.025)
+    assert len(asked) == 1
+    limited = SimpleNamespace(found=proved.found, compensation=SimpleNamespace(limited="limited"))
+    designs_in_place_of_searches(monkeypatch, limited)
+    assert single._designed_behind(LAB, "cta", {"lag": 0.02}) == "limited"
+
+
+def test_a_design_without_a_proof_behind_its_path_is_refused_with_the_reason(monkeypatch):
+    sooner = SimpleNamespace(held=SimpleNamespace(step=F(1, 200)))
+    for shorter, said in ((sooner, "Give --step '0.005 s'"), (None, "Give gains as numbers")):
+        none = SimpleNamespace(found=NoGuarantee(reason="nothing holds", small_gain=None), shorter=shorter)
+        designs_in_place_of_searches(monkeypatch, none)
+        with pytest.raises(ParameterError, match=f"elqr with lag 0.02 s, T_s = 0.001 s: nothing holds. {said}"):
+            choice(LAB, "elqr", ("designed",), path={"lag": 0.02})
+
+
+def test_a_design_is_for_the_step_of_the_command(monkeypatch):
+    law = Mock(sampling=None, divisor=None)
+    found = SimpleNamespace(controller=law, certificate=None, details={})
+    asked = designs_in_place_of_searches(monkeypatch, found)
+    monkeypatch.setattr(single, "certified_bound", lambda designed: None)
+    for gains, step in ((("designed",), 0.04), (("designed",), None), (("continuous",), 0.04)):
+        assert choice(LAB, "elqr", gains, step=step).controller is law
+    assert [time for time, *_ in asked] == [0.04, LAB.sampling_time, LAB.sampling_time]
