@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _SHARED = (
     *("objective", "continuous", "measured", "slip_noise", "rate_noise"),
-    *("diffusion", "stress", "spread", "disturbance_class"),
+    *("delay", "lag", "diffusion", "stress", "spread", "disturbance_class"),
 )
 
 
@@ -48,8 +48,12 @@ class DesignOptions:
     scheme
         Of the runs of gains designed with --continuous: continuous (unless given), as in the paper, or sampled and
         held: explicit, implicit, semi-implicit, compensated. Others run as they were designed.
+    delay
+        From the measurement to the pressure at the valve, for which an e-LQR is designed and behind which it runs.
+    lag
+        The same of the time constant of pump and pipe.
     diffusion
-        Of a fault with rate-and-state friction: L²/D of the rock between well and fault; D_c/(10 V) unless given.
+        The same of L²/D of the rock between well and fault. With rate-and-state friction D_c/(10 V) unless given.
     stress
         Of such a fault: bound of the shear stress disturbance, such as '25 kPa'; the largest that the design stands
         unless given.
@@ -69,6 +73,8 @@ class DesignOptions:
     rate_noise: ExactMetresPerSecond = "0"
     disturbance_class: DisturbanceClass = "amplitude"
     scheme: str | None = None
+    delay: ExactSeconds = "0"
+    lag: ExactSeconds = "0"
     diffusion: ExactSeconds | None = None
     stress: ExactPascals | None = None
     spread: str = "0"
@@ -85,8 +91,15 @@ class DesignOptions:
 
         controllers(self.controller)
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
-        names = controllers(self._laws, loaded)
+        laws = "elqr" if self._behind(loaded) and self.controller == "all" else self._laws
+        names = controllers(laws, loaded)
         return loaded, {"names": names, "published_scheme": self.published_scheme, **self.told()}
+
+    def _behind(self, fault: "Fault") -> bool:
+        """Whether the e-LQR alone is designed: friction without a state, behind a delay, a lag or rock."""
+        return not fault.friction.state_names and any(
+            time not in (None, "0") for time in (self.delay, self.lag, self.diffusion)
+        )
 
     def told(self) -> dict[str, Any]:
         """Options of `designed_comparison`.

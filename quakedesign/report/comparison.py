@@ -64,7 +64,8 @@ def compare(
     designs : sequence of Design
         Designed controllers; one without a controller is reported and not run.
     with_published : bool
-        Add the paper's gains, where the fault has any, with their verdicts and premises.
+        Add the paper's gains, where the fault has any, with their verdicts and premises; not beside designs that act
+        behind a delay, a lag or rock, which those do not know.
     scheme, published_scheme : str
         Of the runs of designed and of published gains, see `quakedesign.loop.schemes`; ``continuous``, as in the
         paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed, as all

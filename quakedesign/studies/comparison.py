@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import partial
 from typing import Any
 
@@ -16,7 +17,7 @@ from quakedesign.simulation import Trajectory, natural_earthquake, simulate, sim
 from quakedesign.simulation.step_stability import amplification
 from quakedesign.studies.on_trajectory import certified_bound
 from quakedesign.studies.state_runs import StateRun, designed_run, natural_run
-from quakedesign.synthesis import Design, assess, left_out
+from quakedesign.synthesis import Design, assess, designable, left_out
 from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.analysis.lipschitz_on_run import largest_sampling_time, on_trajectory
 from quakedesign.synthesis.guaranteed import CLASSES, Answer, attacked
@@ -126,8 +127,14 @@ class Compared:
 
     @property
     def left_out(self) -> dict[str, str]:
-        """Why laws that are designed for other faults are not for this one, by name."""
-        return left_out(self.fault)
+        """Why laws that are designed otherwise are not for this fault, or what stands around it, by name."""
+        behind = self.path and not self.fault.friction.state_names
+        return behind_path(self.fault) if behind else left_out(self.fault)
+
+    @property
+    def path(self) -> dict[str, Fraction]:
+        """Delay, lag and diffusion [s] behind which the designs are to act; those that there are."""
+        return {name: time for entry in self.entries for name, time in entry.design.path.items() if time}
 
     def of(self, origin: str) -> tuple[Entry, ...]:
         """Entries of one origin."""
@@ -146,7 +153,8 @@ def compared(
         return _slowly_compared(fault, designs, tell)
     uncontrolled = natural_earthquake(fault)
     entries: list[Entry] = []
-    for controller in published(fault.name).values() if with_published else ():
+    at_once = not any(any(designed.path.values()) for designed in designs)
+    for controller in published(fault.name).values() if with_published and at_once else ():
         tell(f"{controller.title} (published): verdict", 0.0)
         entries.append(_entry("published", assess(fault, controller), schemes, tell))
     for designed in designs:
@@ -154,6 +162,15 @@ def compared(
         tell(f"{entry.label}: worst cases", 0.0)
         entries.append(replace(entry, answer=_answer(fault, designed)))
     return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
+
+
+def behind_path(fault: Fault) -> dict[str, str]:
+    """Why laws of the package that are designed for a pressure that acts at once are not for one behind a path."""
+    why = (
+        "sliding modes and published gains are for a pressure that acts at once and are not compared behind a delay, a "
+        "lag or rock; guarantee says what is proved of a sliding mode behind them"
+    )
+    return {name: why for name in designable(fault) if name != "elqr"}
 
 
 def _answer(fault: Fault, design: Design) -> Answer | SlidingAnswer | None:

@@ -25,6 +25,8 @@ def design(
     measured: str = MEASURED[0],
     slip_noise: str | float | Fraction = 0,
     rate_noise: str | float | Fraction = 0,
+    delay: str | float | Fraction = 0,
+    lag: str | float | Fraction = 0,
     diffusion: str | float | Fraction | None = None,
     stress: str | float | Fraction | None = None,
     spread: str | float | Fraction = 0,
@@ -64,8 +66,11 @@ def design(
         What the e-LQR of samples is told: ``"slip-and-rate"``, or ``"slip"``, from which it estimates the slip rate.
     slip_noise, rate_noise : str, float or Fraction
         Bounds of what a law of samples is told wrongly of slip [m] and slip rate [m/s], for its guarantee.
+    delay, lag : str, float or Fraction
+        From measurement to valve, and time constant of the pump [s], for which an e-LQR is designed and behind which it
+        runs.
     diffusion : str, float or Fraction, optional
-        Of friction with a state: L²/D [s] of the rock between well and fault; a tenth of D_c/V unless given.
+        The same of rock between well and fault: L²/D [s]. Of friction with a state a tenth of D_c/V unless given.
     stress : str, float or Fraction, optional
         Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that the design stands unless
         given.
@@ -86,13 +91,15 @@ def design(
         For a controller that cannot be designed, or an unknown feed-forward.
     ParameterError
         For a feed-forward with a law that takes none or runs sampled, an unknown objective, or one of a design in
-        continuous time; for diffusion, stress or spread without a state of friction.
+        continuous time; for stress or spread without a state of friction, a delay or a lag with one.
     UnsupportedError
         For a law that does not apply to friction with a state.
     """
     require_fault(fault)
     law = control_law(controller)
-    sliding = _sliding(fault, law, diffusion, stress, spread)
+    times = {"delay": delay, "lag": lag, "diffusion": diffusion or 0}
+    path = {name: rational(time, name) for name, time in times.items()}
+    sliding = _sliding(fault, law, path, stress, spread)
     added = NONE if feedforward == NONE.name else feed_forward(feedforward, fault, least_authority(fault))
     noise = Around(slip_noise=rational(slip_noise, "slip_noise"), rate_noise=rational(rate_noise, "rate_noise"))
     require_known(objective, OBJECTIVES, "objective")
@@ -103,25 +110,35 @@ def design(
             "Leave it out, or continuous."
         )
     told: Any = {"objective": objective, "continuous": continuous, "measured": measured, "noise": noise}
-    told["disturbance_class"] = disturbance_class
+    told |= {"disturbance_class": disturbance_class, "path": {} if fault.friction.state_names else path}
     return law.design(Problem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **told))
 
 
-def _sliding(fault: Fault, law: type[Controller], diffusion: Any, stress: Any, spread: Any) -> Sliding:
+def _sliding(fault: Fault, law: type[Controller], path: dict[str, Fraction], stress: Any, spread: Any) -> Sliding:
     """What is asked of slow sliding, which only friction with a state has; refuses laws that do not apply to it."""
+    if min(path.values()) < 0:
+        raise ParameterError(
+            "delay, lag and diffusion must be 0 s or more. Received "
+            f"{', '.join(f'{float(time):g} s' for time in path.values())}. Check their signs."
+        )
     asked = Sliding(
-        diffusion=None if diffusion is None else rational(diffusion, "diffusion"),
+        diffusion=path["diffusion"] or None,
         stress=None if stress is None else rational(stress, "stress"),
         spread=rational(spread, "spread"),
     )
-    if not fault.friction.state_names and asked != Sliding():
+    if not fault.friction.state_names:
+        if asked.stress is not None or asked.spread:
+            raise ParameterError(
+                f"stress and spread of a design need friction with a state. Received {fault.friction.name}. "
+                "Leave them out."
+            )
+        return Sliding()
+    if path["delay"] or path["lag"]:
         raise ParameterError(
-            "diffusion, stress and spread of a design need friction with a state. Received "
-            f"{fault.friction.name}. Leave them out; guarantee takes a diffusion."
+            f"a design for friction with a state goes through rock alone. Received a delay or lag with "
+            f"{fault.friction.name}. Leave them out; guarantee takes both."
         )
-    if asked.diffusion is not None and asked.diffusion <= 0:
-        raise ParameterError(f"a diffusion must be above 0 s. Received {float(asked.diffusion):g} s. Leave it out.")
-    if fault.friction.state_names and (why := method_of(law).without_state):
+    if why := method_of(law).without_state:
         raise UnsupportedError(f"{why}. Received {law.name}. Design an elqr.")
     return asked
 

@@ -44,6 +44,8 @@ class Design:
         What synthesis decided: exact numbers as texts.
     slip_noise, rate_noise : Fraction
         Bounds of what a law of samples is told wrongly of slip [m] and slip rate [m/s].
+    path : mapping of str to Fraction
+        Delay, lag and diffusion [s] behind which a law of samples is designed to act, where they are told.
     runs : Guarantee, SlidingGuarantee or NoGuarantee, optional
         What was proved of the loop that runs while it was designed; None to find it when `guarantee` is asked for.
     sliding : SlidingAnswer, optional
@@ -62,6 +64,7 @@ class Design:
     details: Mapping[str, Any] = field(default_factory=dict)
     slip_noise: Fraction = Fraction(0)
     rate_noise: Fraction = Fraction(0)
+    path: Mapping[str, Any] = field(default_factory=dict)
     runs: Guarantee | SlidingGuarantee | NoGuarantee | None = None
     sliding: SlidingAnswer | None = None
     disturbance_class: str = CLASSES[0]

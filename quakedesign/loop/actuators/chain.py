@@ -60,7 +60,7 @@ class Actuator:
             For a delay that is no whole number of periods.
         """
         step, kinds = float(sampling.step), {kind.name: kind for kind in (Delay, Lag, Diffusion)}
-        times = {name: float(time) for name, time in sampling.path.items() if time}
+        times: dict[str, Any] = {name: float(time) for name, time in sampling.path.items() if time}
         return cls(stages=tuple(kinds[name].asked(step, **{name: time}) for name, time in times.items()))
 
     def completed(self, other: "Actuator") -> "Actuator":

@@ -61,11 +61,11 @@ class SampledDesign:
             ),
             Premise(
                 name="delay",
-                required=Fraction(0),
+                required=self.runs.held.delay if self.runs else Fraction(0),
                 certified=self.longest_delay,
                 unit="s",
-                note="from the measurement to the pressure: none, and the longest for which a design, an e-LQR that "
-                "knows it, has a guarantee",
+                note="from the measurement to the pressure: that of the design, and the longest for which a design, an "
+                "e-LQR that knows it, has a guarantee",
             ),
         )
 
@@ -88,13 +88,13 @@ def sampled_design(
         found = design_at(task, longest, objective)
     if isinstance(found, NoGuarantee):
         return SampledDesign(step=step, runs=None, reason=reason)
-    delayed = longest_delay(task, found.held.step, measured=measured, **around)
+    delayed, own = longest_delay(task, found.held.step, measured=measured, **around), found.held.delay
     return SampledDesign(
         step=step,
         runs=found,
         reason=reason if found.held.step < step else "",
         longest_step=max(found.held.step, longest.held.step if longest else found.held.step),
-        longest_delay=delayed.held.delay if delayed else Fraction(0),
+        longest_delay=max(own, delayed.held.delay) if delayed else own,
     )
 
 

@@ -63,7 +63,8 @@ class Problem(Generic[Designed]):
     continuous : bool
     feedforward : FeedForward
     measured : str
-    noise : Around
+    noise, path : Around
+        Bounds of what it is told wrongly; delay, lag and L²/D behind which it acts.
     sliding : Sliding
         Of friction with a state.
     disturbance_class : str
@@ -77,6 +78,7 @@ class Problem(Generic[Designed]):
     feedforward: FeedForward = NONE
     measured: str = MEASURED[0]
     noise: Around = field(default_factory=Around)
+    path: Around = field(default_factory=Around)
     sliding: Sliding = field(default_factory=Sliding)
     disturbance_class: str = CLASSES[0]
 
@@ -92,11 +94,16 @@ class Problem(Generic[Designed]):
         ------
         ParameterError
         """
-        if self.continuous and (self.measured != MEASURED[0] or any(self.noise.values())):
+        if self.continuous and (self.measured != MEASURED[0] or any(self.noise.values()) or self.behind):
             raise ParameterError(
-                "a design in continuous time knows slip and slip rate exactly. Received noise, or the slip alone. "
-                "Leave continuous out."
+                "a design in continuous time knows slip and slip rate exactly and acts at once. Received noise, the "
+                "slip alone, a delay, a lag or rock. Leave continuous out."
             )
+
+    @property
+    def behind(self) -> bool:
+        """Whether there is a delay, a lag or rock between law and fault."""
+        return any(self.path.values())
 
     def by_method(self, law: type[Controller]) -> Designed:
         """Gains by the method of the family that a law belongs to."""
@@ -123,7 +130,15 @@ class Problem(Generic[Designed]):
         verdict = decided_once(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
         if runs is not None and controller.sampling is not None:
             verdict = runs.check()
-        found = {"name": controller.name, "verdict": verdict, "domain": domain, "runs": runs, **self.noise, **more}
+        found = {
+            "name": controller.name,
+            "verdict": verdict,
+            "domain": domain,
+            "runs": runs,
+            "path": self.path,
+            **self.noise,
+            **more,
+        }
         found["disturbance_class"] = self.disturbance_class
         known = (*premises, *own, *controller.premises(self.fault, certificate))
         return self.answer(fault=self.fault, controller=controller, certificate=certificate, premises=known, **found)
@@ -131,7 +146,7 @@ class Problem(Generic[Designed]):
     def undecided(self, name: str, reason: str, runs: NoGuarantee | None = None, **more: Any) -> Designed:
         """Answer where no gains were found."""
         none: dict[str, Any] = {"controller": None, "certificate": None, "premises": (), "details": {"reason": reason}}
-        none["disturbance_class"] = self.disturbance_class
+        none |= {"disturbance_class": self.disturbance_class, "path": self.path}
         return self.answer(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none, **more)
 
 

@@ -21,7 +21,7 @@ from quakedesign.certificates.premises import (
 )
 from quakedesign.controllers import BaseGains, Controller, SlidingMode
 from quakedesign.controllers.feed_forward import NONE, FeedForward
-from quakedesign.errors import CertificateError, KinkError, ParameterError
+from quakedesign.errors import CertificateError, KinkError, ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import (
@@ -60,6 +60,11 @@ class SlidingModes(Method[SlidingMode]):
                 "or design an e-LQR."
             )
         problem.require_exact_in_continuous_time()
+        if problem.behind:
+            raise UnsupportedError(
+                f"sliding modes are designed for a pressure that acts at once. Received a delay, a lag or rock with "
+                f"{law.name}. Design an elqr; guarantee says what is proved of a sliding mode behind them."
+            )
         if problem.feedforward != NONE and not problem.continuous:
             raise ParameterError(
                 "a feed-forward has no guarantee with the pressure held over T_s. "

@@ -12,6 +12,7 @@ from quakedesign.certificates.guarantee import (
     Task,
 )
 from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.impossibility import hopeless
 from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.controllers.feed_forward import NONE
@@ -114,7 +115,12 @@ def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
 def _sampled(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
     fault = problem.fault
     step, measured = rational(fault.sampling_time), problem.measured
-    found = sampled_design(problem.task, step, problem.objective, measured=measured, **problem.noise)
+    task, path, stress = problem.task, problem.path, rational(fault.effective_normal_stress)
+    zero = Fraction(0)
+    if beyond := hopeless(task, stress, path.get("delay", zero), path.get("diffusion", zero)):
+        return problem.undecided(law.name, beyond, NoGuarantee(reason=beyond, small_gain=None))
+    told: Any = {**problem.noise, **path}
+    found = sampled_design(task, step, problem.objective, measured=measured, **told)
     if found.runs is None:
         return problem.undecided(law.name, found.reason)
     runs, held = found.runs, found.runs.held
@@ -123,7 +129,7 @@ def _sampled(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
         "step": str(held.step),
         "reason": found.reason or None,
         "measured": measured,
-        **{name: str(value) for name, value in held.noise.items()},
+        **{name: str(value) for name, value in (*held.noise.items(), *held.path.items()) if value},
     }
     return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=found.premises())
 
