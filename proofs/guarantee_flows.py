@@ -7,7 +7,7 @@ from itertools import pairwise
 from math import ceil
 
 from guarantee_loop import Fade, Loop
-from guarantee_numbers import BITS, Fixed, coarse_product, column, exponentials, fixed, sums_of_product
+from guarantee_numbers import BITS, Fixed, column, exponentials, fixed, sums_of_product
 from guarantee_pulse import Near, Pulse, near_of, with_next
 from guarantee_reading import Refused, Row, need
 
@@ -15,7 +15,7 @@ DOUBLINGS = 12  # at most 4096 periods are summed
 SHARE = 1024  # what is left of the past after those is below a 1024th, but for what the slowest mode leaves
 TURNS, ROOM = 8, 1 << 40  # of sums that are solved for to bound themselves
 MAX_WORK = 3 * 10**7  # products of integers
-MAX_SUMS = 10**8  # the same, most of them of 60 bits, many at once; a package that stops at half of it is understood
+MAX_SUMS = 10**8  # the same of all periods before, the package's limit twice
 
 
 @dataclass
@@ -180,7 +180,7 @@ def past(flows: list[Flow], rows: int) -> Past:
     for _ in range(DOUBLINGS):
         width = len(columns.rows[0])
         need(2 * width * size * (size + rows) <= MAX_SUMS, "the loop must forget its past sooner: it takes too long")
-        following = coarse_product(period, columns)
+        following = period * columns
         sums = [a + b for a, b in zip(sums, sums_of_product(seen, following), strict=True)]
         columns, period = columns.beside(following), period * period
         far = period * back

@@ -69,53 +69,28 @@ class Fixed:
 
 
 def sums_of_product(left: Fixed, right: Fixed) -> list[int]:
-    """What `(left * right).sums()` bounds, a little above it: of many columns from what `Cut` makes of them."""
-    count = len(right.rows[0])
-    if count < MANY or not cut_of(right.rows):
+    """What `(left * right).sums()` bounds, a little above it: many columns at once, side by side in one long integer.
+
+    Entries are cut to 60 bits, those of `left` row by row; a place has 128 bits, of which the upper half is read. With
+    l = l' + d and r = r' + e a sum of |l*r| is at most that of |l'*r'| and |l'| times all e and d times all |r|.
+    """
+    count, cut = len(right.rows[0]), cut_of(right.rows)
+    if count < MANY or not cut:
         return (left * right).sums()
-    cut = Cut(right)
+    ones = sum_of_places(count)
+    places = [pack([(v >> cut) + (1 << COARSE + 1) for v in line]) - (ones << COARSE + 1) for line in right.rows]
     whole = sum(sum(map(abs, line)) + right.error * count for line in right.rows)
     found = []
     for line in left.rows:
-        halves, unit, off = cut.times(line, left.error)
-        coarse = sum(map(abs, halves)) + count << unit
-        found.append((coarse + count * off + ((1 << cut_of([line])) + left.error) * whole >> BITS) + 1)
-    return found
-
-
-def coarse_product(left: Fixed, right: Fixed) -> Fixed:
-    """`left * right`, of many columns from what `Cut` makes of them: an error of less than 2^-50 of the largest."""
-    if len(right.rows[0]) < MANY or not cut_of(right.rows):
-        return left * right
-    cut, rows, error = Cut(right), [], 0
-    tallest = sum(max(map(abs, line)) + right.error for line in right.rows)
-    for line in left.rows:
-        halves, unit, off = cut.times(line, left.error)
-        rows.append([(v << unit) >> BITS for v in halves])
-        error = max(error, off + (1 << unit) + ((1 << cut_of([line])) + left.error) * tallest)
-    return bounded(Fixed(rows, (error >> BITS) + 2))
-
-
-class Cut:
-    """Columns cut to 60 bits, side by side in one long integer a row, in places of 128 bits.
-
-    With l = l' + d and r = r' + e a product l*r is off that of l'*r' by less than |l'|*e and d*|r| together.
-    """
-
-    def __init__(self, right: Fixed) -> None:
-        self.bits, self.count, self.error = cut_of(right.rows), len(right.rows[0]), right.error
-        self.ones = sum_of_places(self.count)
-        offset = self.ones << COARSE + 1
-        self.places = [pack([(v >> self.bits) + (1 << COARSE + 1) for v in line]) - offset for line in right.rows]
-
-    def times(self, line: list[int], error: int) -> tuple[tuple[int, ...], int, int]:
-        """Upper halves of the places of l'*r' for a row l, the bits of their unit, and the part |l'|*e of the error."""
         own = cut_of([line])
         near = [v >> own for v in line]
-        signs = self.ones << PLACE - 1
-        total = sum(map(int.__mul__, near, self.places)) + signs ^ signs  # every place by itself, two's complement
-        halves = struct.unpack(f"<{2 * self.count}q", total.to_bytes(self.count * PLACE // 8, "little"))[1::2]
-        return halves, PLACE // 2 + own + self.bits, ((1 << self.bits) + self.error) * sum(map(abs, near)) << own
+        signs = ones << PLACE - 1
+        total = sum(map(int.__mul__, near, places)) + signs ^ signs  # every place for itself, in two's complement
+        halves = struct.unpack(f"<{2 * count}q", total.to_bytes(count * PLACE // 8, "little"))[1::2]
+        coarse = sum(map(abs, halves)) + count << PLACE // 2 + own + cut
+        off = count * ((1 << cut) + right.error) * sum(map(abs, near)) << own
+        found.append((coarse + off + ((1 << own) + left.error) * whole >> BITS) + 1)
+    return found
 
 
 def cut_of(rows: list[list[int]]) -> int:

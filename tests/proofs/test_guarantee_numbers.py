@@ -715,37 +715,6 @@ def test_sums_of_many_columns_at_once_are_above_those_that_are_true_and_just_abo
         assert value << checker.BITS <= plain + 2 * off + 64 * count * (1 << 64 + read) + (4 * count << checker.BITS)
 
 
-@pytest.mark.parametrize(("count", "error"), [(63, 0), (64, 0), (64, 1), (200, 5), (200, 1 << 120)])
-@pytest.mark.parametrize("bits", [(2, 190), (59, 60), (60, 61), (150, 100), (190, 192), (200, 191)])
-def test_a_product_of_many_columns_at_once_holds_the_true_one(count, error, bits):
-    """Against exact products of the worst true entries; few columns are multiplied as ever."""
-    random = Random(count + bits[0])
-    left = checker.Fixed(entries(random, 3, 20, bits[0]), error)
-    right = checker.Fixed(entries(random, 20, count, bits[1]), 2 * error)
-    found, plain = checker.coarse_product(left, right), left * right
-    if count < 64:
-        assert found == plain
-    for row, line in zip(left.rows, found.rows, strict=True):
-        for column, value in zip(zip(*right.rows, strict=True), line, strict=True):
-            true = sum(map(int.__mul__, row, column))
-            off = sum(error * abs(v) + 2 * error * abs(u) + 2 * error**2 for u, v in zip(row, column, strict=True))
-            assert abs((value << checker.BITS) - true) + off <= found.error << checker.BITS
-    read = sum(max(bits + 1 - 60, 0) for bits in bits)  # what is cut off, with half of every place
-    assert found.error << checker.BITS <= 2 * (plain.error + 2 << checker.BITS) + 64 * (1 << 64 + read)
-
-
-@pytest.mark.parametrize("states", [1, 100])
-def test_what_is_cut_off_a_product_counts(states):
-    """Of 100 states what is cut off the entries is most; of one, whose entries lose nothing, half of a place."""
-    random, much = Random(1), (1 << 192) - 1
-    left = [much] * states if states > 1 else [((1 << 60) - 1) << 2]
-    right = [much] * 99 if states > 1 else [random.randint(1 << 59, (1 << 60) - 1) << 132 for _ in range(99)]
-    found = checker.coarse_product(checker.Fixed([left]), checker.Fixed([right] * states))
-    for value, entry in zip(found.rows[0], right, strict=True):
-        assert abs((value << checker.BITS) - sum(left) * entry) <= found.error << checker.BITS
-    assert found.error << checker.BITS <= sum(left) * much >> 50
-
-
 def test_the_slowest_mode_is_seen_in_any_units():
     """Two modes that turn, 3/5 and 4/5 of 0.9: other units of the states change the row, but not which it is."""
     turn = [[F(54, 100), F(-72, 100), F(1, 9)], [F(72, 100), F(54, 100), F(1, 5)], [F(0), F(0), F(1, 2)]]
