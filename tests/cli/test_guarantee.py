@@ -322,3 +322,14 @@ def test_jitter_and_a_slow_pump_are_in_the_answer_and_in_the_file(call, tmp_path
     assert code == 1
     for given in (("--jitter", "100 ms"), ("--jitter", "1 ms", "--diffusion", "1 s"), ("--rate-limit", "0 Pa/s")):
         assert call("real-fault", "--gains", *GAINS, *given)[0] == 2
+
+
+def test_means_count_from_their_middle(call, tmp_path):
+    path = tmp_path / "mean.json"
+    given = ("real-fault", "--gains", *GAINS, "--averaging-time")
+    code, out, _ = call(*given, "2 ms", "--json", "--out", str(path))
+    assert (code, json.loads(out)["averaging"]) == (0, "1/500")
+    loop = json.loads(path.read_text())["loop"]
+    assert (loop["delay"], loop["jitter"]) == ("1/1000", {"measured": "0", "delay": "0", "mean": "1/500"})
+    code, _, err = call(*given[:-1], "--averaging-time=-1 ms")
+    assert (code, "jitter must be 0 or more, and averaging too" in err) == (2, True)

@@ -90,3 +90,20 @@ def test_in_every_piece_both_bound_what_is_there(first):
         np.array([[float(v) for v in row] for row in theirs_of(loop, pulse)]),
     ):
         assert np.all(each <= found * (1 + 1e-12))
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_the_steady_pressure_moves_on_while_another_pressure_is_at_the_valve(asked, monkeypatch):
+    """In the checker: the drift of A + R more in the output at the valve, where what is late enters as well."""
+    entered = []
+    monkeypatch.setattr(checker, "gains", lambda *given, pulse=None: entered.append((given[1:], pulse)) or ones())
+    ones = lambda: [[F(1)] for _ in range(4 + asked)]  # noqa: E731
+    flow, pulse = [[F(0)] * 4 for _ in range(4)], checker.Pulse(0, F(1, 9), F(1, 7), F(1, 9), F(1, 8))
+    flow[2][2] = F(-5)
+    loop = checker.Loop(flow, [(checker.unit(4), F(1))], [[F(0)] * 4] * (4 + asked), [[F(1)]] * 3, None, F(1))
+    loop = checker.replace(loop, asked=asked, stepped=True, pulse=pulse)
+    found = [[line[0] for line in lines] for lines in checker.loop_gains(loop, F(3))]
+    at = 3 if asked else 2
+    assert found == [[1] * len(ones()), [1 + (i == at) * F(1, 7) for i in range(len(ones()))], *[[1] * len(ones())] * 2]
+    assert entered[-1] == (([F(0), F(0), F(5), F(0)] if asked else [F(0), F(3), F(0), F(0)], False), pulse)
+    assert [other for _, other in entered[:-1]] == [None] * 3
