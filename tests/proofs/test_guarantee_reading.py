@@ -138,17 +138,17 @@ LIMITS = [
     (JITTERY, ("loop", "jitter"),
      [{"measured": "1/2", "delay": "0"}, {"measured": "0", "delay": "1/2"}, {"measured": "1/4", "delay": "1/4"}],
      [{"measured": "0", "delay": "0"}, {"measured": "-1/9", "delay": "1/2"}, {"measured": "1/2", "delay": "-1/9"},
-      {"measured": "51/100", "delay": "0"}, {"measured": "1/4", "delay": "26/100"}, {"measured": "1/9"},
+      {"measured": "51/100", "delay": "0"}, {"measured": "1/4", "delay": "13/50"}, {"measured": "1/9"},
       {"delay": "1/9"}, {"measured": "1/9", "delay": "0", "more": "0"}, {}, [], "1/9", None]),
     (JITTERY, ("loop", "jitter"),
      [{"measured": "0", "delay": "0", "mean": "1"}, {"measured": "1/4", "delay": "0", "mean": "1/2"}],
      [{"measured": "0", "delay": "0", "mean": "101/100"}, {"measured": "1/4", "delay": "0", "mean": "51/100"},
       {"measured": "1/9", "delay": "0", "mean": "0"}, {"measured": "1/9", "delay": "0", "mean": "-1"}, {"mean": "1"}]),
     (LATE, ("loop", "jitter"), [{"measured": "1/4", "delay": "0"}, {"measured": "0", "delay": "1/4"}],
-     [{"measured": "26/100", "delay": "0"}, {"measured": "0", "delay": "26/100"}]),
-    (changed(LATE, (("loop", "delay"), "7/4")), ("loop", "jitter", "delay"), ["5/36"], ["6/36"]),
+     [{"measured": "13/50", "delay": "0"}, {"measured": "0", "delay": "13/50"}]),
+    (changed(LATE, (("loop", "delay"), "7/4")), ("loop", "jitter", "delay"), ["5/36"], ["1/6"]),
     (BOTH, ("loop", "pump", "ramp"), ["31/63"], ["32/63"]),
-    (changed(BOTH, (("loop", "delay"), "1/2")), ("loop", "pump", "ramp"), ["31/126"], ["32/126"]),
+    (changed(BOTH, (("loop", "delay"), "1/2")), ("loop", "pump", "ramp"), ["31/126"], ["16/63"]),
     (JITTERY, ("loop",), [many(12, "3", "1")["loop"] | {"jitter": JITTERY["loop"]["jitter"]}],
      [many(12, "4", "1")["loop"] | {"jitter": JITTERY["loop"]["jitter"]}]),
     (LAYERED, ("loop", "diffusion"), ["1/32", "1/31", "5"], ["1/33", "0", "-1", 1, None]),
@@ -446,6 +446,11 @@ def test_the_root_must_lie_between_its_lines_for_the_noise_on_top(monkeypatch):
     for noise in ({"slip": "0", "rate": "1/11"}, {"slip": "1/100", "rate": "0"}):
         with pytest.raises(checker.Refused, match="root of the implicit step"):
             checker.verify(changed(raw, (("loop", "noise"), noise)))
+    late = changed(raw, (("loop", "jitter"), {"measured": "1/9", "delay": "0"}))
+    with pytest.raises(checker.Refused, match="root of the implicit step"):  # the slip of the reference until then
+        checker.verify(late)
+    monkeypatch.setattr(checker, "bounds", lambda *_: ([F(0)] * 4, F(1, 3)))
+    assert checker.verify(changed(late, (("loop", "jitter"), {"measured": "0", "delay": "1/9"})))
 
 
 def test_zero_has_no_sign():

@@ -163,7 +163,7 @@ def test_claims_are_those_that_their_own_spread_gives(asked, found):
     tried = [F(0), *(upward(v * F(1001, 1000)) for v in claims[:-1])]
     assert all(v > slip for v, slip in zip(claims[:-1], tried, strict=False))
     assert claims[-1] <= tried[-1]
-    assert [given[-1] for given in questions] == [SLOW.spread(TASK, slip) for slip in tried]
+    assert [given[5] for given in questions] == [SLOW.spread(TASK, slip) for slip in tried]
     assert result == Guarantee(
         task=TASK, held=HELD, slow_gain=SLOW,
         claims=replace(Claims.of(TASK, BOUNDS).rounded(), slip_error=UpperBound(claims[-1])),
