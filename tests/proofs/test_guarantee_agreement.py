@@ -12,8 +12,9 @@ from quakedesign.certificates.guarantee.files import guarantee_text
 
 
 def bounds_of_both(number):
-    """Slip error and slip-rate error of a random loop, by package and checker; None without a guarantee."""
-    found = guarantee(*random_loop(number))
+    """Slip error and slip-rate error of a random loop, by package and checker; None without a guarantee or a law."""
+    asked = random_loop(number)
+    found = guarantee(*asked) if asked is not None else None
     if not isinstance(found, Guarantee):
         return None
     document = json.loads(guarantee_text(found))
@@ -36,8 +37,8 @@ def test_both_look_back_as_far(number):
 
 @pytest.mark.slow
 def test_every_file_of_two_hundred_random_loops_is_proved_again():
-    """Claims leave a thousandth of room; between both bounds lies a hundredth of that."""
+    """Claims leave a thousandth of room; between both bounds lies a hundred-thousandth of that."""
     both = [bounds_of_both(number) for number in range(200)]
     found = [pair for pair in both if pair is not None]
     assert len(found) > 100
-    assert all(abs(b / a - 1) < F(1, 10**5) for pair in found for a, b in zip(*pair, strict=True))
+    assert all(abs(b / a - 1) < F(1, 10**8) for pair in found for a, b in zip(*pair, strict=True))
