@@ -58,8 +58,8 @@ def test_a_push_that_is_there_at_once_has_no_rate_and_another_class_is_none(law)
 
 
 def test_the_option_of_design_compare_and_figures_is_that_of_python():
-    assert DesignOptions(disturbance_class="rate").told(["cta"])["options"]["disturbance_class"] == "rate"
-    assert DesignOptions().told(["cta"])["options"]["disturbance_class"] == "amplitude"
+    assert DesignOptions(disturbance_class="rate").told()["options"]["disturbance_class"] == "rate"
+    assert DesignOptions().told()["options"]["disturbance_class"] == "amplitude"
 
 
 def integrated(slopes, most):
