@@ -16,6 +16,7 @@ SAMPLES = 10.0
 """Samples while the fastest of an error and of a free oscillation grows or turns by one."""
 AGEINGS = 20.0
 """Samples in D_c/V, few enough to be summed in a proof of slow sliding at V and many enough to control it."""
+_STEP = "sampling time"
 _SHARE = 1000  # of the operation time, which a sampling time must not exceed
 
 
@@ -49,6 +50,11 @@ def sliding_step(law: FrictionLaw, task: Reference) -> float:
     """
     ageing = float(min(law.steady_state(task.target_slip / task.operation_time)))
     return _cut(min(ageing / AGEINGS, task.operation_time / _SHARE), digits=2)
+
+
+def step_assumed(fault: Fault) -> bool:
+    """Whether the T_s of a fault was filled in, so that another friction has another."""
+    return any(said.startswith(_STEP) for said in fault.assumed)
 
 
 def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[str, ...] = ()) -> Fault:
@@ -119,12 +125,12 @@ def _target(fault: Fault, assumed: list[str]) -> float:
 def _step(fault: Fault, task: Reference, assumed: list[str]) -> float:
     if fault.friction.state_names:
         step = sliding_step(fault.friction, task)
-        assumed.append(f"sampling time {step:g} s, near D_c/({AGEINGS:g} V) in slow sliding at the task's mean rate V")
+        assumed.append(f"{_STEP} {step:g} s, near D_c/({AGEINGS:g} V) in slow sliding at the task's mean rate V")
         return step
     pace = max(fault.natural_frequency, _growth(fault))
     step = _cut(min(1 / (SAMPLES * pace), task.operation_time / _SHARE), digits=2)
     assumed.append(
-        f"sampling time {step:g} s, at least {SAMPLES:g} samples while an error grows e-fold or it swings by 1 rad"
+        f"{_STEP} {step:g} s, at least {SAMPLES:g} samples while an error grows e-fold or it swings by 1 rad"
     )
     return step
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from quakedesign.errors import RecordError
 from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox
-from quakedesign.fault.defaults import sliding_step
+from quakedesign.fault.defaults import sliding_step, step_assumed
 from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.fault.template import fault_toml
 from quakedesign.identification.result import Estimate, Identification
@@ -94,7 +94,7 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         Of a record that tells every parameter.
     fault : Fault
         That gives everything but friction. Where the identified friction has a state and that of the fault has none,
-        there is no disturbance, and T_s suits slow sliding.
+        there is no disturbance, and T_s suits slow sliding, as it does where the fault's was assumed.
 
     Returns
     -------
@@ -114,9 +114,10 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         if covers(identification.law)
         else Cover(law=_at_rate_of(fault, identification.law), box=fault.box)
     )
-    if _gains_a_state(identification, fault):
+    if _step_follows(identification, fault):
         step = sliding_step(held.law, fault.reference)
-        fault = replace(fault, friction=held.law, sampling_time=step, disturbance=Disturbance())
+        shaken = Disturbance() if _gains_a_state(identification, fault) else fault.disturbance
+        fault = replace(fault, friction=held.law, sampling_time=step, disturbance=shaken)
     return replace(
         fault,
         name=f"{fault.name[:40].rstrip()}-identified",
@@ -133,7 +134,8 @@ def other_parts(identification: Identification, fault: Fault) -> str:
     if _gains_a_state(identification, fault):
         return shared
     loaded = ", reference rate, working range" if identification.law.state_names else ""
-    return f"{shared}, T_s, disturbance{loaded}"
+    kept = "" if _step_follows(identification, fault) else ", T_s"
+    return f"{shared}{kept}, disturbance{loaded}"
 
 
 def _at_rate_of(fault: Fault, law: FrictionLaw) -> FrictionLaw:
@@ -153,6 +155,12 @@ def _at_rate_of(fault: Fault, law: FrictionLaw) -> FrictionLaw:
         slowest_rate=min(law.slowest_rate, own.slowest_rate),
         fastest_rate=max(law.fastest_rate, own.fastest_rate),
     )
+
+
+def _step_follows(identification: Identification, fault: Fault) -> bool:
+    """Whether T_s is that of the identified friction: the fault has one for friction of another kind, or none."""
+    with_state = bool(identification.law.state_names)
+    return with_state and (step_assumed(fault) or _gains_a_state(identification, fault))
 
 
 def _gains_a_state(identification: Identification, fault: Fault) -> bool:

@@ -13,6 +13,8 @@ import pytest
 from quakedesign.certificates.slow_sliding import sliding_task
 from quakedesign.errors import ParameterError, RecordError
 from quakedesign.fault import Disturbance, friction_law, load_fault
+from quakedesign.fault.defaults import step_assumed
+from quakedesign.fault.template import template
 from quakedesign.identification import Estimate, Record, cover, identified_fault, identify, other_parts, save_fault
 from quakedesign.identification.setup import set_up
 from quakedesign.rationals import rational
@@ -203,14 +205,19 @@ def test_a_law_is_told_at_the_rate_at_which_its_fault_is_loaded_and_stays_the_sa
     assert "reference rate" in other_parts(replace(weak, law=law), patch)
 
 
-def test_friction_with_a_state_brings_its_sampling_time_unless_the_fault_has_one_for_it(weak):
+def test_friction_with_a_state_brings_its_sampling_time_unless_the_fault_has_one_for_it(weak, tmp_path):
     """The laboratory's 1 ms is for slip weakening; D_c/(20 V) with V = 7.1 mm/3600 s is 0.507 s for D_c = 20 µm."""
-    lab, patch = load_fault("lab-fault"), load_fault("crustal-patch")
+    lab, patch, written = load_fault("lab-fault"), load_fault("crustal-patch"), tmp_path / "begun.toml"
+    written.write_text(template("rate-and-state-aging"))
     aged = replace(weak, law=patch.friction)
     assert identified_fault(aged, lab).sampling_time == 3.6  # a thousandth of the hour; D_c/(20 V) is 203 s
     quick = replace(aged, law=replace(patch.friction, critical_slip=2e-5))
     assert identified_fault(quick, lab).sampling_time == 0.50  # 0.507 s rounded down
     assert identified_fault(quick, patch).sampling_time == patch.sampling_time
+    assumed = replace(patch, assumed=("sampling time 41 s, near D_c/(20 V) in slow sliding at the task's mean rate V",))
+    assert identified_fault(quick, assumed).sampling_time == 1.0  # 20 µm/(20 · 1 µm/s)
+    assert other_parts(quick, assumed) == "normal stress, size, task, disturbance, reference rate, working range"
+    assert step_assumed(load_fault(written)) != step_assumed(patch)
     assert identified_fault(weak, lab).sampling_time == lab.sampling_time
     assert other_parts(quick, lab) == "normal stress, size, task"
     assert (
