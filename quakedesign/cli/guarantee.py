@@ -162,6 +162,8 @@ def guarantee(
     asked |= {"measured": measured, "disturbance_class": disturbance_class, **around.exact()}
     questions = [question(one, **asked, **exact) for one in faults]
     with progress() as tell:
+        if not more and faults[0].friction.state_names and scheduler is None:
+            questions = [partial(questions[0], tell=tell)]  # type: ignore[call-arg]
         found = answers(questions, workers=workers, scheduler=scheduler, tell=tell if more else None)
     said = {"class": disturbance_class, "seconds": perf_counter() - began}
     if not more:

@@ -1,10 +1,13 @@
 """What is guaranteed of a law that holds a rate-and-state fault in slow sliding, as `guarantee` says it."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property
 from math import exp
 from typing import Any, ClassVar, Unpack
+
+import numpy as np
 
 from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.pump import Pump
@@ -12,8 +15,10 @@ from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask, sliding_task
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
+from quakedesign.fault.defaults import AGEINGS
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed.sliding_adversary import WorstSliding, worst_sliding
+from quakedesign.synthesis.guaranteed.sliding_reach import Prove, Reach, farthest, suitable, what_would_do
 from quakedesign.synthesis.guaranteed.slow_sliding import (
     LOG_RATES,
     designed_sliding,
@@ -89,6 +94,7 @@ def answer_sliding(
     step: Fraction | None = None,
     stress: Fraction | None = None,
     spread: Fraction = Fraction(0),
+    tell: Callable[[str, float], None] = lambda what, done: None,
     **around: Unpack[Around],
 ) -> SlidingAnswer:
     """Design and prove a law for a rate-and-state fault at the mean rate of its task.
@@ -104,6 +110,8 @@ def answer_sliding(
         Bound of the shear stress disturbance [Pa]; the largest that the design is seen to stand unless given.
     spread : Fraction
         By how much of their values a, b and D_c may be off [-].
+    tell : callable, optional
+        Called with what is being done and the fraction done [-].
     **around : Fraction, Pump
         As in `design_held`; a lag or a diffusion is needed. A proof is one that the pump can hold all of its pressures.
 
@@ -130,27 +138,64 @@ def answer_sliding(
         )
     held_over = rational(fault.sampling_time) if step is None else step
     task = sliding_task(fault, stress or Fraction(1), spread)
-    pump, answers = around.pop("pump", None), []
+    pump = around.pop("pump", None)
     if pump is not None and pump.rate is not None:
         raise ParameterError(
             f"the rate of a pump is not known of slow sliding. Received {float(pump.rate):g} Pa/s. Leave it out."
         )
-    for log_rate in LOG_RATES:
-        answers.append(_answer(task, held_over, log_rate, around, pump, given=stress is not None))
-        if answers[-1].proved:
-            return answers[-1]
-    return answers[0]
+    prove = _proof(pump, given=stress is not None)
+    tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
+    answer, reach, remedy = _answer(task, held_over, LOG_RATES[0], around, prove), Reach(share=Fraction(1)), ""
+    if answer.held is None:
+        tell("how far the well may be", 0.3)
+        reach = farthest(task, suitable(task, held_over), around, stressed=stress is not None)
+        remedy = _remedy(fault, task, held_over, reach, around, prove, spread)
+    for log_rate in LOG_RATES[1:]:
+        if answer.proved or reach.share < 1:
+            break
+        tell(f"a law for |ln(v/V)| up to {log_rate}", 0.6)
+        smaller = _answer(task, held_over, log_rate, around, prove, reach.numbers)
+        answer = smaller if smaller.proved else answer
+    if isinstance(answer.found, NoGuarantee) and remedy:
+        return replace(answer, found=replace(answer.found, reason=f"{answer.found.reason}; {remedy}"))
+    return answer
+
+
+def _remedy(
+    fault: Fault, task: SlidingTask, step: Fraction, reach: Reach, around: Around, prove: Prove, spread: Fraction
+) -> str:
+    """Which T_s, V or path would do; empty where a law was followed through all of the path at the T_s asked for."""
+    if reach.share < 1:
+        return what_would_do(fault, task, reach, around, prove, spread=spread)
+    suits = suitable(task, step)
+    near = f"T_s near D_c/({AGEINGS:g} V), here {float(suits):.2g} s, suits: set sampling_time in [task]"
+    return "" if suits == step else near
+
+
+def _proof(pump: Pump | None, *, given: bool) -> Prove:
+    """Proofs whose pressures the pump can hold, under the task's stress if that is given, or about the largest."""
+
+    def prove(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+        if given:
+            return _held_by(pump, proved_sliding(task, held, log_rate=log_rate))
+        return _with_the_largest_stress(task, held, log_rate=log_rate, pump=pump)
+
+    return prove
 
 
 def _answer(
-    task: SlidingTask, step: Fraction, log_rate: Fraction, around: Around, pump: Pump | None, *, given: bool
+    task: SlidingTask,
+    step: Fraction,
+    log_rate: Fraction,
+    around: Around,
+    prove: Prove,
+    near: np.ndarray | None = None,
 ) -> SlidingAnswer:
-    """With |ln(v/V)| at most `log_rate`, under the task's stress if that is given."""
-    design = designed_sliding(task, step, log_rate=log_rate, **around)
+    """With |ln(v/V)| at most `log_rate`, searched near the numbers of a law as well if they are told."""
+    design = designed_sliding(task, step, log_rate=log_rate, near=near, **around)
     if isinstance(design, NoGuarantee):
         return SlidingAnswer(found=design, task=task, held=None)
-    prove = proved_sliding if given else partial(_with_the_largest_stress, pump=pump)
-    proved = _held_by(pump, prove(task, design, log_rate=log_rate))
+    proved = prove(task, design, log_rate)
     return SlidingAnswer(found=proved, task=proved.task if isinstance(proved, SlidingGuarantee) else task, held=design)
 
 

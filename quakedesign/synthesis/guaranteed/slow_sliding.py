@@ -7,7 +7,7 @@ from math import floor, log10
 from typing import Any, Unpack
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
@@ -24,7 +24,6 @@ from quakedesign.certificates.slow_sliding.small_gain import (
     model_of,
 )
 from quakedesign.errors import ParameterError
-from quakedesign.fault.defaults import AGEINGS
 from quakedesign.loop import LinearLaw, SlidingModel
 from quakedesign.synthesis.guaranteed.estimate import gains_of
 from quakedesign.synthesis.guaranteed.poles import spectral_radius
@@ -40,6 +39,7 @@ _STARTS = (
 """Logarithms of the weights and of what a, b and D of the law's model are over the fault's: ρL²/D = 1, ρT_s = 0.06."""
 _SIMPLEX = (0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.05, 0.05, 0.05)
 _EVALUATIONS = 120
+_HOPELESS = 60  # laws after which a search ends that has found none with bounds
 _FORGETTING = 0.972  # largest eigenvalue of a period, so that the proof need not sum many
 _GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}  # over Y, pressures in 2a of the normal stress
 _TURNS = 6
@@ -122,9 +122,58 @@ def two_digits(value: Fraction) -> Fraction:
 
 
 def designed_sliding(
-    task: SlidingTask, step: Fraction, *, log_rate: Fraction = LOG_RATES[0], **around: Unpack[Around]
+    task: SlidingTask,
+    step: Fraction,
+    *,
+    log_rate: Fraction = LOG_RATES[0],
+    near: np.ndarray | None = None,
+    **around: Unpack[Around],
 ) -> Held | NoGuarantee:
-    """The law with the smallest estimated bounds at the least stable corner of the box, |ln(v/V)| up to `log_rate`."""
+    """The law with the smallest estimated bounds at the least stable corner of the box, |ln(v/V)| up to `log_rate`.
+
+    The search begins `near` the numbers of a law as well, if they are told.
+    """
+    chosen, _ = searched_sliding(task, step, log_rate, around, near=near)
+    if chosen is not None:
+        return chosen
+    ageing = float(task.ranges["critical_slip"][0] / task.rate)
+    path = "".join(f", {title} = {float(v):.4g} s" for title, v in _path(around).items() if v)
+    reason = (
+        f"no law held over {float(step):g} s was found whose loop is stable and forgets within some hundred periods, "
+        f"D_c/V = {ageing:.3g} s{path}"
+    )
+    return NoGuarantee(reason=reason, small_gain=None)
+
+
+def _path(around: Around) -> dict[str, Fraction]:
+    zero = Fraction(0)
+    return {"L^2/D": around.get("diffusion", zero), "lag": around.get("lag", zero), "delay": around.get("delay", zero)}
+
+
+def searched_sliding(
+    task: SlidingTask,
+    step: Fraction,
+    log_rate: Fraction,
+    around: Around,
+    *,
+    near: np.ndarray | None = None,
+    enough: float = 0.0,
+    most: int = _EVALUATIONS,
+) -> tuple[Held | None, np.ndarray]:
+    """A law with small estimated bounds, None for none, and its numbers, near which another search may begin.
+
+    Parameters
+    ----------
+    task : SlidingTask
+    step, log_rate, around
+        As of `designed_sliding`.
+    near : array, optional
+        Numbers to begin with beside the usual ones.
+    enough : float
+        Estimated bound of |ln(v/V)| over `log_rate` with which the search ends.
+    most : int
+        Number of laws that are estimated.
+    """
     corner = worst_corner(task)
     claims = _guess(corner, log_rate)
 
@@ -132,7 +181,13 @@ def designed_sliding(
         law = _law(corner, task, step, around, x)
         return None if law is None else Held(law=law, step=step, **around)
 
+    costs: list[float] = []
+
     def cost(x: np.ndarray) -> float:
+        costs.append(estimated(x))
+        return costs[-1]
+
+    def estimated(x: np.ndarray) -> float:
         tried = held(x)
         if tried is None:
             return _FAILED
@@ -143,18 +198,18 @@ def designed_sliding(
         found = _estimate(corner, tried, claims)
         return _FAILED / 2 if found is None else float(found["log_rate"] / log_rate)
 
-    best = min((np.array(start) for start in _STARTS), key=cost)
+    def ends(intermediate_result: OptimizeResult) -> None:
+        hopeless = len(costs) > _HOPELESS and intermediate_result.fun >= _FAILED / 2
+        if hopeless or intermediate_result.fun <= enough:
+            raise StopIteration
+
+    best = min([np.array(start) for start in _STARTS] + ([] if near is None else [near]), key=cost)
+    if min(costs) <= enough:
+        return held(best), best
     simplex = np.vstack([best, best + np.diag(_SIMPLEX)])
-    reached = minimize(cost, best, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": _EVALUATIONS})
-    chosen = held(reached.x)
-    if chosen is None or reached.fun >= _FAILED / 2:
-        suits = float(task.ranges["critical_slip"][0] / task.rate) / AGEINGS
-        reason = (
-            f"no law held over {float(step):g} s was found whose loop is stable and forgets within some hundred "
-            f"periods; T_s near D_c/({AGEINGS:g} V), here {suits:.2g} s, suits: set sampling_time in [task]"
-        )
-        return NoGuarantee(reason=reason, small_gain=None)
-    return chosen
+    options = {"initial_simplex": simplex, "maxfev": most}
+    reached = minimize(cost, best, method="Nelder-Mead", options=options, callback=ends)
+    return (held(reached.x) if reached.fun < _FAILED / 2 else None), reached.x
 
 
 def worst_corner(task: SlidingTask) -> SlidingTask:
