@@ -1,6 +1,7 @@
 """The command about the loop that runs."""
 
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, Literal
@@ -162,7 +163,7 @@ def guarantee(
     asked |= {"measured": measured, "disturbance_class": disturbance_class, **around.exact()}
     questions = [question(one, **asked, **exact) for one in faults]
     with progress() as tell:
-        if not more and faults[0].friction.state_names and scheduler is None:
+        if not more and faults[0].friction.state_names and scheduler is None and workers == 1:
             questions = [partial(questions[0], tell=tell)]  # type: ignore[call-arg]
         found = answers(questions, workers=workers, scheduler=scheduler, tell=tell if more else None)
     said = {"class": disturbance_class, "seconds": perf_counter() - began}
