@@ -57,9 +57,17 @@ def _read(value: object, name: str) -> Fraction:
     if len(written) > 300 or not _NUMBER.fullmatch(written) or re.search(r"/0+$", written):
         raise ParameterError(
             f"{name} must be a finite number: a decimal, an exponent form or p/q, in at most 300 characters. "
-            f"Received {written[:60]!r}. Write for example 2.3, 4.51e-4 or 23/10."
+            f"Received {written[:60]!r}. Write for example {_instead(written)}."
         )
     return Fraction(written)
+
+
+def _instead(written: str) -> str:
+    """A number that may be meant."""
+    share = written.removesuffix("%").strip()
+    if share != written and len(share) <= 20 and _NUMBER.fullmatch(share) and "/" not in share:
+        return f"{float(share) / 100:g}"
+    return "2.3, 4.51e-4 or 23/10"
 
 
 def nearest(value: float, denominator: int) -> Fraction:

@@ -8,6 +8,7 @@ from itertools import takewhile
 from unicodedata import category
 
 _OBEYED = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, invisible formats, half characters, line separators
+_LONG = 8  # letters of a name that others go on from
 _LONGEST_WORD = 200
 _LONGEST_MESSAGE = 2000
 _LONGEST_LINE = 200
@@ -63,7 +64,8 @@ def _place(division: tuple[int, int]) -> int:
 def nearest_name(name: str, known: Iterable[str]) -> str:
     """Question whether the nearest known name is meant, to be put at the end of a message; nothing if none is near.
 
-    Capitals do not matter; of names that are equally near, the one that begins alike is asked for.
+    Capitals do not matter; of names that are equally near, the one that begins alike is asked for, and the first by
+    the alphabet of those that go on where a long one ends.
     """
     written = name[:_LONGEST_WORD].lower()
     spelt = {each.lower(): each for each in known}
@@ -72,7 +74,8 @@ def nearest_name(name: str, known: Iterable[str]) -> str:
         alike = takewhile(lambda pair: pair[0] == pair[1], zip(each, written, strict=False))
         return SequenceMatcher(None, each, written).ratio(), len(list(alike))
 
-    close = get_close_matches(written, spelt, n=5)
+    longer = sorted(each for each in spelt if len(written) >= _LONG and each.startswith(written))
+    close = longer[:1] or get_close_matches(written, spelt, n=5)
     return f" Did you mean {spelt[max(close, key=likeness)]}?" if close else ""
 
 

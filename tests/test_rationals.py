@@ -122,3 +122,12 @@ def test_fractions_are_themselves_and_numbers_have_at_most_308_digits_and_300_ch
 def test_six_digits_are_shown_of_numbers_of_any_size():
     shown = {F(2, 3): "0.666667", F(-1, 8): "-0.125", F(10) ** 400: "1.00000e+400"}
     assert {value: six_digits(value) for value in shown} == shown
+
+
+@pytest.mark.parametrize(
+    ("written", "instead"), [("0.67%", "0.0067."), ("10 %", "0.1."), ("x%", "2.3, 4.51e-4 or 23/10.")]
+)
+def test_a_percentage_is_told_as_a_share(written, instead):
+    with pytest.raises(ParameterError) as refused:
+        rational(written, "spread")
+    assert str(refused.value).endswith(f"Write for example {instead}")

@@ -97,6 +97,7 @@ def test_every_refusal_is_one_visible_line_and_survives_a_worker(kind):
         ("mpa", ("Pa", "MPa"), "MPa"),
         ("kmm", ("m", "mm", "km"), "km"),  # as near to mm: the first letter decides
         ("kmm", ("km", "mm", "m"), "km"),
+        ("rate-and-state", ("rate-and-state-slip", "rate-and-state-aging", "slip-rate"), "rate-and-state-aging"),
         ("smooth", ("cta", "dia"), None),
         ("x" * 10_000, ("x",), None),
         ("", ("cta",), None),
