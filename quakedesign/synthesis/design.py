@@ -99,7 +99,7 @@ def design(
     law = control_law(controller)
     times = {"delay": delay, "lag": lag, "diffusion": diffusion or 0}
     path = {name: rational(time, name) for name, time in times.items()}
-    sliding = _sliding(fault, law, path, stress, spread)
+    sliding = _sliding(fault, law, path, diffusion, stress, spread)
     added = NONE if feedforward == NONE.name else feed_forward(feedforward, fault, least_authority(fault))
     noise = Around(slip_noise=rational(slip_noise, "slip_noise"), rate_noise=rational(rate_noise, "rate_noise"))
     require_known(objective, OBJECTIVES, "objective")
@@ -114,7 +114,9 @@ def design(
     return law.design(Problem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **told))
 
 
-def _sliding(fault: Fault, law: type[Controller], path: dict[str, Fraction], stress: Any, spread: Any) -> Sliding:
+def _sliding(
+    fault: Fault, law: type[Controller], path: dict[str, Fraction], diffusion: Any, stress: Any, spread: Any
+) -> Sliding:
     """What is asked of slow sliding, which only friction with a state has; refuses laws that do not apply to it."""
     if min(path.values()) < 0:
         raise ParameterError(
@@ -133,6 +135,8 @@ def _sliding(fault: Fault, law: type[Controller], path: dict[str, Fraction], str
                 "Leave them out."
             )
         return Sliding()
+    if diffusion is not None and not path["diffusion"]:
+        raise ParameterError("a diffusion must be above 0 s. Received 0 s. Leave it out for a well near the fault.")
     if path["delay"] or path["lag"]:
         raise ParameterError(
             f"a design for friction with a state goes through rock alone. Received a delay or lag with "

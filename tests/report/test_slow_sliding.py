@@ -124,7 +124,7 @@ def test_laws_that_do_not_apply_are_left_out_with_their_reason():
     ("fault", "asked", "said"),
     [
         ("real-fault", {"stress": 1e3}, "need friction with a state"),
-        ("real-fault", {"diffusion": "1"}, "need friction with a state"),
+        ("real-fault", {"spread": "0.1"}, "need friction with a state"),
         ("crustal-patch", {"diffusion": 0}, "above 0 s"),
         ("crustal-patch", {"continuous": True}, "designed as it runs"),
         ("crustal-patch", {"disturbance_class": "rate"}, "for any stress of an amplitude"),
