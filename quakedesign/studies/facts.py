@@ -56,6 +56,7 @@ def fault_sentences(fault: Fault) -> list[str]:
     """The same for people."""
     model = derive(fault)
     poles = ", ".join(f"{z.real:.4g}{z.imag:+.4g}i" if z.imag else f"{z.real:.4g}" for z in model.eigenvalues)
+    mean = fault.reference.target_slip / fault.reference.operation_time
     state = "unstable: " + "; ".join(model.reasons) if model.unstable else "stable without control"
     return [
         f"mass {fault.mass:.4g} kg, stiffness {fault.stiffness:.4g} N/m, natural frequency "
@@ -63,12 +64,17 @@ def fault_sentences(fault: Fault) -> list[str]:
         *_rock(fault),
         *_event(fault),
         *(f"assumed: {said}" for said in fault.assumed),
-        f"{state}; eigenvalues {poles} 1/s",
-        sampling_sentence(sampling_adequacy(fault)),
+        f"{state}; eigenvalues {poles} 1/s{_about(fault, fault.friction.operating_rate, '')}",
+        f"{sampling_sentence(sampling_adequacy(fault))}{_about(fault, mean, '; the pole is that')}",
         *_sliding_sentence(fault),
         *beyond_control(fault),
         *([need_sentence(needed)] if (needed := needed_pressure(fault)) else []),
     ]
+
+
+def _about(fault: Fault, rate: float, before: str) -> str:
+    """About which steady sliding poles are; nothing for friction without a state, whose fault rests."""
+    return f"{before} about steady sliding at {rate:.4g} m/s" if fault.friction.state_names else ""
 
 
 def beyond_rest(fault: Fault) -> str:

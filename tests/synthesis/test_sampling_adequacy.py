@@ -92,3 +92,12 @@ def test_a_state_asks_for_a_sampling_time_of_its_own_when_that_of_the_fault_is_f
     step = patch.friction.critical_slip * patch.reference.operation_time / (20 * patch.reference.target_slip)
     lines = fault_sentences(replace(patch, sampling_time=factor * step))
     assert (f"a guarantee of slow sliding wants sampling_time near D_c/(20 V), here {step:g} s" in lines) is said
+
+
+def test_each_pole_of_a_fault_with_a_state_is_told_with_the_rate_that_it_is_about():
+    said = fault_sentences(load_fault("crustal-patch"))
+    (poles,) = (line for line in said if "eigenvalues" in line)
+    (sampled,) = (line for line in said if line.startswith("T_s = "))
+    assert poles.endswith("1/s about steady sliding at 1e-09 m/s")
+    assert sampled.endswith("; the pole is that about steady sliding at 1e-06 m/s")
+    assert not any("about steady sliding" in line for line in fault_sentences(load_fault("real-fault")))
