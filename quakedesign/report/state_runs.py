@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
 _YEAR = 31_557_600.0
 _MOST_EVENTS = 8
+_LOCKED = 0.5  # of what it is loaded by: a fault that slips less stores the rest
 FASTEST_PLATE = 1e-8
 """Rate of loading [m/s] that no plate has: 0.3 m a year."""
 _LABORATORY = 10.0  # length of a fault [m] below which what loads it is a machine
@@ -29,6 +30,11 @@ def state_run_lines(answer: dict[str, Any]) -> list[str]:
     ]
     if answer["resting"]:
         lines.append("steady sliding is unstable here, but nothing disturbs it: start late, or give a pressure")
+    if outcome["kind"] == "creep" and answer["slip"] < _LOCKED * answer["loading_rate"] * answer["duration"]:
+        lines.append(
+            "it does not creep for good: it slips far less than it is loaded, and the run ends before what is stored "
+            "goes; the recurrence interval that design tells, or a longer --duration, shows the event"
+        )
     if cycle["recurrence_interval"] is not None:
         lines.append(f"recurrence interval {_time(cycle['recurrence_interval'])}")
     if cycle["slip"] is not None:

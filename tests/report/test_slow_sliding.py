@@ -19,7 +19,7 @@ from quakedesign.errors import ParameterError, SimulationError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.report.folder import write_folder
 from quakedesign.report.sliding_figures import cycle
-from quakedesign.report.state_runs import cycle_sentence
+from quakedesign.report.state_runs import cycle_sentence, state_run_lines
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
 from quakedesign.simulation.starting_state import sliding
@@ -213,3 +213,12 @@ def test_a_fault_that_is_loaded_faster_than_any_plate_is_told_which_key_says_so(
     said = cycle_sentence(SimpleNamespace(fault=SimpleNamespace(length=length), loading_rate=rate, **run))
     assert f"loaded at {rate:.3g} m/s (with inertia)" in said
     assert ("FASTER than any plate: that is reference_rate of [friction]" in said) == warned
+
+
+@pytest.mark.parametrize(("slip", "locked"), [(0.001, True), (0.009, False)])
+def test_a_locked_fault_whose_run_ends_before_its_event_is_not_said_to_creep_for_good(slip, locked):
+    outcome = {"kind": "creep", "peak_slip_rate": 1e-9, "earthquake_from": 0.02}
+    answer = {"outcome": outcome, "slip_events": [], "duration": 1e7, "slip": slip, "loading_rate": 1e-9}
+    answer |= {"start": {"slip_rate": 1e-12, "state": {"state": 1e6}}, "pressure": [0.0, 0.0], "resting": False}
+    answer |= {"cycle": {"recurrence_interval": None, "slip": None}, "energy": {"relative_residual": 0.0}}
+    assert any("does not creep for good" in line for line in state_run_lines(answer)) == locked
