@@ -3,7 +3,7 @@
 from fractions import Fraction
 from typing import Any
 
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.premises import least_authority
 from quakedesign.controllers import Controller, control_law
 from quakedesign.controllers.feed_forward import NONE, feed_forward

@@ -8,7 +8,7 @@ from typing import Any
 
 from quakedesign.certificates import Certificate, Verdict
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee, task_of
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.premises import Domain, Premise, Variant
 from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.controllers import Controller, control_laws

@@ -7,8 +7,8 @@ from functools import partial
 from typing import Any, TypeVar, Unpack
 
 from quakedesign.certificates.guarantee import NoGuarantee, task_of
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.guarantee.pump import Pump
-from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.impossibility import hopeless
 from quakedesign.controllers import Controller, control_law
 from quakedesign.errors import ParameterError, QuakedesignError, require_known

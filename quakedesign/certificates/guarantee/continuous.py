@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee.claims import Claims
 from quakedesign.certificates.guarantee.small_gain import Bounds, NoGuarantee, certified_bounds
-from quakedesign.certificates.guarantee.statement import Claims, sentence_of
+from quakedesign.certificates.guarantee.statement import sentence_of
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.errors import ParameterError
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop

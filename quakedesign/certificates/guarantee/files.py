@@ -10,10 +10,12 @@ from typing import Any, TypeVar
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.files import read_json
+from quakedesign.certificates.guarantee.claims import Claims
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
+from quakedesign.certificates.guarantee.held import Held
 from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.slow_gain import SlowGain
-from quakedesign.certificates.guarantee.statement import Claims, Guarantee, Held
+from quakedesign.certificates.guarantee.statement import Guarantee
 from quakedesign.certificates.guarantee.task import Friction, Task
 from quakedesign.certificates.kinds import GUARANTEE, SLOW_SLIDING, kind_of
 from quakedesign.certificates.slow_sliding.cells import MOST_CELLS, Cuts, cells

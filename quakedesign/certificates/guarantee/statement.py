@@ -2,322 +2,32 @@
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import ceil, floor, log10
-from typing import TYPE_CHECKING, Any, ClassVar, TypedDict, cast
+from typing import TYPE_CHECKING, ClassVar
 
-from quakedesign import loop as loops
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import sector
+from quakedesign.certificates.guarantee.claims import MARGIN, Claims, above
+from quakedesign.certificates.guarantee.held import Held
 from quakedesign.certificates.guarantee.inputs import Gains
-from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
 from quakedesign.certificates.guarantee.small_gain import Bounds, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.certificates.guarantee.task import Task
-from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.loop import (
-    NOISES,
-    Instants,
-    Layer,
-    LinearLaw,
-    Model,
-    PeriodicLoop,
-    RestLimit,
-    held_loop,
-    starts,
-    with_known_area,
-)
+from quakedesign.errors import ParameterError
+from quakedesign.loop import PeriodicLoop, RestLimit
 from quakedesign.rationals import six_digits
 
 if TYPE_CHECKING:
     from quakedesign.loop import SampledController
 
-_DIGITS = 4
 _NOISE_WORDS = {
     "slip_noise": "with any noise of at most {:.6g} m in the measured slip",
     "rate_noise": "with any noise of at most {:.6g} m/s in the measured slip rate",
 }
-_MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
 _RESTS = Fraction(1, 100)  # of the largest rate of the reference: below that a fault counts as at rest
-_ENDS = ("least_pressure", "largest_pressure", "least_asked", "largest_asked")
 _TURNS = 32  # of claims that follow from themselves
 _RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # times of a pump that are tried, and what each has more than the last needed
 _FIRST = Fraction(1, 64)  # of a step, the first of them
-
-
-class Around(TypedDict, total=False):
-    """What `Held` has besides the law and T_s; what is left out is 0, a pump without limits None."""
-
-    delay: Fraction
-    lag: Fraction
-    diffusion: Fraction
-    slip_noise: Fraction
-    rate_noise: Fraction
-    initial_slip: Fraction
-    initial_slip_rate: Fraction
-    jitter: Fraction
-    delay_jitter: Fraction
-    averaging: Fraction
-    pump: Pump | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Held:
-    """A law as it runs: once every T_s, its pressure held, late, through a lag and rock, from what it measures.
-
-    Attributes
-    ----------
-    law : LinearLaw
-    step, delay, lag : Fraction
-        [s].
-    diffusion : Fraction
-        L²/D of the layer between well and fault [s]; 0 for none.
-    slip_noise, rate_noise : Fraction
-        Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
-    initial_slip, initial_slip_rate : Fraction
-        Bounds of both at the start, where the reference has none, of either sign [m], [m/s].
-    jitter, delay_jitter : Fraction
-        By how much a measurement is early or late at most, its pressure with it [s], and the pressure besides.
-    averaging : Fraction
-        Each measurement but the first is a mean over a time around its own, at most half of this away [s].
-    pump : Pump, optional
-        Limits at the valve, which the loop must never reach.
-    ramp : Fraction
-        Time in which the pump goes from one pressure to the next, at most [s].
-
-    Raises
-    ------
-    ParameterError
-        For a negative bound, or noise of a slip rate that the law does not measure.
-    """
-
-    law: LinearLaw
-    step: Fraction
-    delay: Fraction = Fraction(0)
-    lag: Fraction = Fraction(0)
-    diffusion: Fraction = Fraction(0)
-    slip_noise: Fraction = Fraction(0)
-    rate_noise: Fraction = Fraction(0)
-    initial_slip: Fraction = Fraction(0)
-    initial_slip_rate: Fraction = Fraction(0)
-    jitter: Fraction = Fraction(0)
-    delay_jitter: Fraction = Fraction(0)
-    averaging: Fraction = Fraction(0)
-    pump: Pump | None = None
-    ramp: Fraction = Fraction(0)
-
-    def __post_init__(self) -> None:
-        if min(self.start) < 0:
-            raise ParameterError(
-                "initial slip and slip rate are bounds of both signs, 0 or more. Received "
-                f"{float(self.initial_slip):.4g} m and {float(self.initial_slip_rate):.4g} m/s. Leave out the sign."
-            )
-        if min(self.slip_noise, self.rate_noise) < 0:
-            raise ParameterError(
-                "a bound of noise must be 0 or more. Received "
-                f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s. Check their signs."
-            )
-        if min(self.jitter, self.delay_jitter, self.averaging, self.ramp) < 0:
-            raise ParameterError(
-                f"jitter must be 0 or more, and averaging too. Received {float(self.jitter):.4g} s, of the delay "
-                f"{float(self.delay_jitter):.4g} s, and {float(self.averaging):.4g} s. Leave out the sign."
-            )
-        if self.rate_noise and self.law.of_slip_alone:
-            raise ParameterError(
-                "noise of the slip rate needs a law that measures it. Received "
-                f"{float(self.rate_noise):.4g} m/s and a law of the slip alone. Leave it out."
-            )
-
-    @property
-    def around(self) -> Around:
-        """All but law and T_s."""
-        return cast(Around, {name: getattr(self, name) for name in Around.__annotations__})
-
-    @property
-    def path(self) -> dict[str, Any]:
-        """Delay, lag and L²/D [s] between law and fault."""
-        return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
-
-    @property
-    def start(self) -> tuple[Fraction, Fraction]:
-        """Bounds of the errors at the start [m], [m/s]; 0 and 0 at rest."""
-        return self.initial_slip, self.initial_slip_rate
-
-    @property
-    def noise(self) -> dict[str, Fraction]:
-        """Bounds of the noise that there is, by its input of the loop; with jitter all that is measured has some."""
-        measured = (NOISES[0], *NOISES[1:] * (not self.law.of_slip_alone)) if self.off else ()
-        return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
-
-    @property
-    def off(self) -> Fraction:
-        """How far from its instant a measurement may tell of, at most [s]."""
-        return self.jitter + self.averaging / 2
-
-    @property
-    def instants(self) -> Instants | None:
-        """How far those of the loop may be off; None where they are not, and a pressure may change at once."""
-        if not (self.off or self.delay_jitter or (self.pump and self.pump.rate)):
-            return None
-        return Instants(measured=self.off, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
-
-    @property
-    def longest_ramp(self) -> Fraction:
-        """Time after a pressure is due and before the next sample is [s]."""
-        off, part = self.jitter + self.delay_jitter, self.delay % self.step
-        return min(self.step - part - off, self.step - 2 * off)
-
-    def told(self, task: Task, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
-        """Bounds of the errors as the law is told them, from those of the true ones at any time [m], [m/s].
-
-        A measurement that is early or late may be compared with the reference at its instant.
-        """
-        off = zip(errors, (self.slip_noise, self.rate_noise), task.reference_rates, strict=True)
-        slip, rate = (error + noise + self.off * moves for error, noise, moves in off)
-        return slip, rate
-
-    @property
-    def controller(self) -> "SampledController":
-        """The law for `simulate`, with the scheme ``explicit``, the step T_s, and the delay, lag and rock around it.
-
-        Raises
-        ------
-        UnsupportedError
-            For a law with an implicit root, which is a controller of its own with a scheme.
-        """
-        if self.law.root is not None:
-            raise UnsupportedError(
-                "what is proved of a sliding mode tells its implicit root, not its gains. Received one. Take the "
-                "controller of its design, or its gains, scale, weight and authority in the scheme compensated."
-            )
-        return loops.SampledController(law=self.law, step=self.step, **self.path)
-
-    def loop(self, task: Task, model: Model | None = None) -> PeriodicLoop:
-        """Nominal error loop on a task, of its model or another one."""
-        loop = held_loop(
-            self.law,
-            model or task.model,
-            task.authority,
-            self.step,
-            **self.path,
-            noisy=self.noise,
-            instants=self.instants,
-        )
-        if self.diffusion:
-            gain = (model or task.model).gain / task.authority
-            loop = with_known_area(loop, gain, Layer(time=self.diffusion))
-        box = starts(self.law, len(loop.states), self.start, (self.slip_noise, self.rate_noise))
-        return replace(loop, start=box)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Claims:
-    """What is never exceeded.
-
-    Attributes
-    ----------
-    slip_error : UpperBound
-        Slip less reference, absolute value [m].
-    slip_rate_error : UpperBound
-        [m/s].
-    peak_slip_rate : UpperBound
-        Slip rate, absolute value [m/s].
-    least_pressure : LowerBound
-        [Pa].
-    largest_pressure : UpperBound
-        [Pa].
-    least_asked, largest_asked : LowerBound and UpperBound, optional
-        The same of the pressure at the valve [Pa]; None where that is the fault's.
-    largest_step : UpperBound, optional
-        Change of the pressure that is asked for from sample to sample [Pa]; None where it does not count.
-    """
-
-    slip_error: UpperBound
-    slip_rate_error: UpperBound
-    peak_slip_rate: UpperBound
-    least_pressure: LowerBound
-    largest_pressure: UpperBound
-    least_asked: LowerBound | None = None
-    largest_asked: UpperBound | None = None
-    largest_step: UpperBound | None = None
-
-    @classmethod
-    def of(cls, task: Task, bounds: Bounds) -> "Claims":
-        """Tightest claims that bounds support."""
-        low, high = task.rest_pressure
-        push = bounds.push / task.authority
-        asked = None if bounds.asked is None else bounds.asked / task.authority
-        return cls(
-            slip_error=UpperBound(bounds.slip_error),
-            slip_rate_error=UpperBound(bounds.slip_rate_error),
-            peak_slip_rate=UpperBound(bounds.slip_rate_error + task.reference_rates[0]),
-            least_pressure=LowerBound(low - push),
-            largest_pressure=UpperBound(high + push),
-            least_asked=None if asked is None else LowerBound(low - asked),
-            largest_asked=None if asked is None else UpperBound(high + asked),
-            largest_step=None if bounds.stepped is None else UpperBound(bounds.stepped / task.authority),
-        )
-
-    @property
-    def pressures(self) -> tuple[tuple[LowerBound, UpperBound], ...]:
-        """In the fault, and at the valve where that is another one [Pa]."""
-        fault = self.least_pressure, self.largest_pressure
-        if self.least_asked is None or self.largest_asked is None:
-            return (fault,)
-        return fault, (self.least_asked, self.largest_asked)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Exact numbers as texts, SI."""
-        return {
-            "slip_error": self.slip_error.exact,
-            "slip_rate_error": self.slip_rate_error.exact,
-            "peak_slip_rate": self.peak_slip_rate.exact,
-            **{
-                name: [low.exact, high.exact]
-                for name, (low, high) in zip(("pressure", "asked_pressure"), self.pressures, strict=False)
-            },
-            **({} if self.largest_step is None else {"largest_step": self.largest_step.exact}),
-        }
-
-    def rounded(self) -> "Claims":
-        """The same, a little weaker and with few digits."""
-        step = self.largest_step
-        ends: list[Any] = [end for low, high in self.pressures for end in _wider(low, high)]
-        return Claims(
-            slip_error=UpperBound(_above(self.slip_error * _MARGIN)),
-            slip_rate_error=UpperBound(_above(self.slip_rate_error * _MARGIN)),
-            peak_slip_rate=UpperBound(_above(self.peak_slip_rate * _MARGIN)),
-            largest_step=None if step is None else UpperBound(_above(step * _MARGIN)),
-            **dict(zip(_ENDS, ends, strict=False)),
-        )
-
-    def verdict(self, task: Task, bounds: Bounds) -> Verdict:
-        """PROVED if the claims follow from bounds under which the fault stays closed, else UNDECIDED."""
-        tightest = Claims.of(task, bounds)
-        return Verdict.PROVED if self.covers(tightest) and not tightest.opens(task) else Verdict.UNDECIDED
-
-    def opens(self, task: Task) -> str:
-        """Why the fault may open, where the plant is another one; empty where the pressure stays below σ′."""
-        if self.largest_pressure < task.normal_stress:
-            return ""
-        return (
-            f"the pressure may rise to {self.largest_pressure.quantity('Pa')}, and the effective normal stress is "
-            f"{LowerBound(task.normal_stress).quantity('Pa')}: the fault may open"
-        )
-
-    def covers(self, other: "Claims") -> bool:
-        """Whether these claims follow from others."""
-        return (
-            self.slip_error >= other.slip_error
-            and self.slip_rate_error >= other.slip_rate_error
-            and self.peak_slip_rate >= other.peak_slip_rate
-            and len(self.pressures) <= len(other.pressures)
-            and _covers(self.largest_step, other.largest_step)
-            and all(
-                low <= least and high >= largest
-                for (low, high), (least, largest) in zip(self.pressures, other.pressures, strict=False)
-            )
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -373,9 +83,9 @@ class Guarantee:
         away = max(largest - high, low - least)
         per_slip = max(map(abs, self.task.slip_chord)) / self.task.authority
         late = per_slip * (held.delay + held.jitter + held.delay_jitter + held.ramp) * self.task.reference_rates[0]
-        width = _above(2 * away + late)
-        resolution = _above(2 * held.slip_noise + _RESTS * self.task.reference_rates[0] * held.step)
-        return RestLimit(width=width, per_slip=_above(per_slip), resolution=resolution)
+        width = above(2 * away + late)
+        resolution = above(2 * held.slip_noise + _RESTS * self.task.reference_rates[0] * held.step)
+        return RestLimit(width=width, per_slip=above(per_slip), resolution=resolution)
 
     @property
     def controller(self) -> "SampledController":
@@ -455,7 +165,7 @@ def guarantee(task: Task, held: Held, slow_gain: SlowGain | None = None) -> Guar
     for _ in range(_RAMPS):
         if isinstance(found, Guarantee) or found.needs is None:
             return found
-        ramp = _above(found.needs / held.pump.rate * _RAMP_ROOM)
+        ramp = above(found.needs / held.pump.rate * _RAMP_ROOM)
         if ramp > longest:
             return found
         found = _proved(task, replace(held, ramp=ramp), slow_gain)
@@ -492,7 +202,7 @@ def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuar
         claims = Claims.of(task, bounds).rounded()
         if claims.slip_error <= slip_error:
             return claims
-        slip_error = _above(claims.slip_error * _MARGIN)
+        slip_error = above(claims.slip_error * MARGIN)
     reason = f"the slip error that moves the input gain, beyond {UpperBound(slip_error):.2g} m, moves it further"
     return NoGuarantee(reason=reason, small_gain=None)
 
@@ -536,24 +246,6 @@ def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
 def _unstable(held: Held) -> NoGuarantee:
     reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
     return NoGuarantee(reason=reason, small_gain=None)
-
-
-def _covers(step: UpperBound | None, other: UpperBound | None) -> bool:
-    """Whether a largest step follows from another."""
-    return step is None or (other is not None and step >= other)
-
-
-def _wider(low: LowerBound, high: UpperBound) -> tuple[LowerBound, UpperBound]:
-    room = (high - low) * (_MARGIN - 1)
-    return LowerBound(-_above(room - low)), UpperBound(_above(high + room))
-
-
-def _above(value: Fraction) -> Fraction:
-    """At least a rational, with four digits."""
-    if not value:
-        return value
-    scale = Fraction(10) ** (floor(log10(abs(value))) - _DIGITS + 1)
-    return ceil(value / scale) * scale
 
 
 def _off_schedule(measured: Fraction, arrived: Fraction) -> str:

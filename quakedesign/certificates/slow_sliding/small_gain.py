@@ -57,10 +57,10 @@ from itertools import accumulate
 from typing import Any
 
 from quakedesign.bounds import UpperBound
+from quakedesign.certificates.guarantee.held import Held
 from quakedesign.certificates.guarantee.inputs import Channel, Gains
 from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.certificates.guarantee.small_gain import NoGuarantee, channel_bounds
-from quakedesign.certificates.guarantee.statement import Held
 from quakedesign.certificates.slow_sliding.task import Range, SlidingTask
 from quakedesign.errors import ParameterError
 from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop

@@ -7,8 +7,8 @@ from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee.held import Held
 from quakedesign.certificates.guarantee.small_gain import NoGuarantee
-from quakedesign.certificates.guarantee.statement import Held
 from quakedesign.certificates.slow_sliding.cells import Cuts, cells
 from quakedesign.certificates.slow_sliding.small_gain import SlidingClaims, cell_bounds, exponential, follows
 from quakedesign.certificates.slow_sliding.task import SlidingTask

@@ -10,8 +10,8 @@ from typing import Any, Unpack
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.guarantee.sector import holds
-from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.controllers import Sampling, SlidingMode
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.fault.checks import require_ordinary

@@ -5,7 +5,7 @@ from fractions import Fraction
 from typing import Unpack
 
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.premise import Premise
 from quakedesign.controllers import SlidingMode
 from quakedesign.synthesis.guaranteed.compensated import WEIGHTS, Compensation, design_compensated

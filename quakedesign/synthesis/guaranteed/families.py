@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from quakedesign.certificates.guarantee import Task
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.errors import ParameterError
 from quakedesign.loop import (
     SHORTEST,

@@ -9,7 +9,7 @@ import numpy as np
 
 from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.synthesis.guaranteed.design import MOST_DELAY, design_held, first_held
 from quakedesign.synthesis.guaranteed.families import MEASURED
 from quakedesign.synthesis.guaranteed.slowly import tightened

@@ -7,7 +7,7 @@ from math import exp
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.loop import Layer, Model, PathModel
 from quakedesign.loop.laws import Row
 from quakedesign.loop.layer import MODES

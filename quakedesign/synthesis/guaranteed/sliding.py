@@ -6,7 +6,7 @@ from typing import Any, Unpack
 
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.controllers import SlidingMode
 from quakedesign.errors import require_known
 from quakedesign.loop.schemes import schemes

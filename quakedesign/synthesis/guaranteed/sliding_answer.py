@@ -10,8 +10,8 @@ from typing import Any, ClassVar, Unpack
 import numpy as np
 
 from quakedesign.certificates.guarantee import Held, NoGuarantee
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.guarantee.pump import Pump
-from quakedesign.certificates.guarantee.statement import Around
 from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask, sliding_task
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from quakedesign.certificates.guarantee import Held, NoGuarantee
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask, sliding_task
 from quakedesign.fault import Fault
 from quakedesign.fault.defaults import AGEINGS, sliding_step

@@ -12,7 +12,7 @@ from scipy.optimize import OptimizeResult, minimize
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Held, NoGuarantee
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.slow_sliding import SlidingClaims, SlidingGuarantee, SlidingTask
 from quakedesign.certificates.slow_sliding.cells import MOST_CELLS, Cuts, parts
 from quakedesign.certificates.slow_sliding.small_gain import (

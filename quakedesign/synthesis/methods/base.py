@@ -10,7 +10,7 @@ import sympy as sp
 
 from quakedesign.certificates import Certificate, Verdict, decided_once
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee, Task, task_of
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.linear_premises import linear_premises
 from quakedesign.certificates.premises import Domain, Premise, Variant
 from quakedesign.certificates.sectors import sectors

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from quakedesign.certificates import Certificate
 from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, Task
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.premises import Domain, Premise
 from quakedesign.fault import Fault
 from quakedesign.loop import SampledController

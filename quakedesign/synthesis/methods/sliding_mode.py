@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from quakedesign.certificates import Certificate, Loop, loop_of
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.premises import (
     Domain,
     Errors,

@@ -11,7 +11,7 @@ from quakedesign.certificates.guarantee import (
     NoGuarantee,
     Task,
 )
-from quakedesign.certificates.guarantee.statement import Around
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.impossibility import hopeless
 from quakedesign.certificates.sectors import sectors
 from quakedesign.controllers.elqr import ExtendedLQR

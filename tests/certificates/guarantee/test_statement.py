@@ -18,8 +18,9 @@ from quakedesign.certificates.guarantee import (
     statement,
     task_of,
 )
+from quakedesign.certificates.guarantee.claims import above
 from quakedesign.certificates.guarantee.pump import Pump
-from quakedesign.certificates.guarantee.statement import _above, sentence_of
+from quakedesign.certificates.guarantee.statement import sentence_of
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop import ContinuousLaw, ImplicitRoot, Instants, LinearLaw, Power, compensated, summed_integrals
@@ -84,7 +85,7 @@ def test_rounded_claims_are_a_thousandth_weaker_with_four_digits():
 
 @pytest.mark.parametrize(("value", "rounded"), [("12345.1", "12350"), ("-12345.1", "-12340"), ("0", "0"), ("1", "1")])
 def test_four_digits_are_not_below(value, rounded):
-    assert _above(F(value)) == F(rounded)
+    assert above(F(value)) == F(rounded)
 
 
 @pytest.mark.parametrize(
