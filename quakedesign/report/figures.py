@@ -20,7 +20,7 @@ from quakedesign.report.drawing import (
     style,
     with_diverged,
 )
-from quakedesign.report.sliding_figures import sliding_figures
+from quakedesign.report.state_figures import state_figures
 from quakedesign.studies.state_runs import StateRun
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def figures(comparison: "Compared") -> dict[str, Any]:
     """Figures by name: ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``; others with a state."""
     if isinstance(comparison.uncontrolled, StateRun):
         slowly = {"errors": errors(comparison)} if runs_of(comparison.entries) else {}
-        return sliding_figures(comparison, comparison.uncontrolled) | slowly
+        return state_figures(comparison, comparison.uncontrolled) | slowly
     drawn = {"uncontrolled": uncontrolled(comparison)}
     if runs_of(comparison.entries):
         drawn |= {

@@ -18,7 +18,7 @@ from quakedesign.cli import main
 from quakedesign.errors import ParameterError, SimulationError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.report.folder import write_folder
-from quakedesign.report.sliding_figures import cycle
+from quakedesign.report.state_figures import cycle
 from quakedesign.report.state_runs import cycle_sentence, state_run_lines
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _PER_BAND = 16  # instants, four periods
 
 
-def sliding_figures(comparison: "Compared", natural: "StateRun") -> dict[str, Any]:
+def state_figures(comparison: "Compared", natural: "StateRun") -> dict[str, Any]:
     """``cycle``, and ``slow-sliding`` of the first law that ran."""
     held = next(((e, e.run) for e in comparison.entries if isinstance(e.run, SlidingRun)), None)
     drawn = {"cycle": cycle(comparison, natural)}
