@@ -196,7 +196,7 @@ def test_the_adversary_s_limit_is_that_of_the_run(proved):
     )
     controller = replace(proved.controller, rest_limit=exact)
     limit = replace(
-        _Limit.of(proved, 6, np.array([pace])),
+        _Limit.of(proved, proved.held, 6, np.array([pace])),
         width=4000 * authority,
         moved=0.0,
         rests=np.array([1e-6 - pace * 0.184]),
@@ -207,7 +207,9 @@ def test_the_adversary_s_limit_is_that_of_the_run(proved):
     for number in range(60):
         errors = random.normal(0, [1e-5, 5e-5])
         asked = output @ told + fed @ errors
-        (state,) = limit.cut(np.array([[*errors, *(rows @ told + seen @ errors), asked * authority, 0.0]]))
+        (state,) = limit.cut(
+            np.array([[*errors, *(rows @ told + seen @ errors), asked * authority, 0.0]]), np.array([True])
+        )
         told = state[2:4]
         pressure, z = stepped(controller, z, *errors, number * pace * 0.184)
         cuts += abs(pressure - asked) > 1
@@ -236,14 +238,14 @@ def test_what_the_adversary_cuts_off_moves_all_that_stands_at_the_valve(proved):
         claims = replace(proved.claims, **(asked if behind else {}))
         claim = replace(proved, claims=claims, held=replace(proved.held, **around))
         states = claim.loop.states
-        told = _Limit.of(claim, len(states) + 1, np.zeros(1)).told
+        told = _Limit.of(claim, claim.held, len(states) + 1, np.zeros(1)).told
         expected |= {name: float(v / proved.task.authority) for name, v in own.items()}
         assert told == pytest.approx([expected.get(name, 0.0) for name in (*states, "disturbance of the class")])
 
 
 def test_where_p_star_drifts_all_pressures_that_count_from_it_move(proved):
-    limit = _Limit.of(proved, 6, np.array([0.0])).anew()
-    limit.cut(np.array([[0.0, 0.0, 0.0, 0.0, 3.0, 0.0]]))
+    limit = _Limit.of(proved, proved.held, 6, np.array([0.0])).anew()
+    limit.cut(np.array([[0.0, 0.0, 0.0, 0.0, 3.0, 0.0]]), np.array([True]))
     limit.follow(np.zeros((1, 6)), np.array([[0.0, 0.0, 0.0, 0.0, -2.0, 0.0]]))
     assert limit.highest == pytest.approx([1.0])
 

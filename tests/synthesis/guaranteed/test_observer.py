@@ -148,6 +148,7 @@ def asked(monkeypatch):
 def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for(asked, monkeypatch):
     design = qd.design(REAL, "elqr", measured="slip", slip_noise="1e-6")
     claim, told = design.guarantee, {"measured": "slip", "slip_noise": NOISE, "rate_noise": 0}
+    told |= {"delay": 0, "lag": 0, "diffusion": 0}
     assert asked["design_held"] == told | {"objective": "tracking"}
     assert (asked["longest_step"], asked["longest_delay"]) == (told | {"most": None}, told)
     assert (design.verdict, claim) == (Verdict.PROVED, designed("slip alone"))
