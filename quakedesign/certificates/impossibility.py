@@ -233,6 +233,16 @@ def smallest_withdrawal(task: Task | SlidingPush, step: Fraction) -> LowerBound 
     return LowerBound(max(withdrawals)) if withdrawals else None
 
 
+def too_slow(task: Task, withdrawal: Fraction, step: Fraction, delay: Fraction) -> str:
+    """Why no controller with such a withdrawal [Pa] holds the fault with T_s and a delay [s]; empty where none is."""
+    late = longest_reaction(task, withdrawal) if task.change is None else None
+    if late is None or step + delay <= late:
+        return ""
+    most = LowerBound(withdrawal).quantity("Pa")
+    how = f"with T_s and delay above {late.quantity('s')} in all"
+    return f"no controller whatever that withdraws at most {most} holds it {how}"
+
+
 def hopeless(task: Task, withdrawal: Fraction, delay: Fraction, diffusion: Fraction) -> str:
     """Why no controller with such a withdrawal [Pa] holds the fault, whatever its T_s; empty where that is not proved.
 

@@ -39,6 +39,10 @@ WIDTHS = ("stiffness", "damping", "authority")
 OPTIONAL = ("damping", "width")  # of the plant
 _NO_SOURCE = "no source given"
 _UNDISTURBED = "no disturbance, so that no guarantee covers one"
+_STILL = (
+    "frequency 0 of the disturbance, so that its sine is 0 in every run; guarantees are for any course of its size. "
+    "Give a frequency to see one"
+)
 
 
 def load_fault(source: str | Path, *, box: str | None = None, disturbance: str | None = None) -> Fault:
@@ -110,8 +114,7 @@ def _fault(table: Table, problems: Problems) -> Any:
     whole = task if given == parts else None
     with problems.collected():
         if whole is not None:
-            said = "disturbance" in table.entries or parts["friction"].state_names
-            return completed(parts, whole, () if said else (_UNDISTURBED,))
+            return completed(parts, whole, _assumed(parts, table))
         require_plant(**{key: given[key] for key in PLANT if key in given})
     with problems.collected():
         if whole is None and "name" in given:
@@ -161,6 +164,16 @@ def _authority(parts: Mapping[str, Any]) -> Fraction:
     if density is None or len(told) == 1 or not all(map(is_ordinary, told)):
         return Fraction(1)
     return 1 / (rational(density) * rational(min(told[1:])))
+
+
+def _assumed(parts: Mapping[str, Any], table: Table) -> tuple[str, ...]:
+    """What a file leaves open of its disturbance, for friction without a state."""
+    if parts["friction"].state_names:
+        return ()
+    if "disturbance" not in table.entries:
+        return (_UNDISTURBED,)
+    told = parts["disturbance"]
+    return (_STILL,) if told.amplitude and not (told.frequency or told.constant) else ()
 
 
 def _disturbance(table: Table | None, problems: Problems, authority: Fraction) -> Disturbance | None:

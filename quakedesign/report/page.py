@@ -36,8 +36,8 @@ MODEL_LIMITS = (
 REST_LIMITS = (
     "proofs are about a plant continued to negative slip rates; the worst found with stick is what a search found on "
     "one that stops and reverses",
-    "in these runs the pressure acts at once",
 )
+_WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "rock of L^2/D ="}
 SLIDING_LIMITS = (
     "the fault slides at the rate of its task from the start, and its far end rests: how it came to slide is not part "
     "of the run nor of the proof",
@@ -129,7 +129,15 @@ def _limits(comparison: "Compared", told: list[Account]) -> list[str]:
     reverse = (
         [f"the slip rate is negative, outside the model, in part of the steps: {', '.join(shares)}"] if shares else []
     )
-    return [*own, *reverse, *MODEL_LIMITS, *(SLIDING_LIMITS if comparison.fault.friction.state_names else REST_LIMITS)]
+    about_runs = SLIDING_LIMITS if comparison.fault.friction.state_names else (*REST_LIMITS, _way(comparison))
+    return [*own, *reverse, *MODEL_LIMITS, *about_runs]
+
+
+def _way(comparison: "Compared") -> str:
+    """What the pressure of the runs goes through."""
+    paths = (e.design.path.items() for e in comparison.of("designed"))
+    told = dict.fromkeys(f"{_WAYS[name]} {float(time):.4g} s" for path in paths for name, time in path if time)
+    return f"in these runs the pressure {'comes behind ' + ', '.join(told) if told else 'acts at once'}"
 
 
 def _tables(comparison: "Compared") -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from typing import Any, TypeVar, Unpack
@@ -9,7 +10,7 @@ from typing import Any, TypeVar, Unpack
 from quakedesign.certificates.guarantee import NoGuarantee, task_of
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.guarantee.pump import Pump
-from quakedesign.certificates.impossibility import hopeless
+from quakedesign.certificates.impossibility import hopeless, too_slow
 from quakedesign.controllers import Controller, control_law
 from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.executors import crew_or_here
@@ -122,7 +123,11 @@ def answer(
     if beyond and not gains:
         return Answer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None))
     wanted = Wanted(gains=gains, objective=objective, scheme=scheme, measured=measured, around=around)
-    return method_of(law).sampled(fault, task, law, period, wanted)
+    given = method_of(law).sampled(fault, task, law, period, wanted)
+    slow = "" if gains else too_slow(task, rational(fault.effective_normal_stress), period, late)
+    if not slow or given.proved:
+        return given
+    return replace(given, found=NoGuarantee(reason=slow, small_gain=None))
 
 
 _UNITS = {

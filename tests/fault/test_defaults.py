@@ -162,3 +162,11 @@ def test_symbols_are_names():
     with pytest.raises(ScenarioError, match=r"direct_effect must be given once. Received a and direct_effect"):
         parse_fault(f"{head}{RATE}direct_effect = 0.01\n{TASK}", "own.toml")
     assert set(friction_laws()) >= {law.name}
+
+
+@pytest.mark.parametrize(
+    ("more", "still"), [("", True), ('frequency = "1 rad/s"', False), ('constant = "1 kPa"', False)]
+)
+def test_a_sine_without_a_frequency_is_said_to_be_none(more, still):
+    fault = parse_fault(f'{PLAIN}[disturbance]\namplitude = "5 kPa"\n{more}\n', "own.toml")
+    assert any("its sine is 0 in every run" in said for said in fault.assumed) is still

@@ -3,10 +3,12 @@
 import json
 import re
 import tomllib
+from fractions import Fraction as F
 from html import unescape
 from importlib.resources import files
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,6 +18,7 @@ import sympy as sp
 import quakedesign as qd
 from quakedesign.cli.shared import command_line, typed
 from quakedesign.fault import parse_fault
+from quakedesign.report import page
 from quakedesign.report.account import ASKED
 from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.drawing import figure
@@ -186,3 +189,13 @@ def test_numbers_of_many_digits_become_decimals_and_no_others():
     assert _written(sp.Rational(1, 3) * x) == r"\frac{x}{3}"
     assert _written(sp.Rational(123456, 1000) * x) == "123.5 x"
     assert _written(sp.sqrt(2) * x) == "1.414 x"
+
+
+def test_the_report_says_behind_what_its_runs_are():
+    def compared(**path):
+        design = SimpleNamespace(path=path)
+        return SimpleNamespace(of=lambda _: [SimpleNamespace(design=design)])
+
+    assert page._way(compared()) == page._way(compared(lag=F(0))) == "in these runs the pressure acts at once"
+    found = page._way(compared(delay=F("0.15"), lag=F("0.03"), diffusion=F(2)))
+    assert found == "in these runs the pressure comes behind a delay of 0.15 s, a lag of 0.03 s, rock of L^2/D = 2 s"
