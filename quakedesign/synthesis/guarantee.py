@@ -18,7 +18,6 @@ from quakedesign.fault import Fault
 from quakedesign.fault.units import exact_value
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, OBJECTIVES, Answer
-from quakedesign.synthesis.guaranteed.families import require_surroundings
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer, answer_sliding
 from quakedesign.synthesis.methods.base import Wanted, method_of
 
@@ -115,7 +114,6 @@ def answer(
     period = rational(fault.sampling_time) if step is None else step
     if not Fraction(1, 10**9) <= period <= 10**9:
         raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")
-    require_surroundings(around)
     task = task_of(fault, rate_limited=disturbance_class == "rate")
     law = control_law(controller)
     late, far = around.get("delay", Fraction(0)), around.get("diffusion", Fraction(0))
