@@ -7,7 +7,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import ContinuousPeaks, NoGuarantee
 from quakedesign.synthesis.linear.analysis.robust_stability import Analysis
 from quakedesign.synthesis.linear.analysis.verdict import LinearVerdict
-from quakedesign.synthesis.linear.sampled.held import ConstantLoop, HeldLoop
+from quakedesign.synthesis.linear.sampled.held import HeldLoop
 
 
 def held_sentences(held: HeldLoop) -> list[str]:
@@ -26,15 +26,6 @@ def _proved_up_to(held: HeldLoop) -> str:
         return "no T_s is proved"
     said = f"every T_s up to {held.largest_step:.4g} s is proved"
     return said if held.refuted_step is None else f"{said}, {held.refuted_step:.15g} s is refuted, open in between"
-
-
-def constant_sentence(loops: Mapping[str, ConstantLoop]) -> str:
-    """The same for the idealised loops with constant parameters."""
-    said = [
-        f"{name} integrals {loop.verdict}, {'no T_s' if loop.largest_step is None else f'{loop.largest_step:.4g} s'}"
-        for name, loop in loops.items()
-    ]
-    return f"idealised, constant parameters (verdict, longest T_s proved): {'; '.join(said)}"
 
 
 def peaks_sentence(peaks: Mapping[str, ContinuousPeaks | NoGuarantee]) -> str:
@@ -61,7 +52,6 @@ def verdict_lines(judged: LinearVerdict) -> list[str]:
         *(f"  {line}" for line in margin_lines(judged.analysis)),
         f"  optimal for a Q that covers the uncertainty: {optimal} (the printed test: {tests['printed']['verdict']})",
         f"  {'; '.join(held_sentences(judged.held))}",
-        f"  {constant_sentence(judged.held.constant)}",
     ]
     if judged.asked is None or judged.peaks is None:
         return lines

@@ -11,17 +11,16 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Bounds, Claims, ContinuousPeaks, NoGuarantee, task_of
 from quakedesign.fault import load_fault
 from quakedesign.loop import exact_integrals
-from quakedesign.report.linear import constant_sentence, held_sentences, margin_lines, peaks_sentence
-from quakedesign.synthesis.linear.sampled.held import ConstantLoop, HeldLoop
+from quakedesign.report.linear import held_sentences, margin_lines, peaks_sentence
+from quakedesign.synthesis.linear.sampled.held import HeldLoop
 from quakedesign.synthesis.linear.sampled.varying_parameters import LargestVaryingStep, VaryingVerdict
 
 LONGEST = LargestVaryingStep(proved=LowerBound("0.15769"), refuted=UpperBound("0.15822"), proofs=())
-CONSTANT = {"exact": ConstantLoop(verdict=Verdict.PROVED, largest_step=LowerBound("0.157675"))}
 
 
 def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
     runs = VaryingVerdict(verdict=verdict, step=F(step), witness=witness)
-    return HeldLoop(runs=runs, longest=longest, radius=0.9, constant=CONSTANT)
+    return HeldLoop(runs=runs, longest=longest, radius=0.9)
 
 
 @pytest.mark.parametrize(
@@ -36,12 +35,6 @@ def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
 )  # fmt: skip
 def test_a_held_pressure(loop, said):
     assert said in "; ".join(held_sentences(loop))
-
-
-def test_idealised_loops_are_named_as_such():
-    said = constant_sentence(CONSTANT | {"summed": ConstantLoop(verdict=Verdict.REFUTED, largest_step=None)})
-    assert said.startswith("idealised, constant parameters")
-    assert said.endswith("exact integrals proved, 0.1576 s; summed integrals refuted, no T_s")
 
 
 def test_peaks_of_one_or_no_class():

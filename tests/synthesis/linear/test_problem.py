@@ -11,9 +11,8 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, Reference
 from quakedesign.synthesis.linear.analysis.inverse_optimality import inverse_optimality
 from quakedesign.synthesis.linear.design.riccati import riccati_design
-from quakedesign.synthesis.linear.design.specifications import Specifications
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
-from quakedesign.synthesis.linear.sampled.stability import hold_verdict, largest_radius
+from quakedesign.synthesis.linear.sampled.zero_order_hold import HeldPoles
 
 YEAR = 31557600.0
 UNITS = {
@@ -61,16 +60,11 @@ def test_designs_do_not_depend_on_the_units(preset, name):
         Disturbance(amplitude=1e-4, frequency=0.5, slip_growth=1e-3, rate_growth=1e-2)
     )
     other, units = in_units(fault, *UNITS[name]), UNITS[name]
-    speed = Specifications(settling_time=20 / fault.natural_frequency)
-    slow = Specifications(settling_time=20 / fault.natural_frequency / units[1])
-    for here, there in (
-        (riccati_design(fault), riccati_design(other)),
-        (riccati_design(fault, specifications=speed), riccati_design(other, specifications=slow)),
-    ):
-        assert gains_in_si(there.K, *units) == pytest.approx(here.K, rel=1e-9)
-        assert there.split == here.split
-        assert np.sort_complex(there.E) / units[1] == pytest.approx(np.sort_complex(here.E), rel=1e-9)
-        assert there.fastest_pole / units[1] == pytest.approx(here.fastest_pole, rel=1e-9)
+    here, there = riccati_design(fault), riccati_design(other)
+    assert gains_in_si(there.K, *units) == pytest.approx(here.K, rel=1e-9)
+    assert there.split == here.split
+    assert np.sort_complex(there.E) / units[1] == pytest.approx(np.sort_complex(here.E), rel=1e-9)
+    assert there.fastest_pole / units[1] == pytest.approx(here.fastest_pole, rel=1e-9)
 
 
 def test_verdicts_and_radii_do_not_depend_on_the_units():
@@ -83,9 +77,9 @@ def test_verdicts_and_radii_do_not_depend_on_the_units():
     assert inverse_optimality(one, here).verdict is inverse_optimality(two, there).verdict
     for step in (1e-3, 0.5e-3):
         period = F(step) / F(second)
-        assert hold_verdict(one, here, step).verdict is hold_verdict(two, there, period).verdict
-        measured = largest_radius(two, there, float(period))
-        assert largest_radius(one, here, step) == pytest.approx(measured, rel=1e-9)
+        first, again = HeldPoles(one, here), HeldPoles(two, there)
+        assert (first.unstable(F(step)) is None) == (again.unstable(period) is None)
+        assert first.radius(F(step)) == pytest.approx(again.radius(period), rel=1e-9)
 
 
 def test_scaling_is_undone_exactly():
@@ -113,8 +107,8 @@ def test_a_loop_and_its_twin_have_the_same_poles():
             for m in (problem.loop(a, gains), inside.loop(b, K))
         ]
         assert poles[1] / float(scales.time) == pytest.approx(poles[0], rel=1e-6)
-    assert largest_radius(problem, gains, 5e-4) == pytest.approx(
-        largest_radius(inside, K, float(F("5e-4") / scales.time)), rel=1e-9
+    assert HeldPoles(problem, gains).radius(F("5e-4")) == pytest.approx(
+        HeldPoles(inside, K).radius(F("5e-4") / scales.time), rel=1e-9
     )
 
 

@@ -1,41 +1,22 @@
 """Everything that is decided of a K when p is held over a sampling period."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
 from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates import Verdict
 from quakedesign.fault.checks import require_positive
 from quakedesign.rationals import rational
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
-from quakedesign.synthesis.linear.sampled.stability import hold_verdict, largest_radius, largest_step
 from quakedesign.synthesis.linear.sampled.varying_parameters import (
     LargestVaryingStep,
     VaryingVerdict,
     largest_varying_step,
     varying_verdict,
 )
-
-INTEGRATIONS = {"summed": "euler", "exact": "exact"}
-"""Loops with constant parameters: integrals summed over the samples as they run, and integrals at all times."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConstantLoop:
-    """What is decided for parameters that are constant anywhere in the box, an idealisation.
-
-    Attributes
-    ----------
-    verdict : Verdict
-    largest_step : LowerBound or None
-        Every period up to it is proved [s].
-    """
-
-    verdict: Verdict
-    largest_step: LowerBound | None
+from quakedesign.synthesis.linear.sampled.zero_order_hold import HeldPoles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,14 +31,11 @@ class HeldLoop:
         Up to which period that is proved.
     radius : float
         Spectral radius of a period, largest over the vertices, measured.
-    constant : mapping of str to ConstantLoop
-        ``"summed"`` and ``"exact"``.
     """
 
     runs: VaryingVerdict
     longest: LargestVaryingStep | None
     radius: float
-    constant: Mapping[str, ConstantLoop]
 
     @property
     def step(self) -> Fraction:
@@ -81,15 +59,10 @@ class HeldLoop:
             "step": float(self.step),
             "verdict": str(self.runs.verdict),
             "varying": str(self.runs.verdict),
-            "summed": str(self.constant["summed"].verdict),
             "radius": self.radius if isfinite(self.radius) else None,
             "witness": [float(v) for v in witness] if witness else None,
             "largest_step": _number(self.largest_step),
             "refuted_step": _number(refuted),
-            "constant": {
-                name: {"verdict": str(loop.verdict), "largest_step": _number(loop.largest_step)}
-                for name, loop in self.constant.items()
-            },
         }
 
 
@@ -115,17 +88,9 @@ def held_loop(problem: LinearProblem, gains: Sequence[Fraction], step: float | s
     """
     period = rational(step, "step")
     require_positive("Give it in seconds.", step=period)
-    constant = {name: largest_step(problem, gains, integration=way) for name, way in INTEGRATIONS.items()}
-    longest = largest_varying_step(problem, gains, constant["summed"])
+    longest = largest_varying_step(problem, gains)
     return HeldLoop(
         runs=varying_verdict(problem, gains, period, known=longest),
         longest=longest,
-        radius=largest_radius(problem, gains, float(period), "euler"),
-        constant={
-            name: ConstantLoop(
-                verdict=hold_verdict(problem, gains, period, integration=INTEGRATIONS[name]).verdict,
-                largest_step=reach.proved if reach else None,
-            )
-            for name, reach in constant.items()
-        },
+        radius=HeldPoles(problem, gains).radius(period),
     )

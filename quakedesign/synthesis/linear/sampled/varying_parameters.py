@@ -14,10 +14,10 @@ from quakedesign.rationals import rational
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Vertex
 from quakedesign.synthesis.linear.sampled.clock_dependent import DEGREE, ClockProof, clock_proof
 from quakedesign.synthesis.linear.sampled.input_delay import DelayProof, delay_proof
-from quakedesign.synthesis.linear.sampled.stability import LargestStep, hold_verdict
+from quakedesign.synthesis.linear.sampled.zero_order_hold import HeldPoles
 
 _SHARES = tuple(Fraction(n, 100) for n in (99, 98, 96, 93, 88, 80))
-"""Of the limit for constant parameters, where a V that depends on the clock is tried; degree 8 reaches 98 or 99 %."""
+"""Of the limit at the corners, where a V that depends on the clock is tried; degree 8 reaches 98 or 99 %."""
 _DEGREES = (DEGREE, 2 * DEGREE)
 """Tried for one period: where the plant alone doubles within it, 8 is too few."""
 _TOLERANCE = Fraction(1, 50)
@@ -89,47 +89,43 @@ def varying_verdict(
         What is proved of these gains already.
     """
     period = rational(step, "step")
-    constant = hold_verdict(problem, gains, period, integration="euler")
-    if constant.verdict is Verdict.REFUTED:
-        return VaryingVerdict(verdict=Verdict.REFUTED, step=period, witness=constant.witness)
+    witness = HeldPoles(problem, gains).unstable(period)
+    if witness is not None:
+        return VaryingVerdict(verdict=Verdict.REFUTED, step=period, witness=witness)
     proof: HoldProof | None = known.proof_at(period) if known else delay_proof(problem, gains, period)
     for degree in () if proof else _DEGREES:
         proof = proof or clock_proof(problem, gains, (period, period), degree=degree)
     return VaryingVerdict(verdict=Verdict.PROVED if proof else Verdict.UNDECIDED, step=period, proof=proof)
 
 
-def largest_varying_step(
-    problem: LinearProblem, gains: Sequence[Fraction], constant: LargestStep | None
-) -> LargestVaryingStep | None:
+def largest_varying_step(problem: LinearProblem, gains: Sequence[Fraction]) -> LargestVaryingStep | None:
     """Longest sampling period up to which the law that runs is proved.
 
     One V for all phases from short periods on, by bisection; then one that depends on the clock, range by range,
-    towards the limit for constant parameters. Periods have four digits.
+    towards the longest one that constant parameters at the corners allow. Periods have four digits.
 
     Parameters
     ----------
     problem : LinearProblem
         In SI.
     gains : sequence of 4 Fraction
-    constant : LargestStep or None
-        What is known for constant parameters and summed integrals.
 
     Returns
     -------
     LargestVaryingStep or None
         None when no range of periods was proved.
     """
-    if constant is None:
-        return None
-    first = _longest_delay(problem, gains, constant.proved)
-    if first is None:
+    corners = HeldPoles(problem, gains)
+    longest, refuted = corners.limit() or (None, None)
+    first = _longest_delay(problem, gains, longest) if longest else None
+    if longest is None or first is None:
         return None
     proofs: list[HoldProof] = [first]
-    while more := _further(problem, gains, proofs[-1].longest, constant.proved):
+    while more := _further(problem, gains, proofs[-1].longest, longest):
         proofs.append(more)
     return LargestVaryingStep(
         proved=LowerBound(proofs[-1].longest),
-        refuted=_refuted(problem, gains, constant.refuted) if constant.refuted is not None else None,
+        refuted=_refuted(corners, refuted) if refuted is not None else None,
         proofs=tuple(proofs),
     )
 
@@ -144,7 +140,7 @@ def _longest_delay(problem: LinearProblem, gains: Sequence[Fraction], most: Frac
 
 
 def _further(problem: LinearProblem, gains: Sequence[Fraction], low: Fraction, limit: Fraction) -> ClockProof | None:
-    """Proof from a period on, as far towards the limit for constant parameters as one is found."""
+    """Proof from a period on, as far towards the limit at the corners as one is found."""
     for share in _SHARES:
         high = _short(share * limit)
         proof = clock_proof(problem, gains, (low, high)) if high > low else None
@@ -153,11 +149,10 @@ def _further(problem: LinearProblem, gains: Sequence[Fraction], low: Fraction, l
     return None
 
 
-def _refuted(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction) -> UpperBound:
+def _refuted(corners: HeldPoles, step: Fraction) -> UpperBound:
     """A refuted period, with four digits where the next longer one of four digits is refuted too."""
     longer = Fraction(f"{UpperBound(step):.4g}")
-    shown = hold_verdict(problem, gains, longer, integration="euler").verdict is Verdict.REFUTED
-    return UpperBound(longer if shown else step)
+    return UpperBound(longer if corners.unstable(longer) else step)
 
 
 def _short(step: Fraction) -> Fraction:

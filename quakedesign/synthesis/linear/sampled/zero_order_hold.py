@@ -1,110 +1,112 @@
-"""The loop with p held over a sampling period T: its characteristic polynomial without cancellation, in any arithmetic.
+"""Poles of the sampled law that runs, p held over a period and integrals summed, at constant parameters, in balls.
 
-In the states x1, T·x2, ξ1/T, ξ2/T² and with z = 1 + d the hold needs four numbers of the plant x1'' = s·x1 − w·x1' + u:
-its impulse response g after one period and the iterated integrals Γ = ∫g, Θ = ∫Γ, Ψ = ∫Θ, time in T. Then
-
-    p(d) = d⁴ + Tγ3 d³ + T²γ2 d² + T³γ1 d + T⁴γ0
-
-with γ_i that tend to the coefficients of the continuous loop as T → 0. It is stable if and only if p(2v/(1 − v)), in
-units of T for v the quartic of `conditions`, is Hurwitz: the Schur–Cohn condition (Jury 1964, Theory and Application
-of the z-Transform Method, ch. 3) for d in place of z, without the digits that z = 1 + d loses when T is short.
+A corner of the box with a pole outside the unit circle refutes a sampling period for the whole box. Inside the box
+constant parameters may be worse than at its corners: what is not refuted here is not proved either.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat
-from scipy.linalg import expm
+from flint import acb_mat, arb_mat, ctx
 
-from quakedesign.certificates.guarantee.ball_matrices import ball
-from quakedesign.errors import require_known
+from quakedesign.certificates.guarantee.ball_matrices import matrix
+from quakedesign.rationals import rational
+from quakedesign.synthesis.linear.plant.problem import LinearProblem, Vertex
+from quakedesign.synthesis.linear.plant.rational_matrices import floats, times
 
-INTEGRATIONS = ("exact", "euler")
-
-
-def interval(low: Fraction, high: Fraction) -> Any:
-    """Ball that contains an interval."""
-    return ball(low).union(ball(high)) if low != high else ball(low)
-
-
-def response(sigma: Any, omega: Any) -> tuple[Any, Any, Any, Any]:
-    """Impulse response g of g'' = σg − ωg' after a unit of time, and its three iterated integrals (balls)."""
-    o, one = arb(0), arb(1)
-    chain = [[-omega, sigma, o, o, o]] + [[one if j == i else o for j in range(5)] for i in range(4)]
-    column = arb_mat(chain).exp().tolist()
-    return column[1][0], column[2][0], column[3][0], column[4][0]
+_DOUBLINGS = 24
+_TOLERANCE = 0.01  # relative width at which the bisection stops
+_BITS = (100, 2000)  # the second for a plant that grows far within a period
+_ZERO, _ONE = Fraction(0), Fraction(1)
 
 
-def require_integration(integration: str) -> None:
-    """Refuse an unknown way to integrate ξ.
-
-    Raises
-    ------
-    ParameterError
-    """
-    require_known(integration, INTEGRATIONS, "integration")
-
-
-def coefficients(T: Any, beta: Any, s: Any, w: Any, push: Sequence[Any], integration: str = "exact") -> tuple[Any, ...]:
-    """γ0, γ1, γ2, γ3 of the held loop (balls).
+def poles(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, vertex: Vertex) -> list[Any]:
+    """Eigenvalues of one period in x1, x2, ξ1, ξ2 at constant (β, s, w), as complex balls; not finite if not isolated.
 
     Parameters
     ----------
-    T, beta, s, w : arb
-        Period, control coefficient, chords of slip and slip rate.
-    push : sequence of 4 arb
-        b·K.
-    integration : str
-        ``"exact"``: ξ' = (x1, ξ1) holds at all times; ``"euler"``: ξ⁺ = ξ + T(x1, ξ1) of the samples.
+    problem : LinearProblem
+        In units in which its numbers are near 1.
+    gains : sequence of 4 Fraction
+    step : Fraction
+        T_s.
+    vertex : (Fraction, Fraction, Fraction)
+        β, s, w.
     """
-    sigma, omega = s * T * T, w * T
-    g, G, H, J = response(sigma, omega)
-    k1, k2, k3, k4 = (beta * k for k in push)
-    slope = w * g - 2 * s * T * G  # (2 − trace of the plant's period)/T
-    n10 = (omega * g - sigma * G) * G + g * g
-    if integration == "euler":
-        return k4 * n10, k3 * n10 + k4 * T * G, (k1 - s) * n10 + k3 * T * G, slope + k1 * T * G + k2 * g
-    n31 = (g + omega * G) * G + G * g + H * slope * T
-    n42 = H + (G + omega * H) * G + H * g + J * slope * T
-    return (
-        k4 * n10,
-        k3 * n10 + k4 * T * (n31 + n10 / 2),
-        (k1 - s) * n10 + k3 * T * n31 + k4 * T * T * n42,
-        slope + k1 * T * G + k2 * g + k3 * T * T * H + k4 * T**3 * J,
-    )
+    beta, s, w = vertex
+    flow = ((_ZERO, _ONE, _ZERO), (s, -w, beta * problem.sectors.authority), (_ZERO,) * 3)
+    start = ((_ONE, _ZERO, _ZERO, _ZERO), (_ZERO, _ONE, _ZERO, _ZERO), tuple(-k for k in gains))
+    sums = ((step, _ZERO, _ONE, _ZERO), (_ZERO, _ZERO, step, _ONE))
+    values = list[Any]()
+    for bits in _BITS:
+        with ctx.workprec(bits):
+            moved = (matrix(times(step, flow)).exp() * matrix(start)).tolist()
+            period = acb_mat(arb_mat([*moved[:2], *matrix(sums).tolist()]))
+            values = list(period.eig(multiple=True, nonstop=True))
+        if all(z.is_finite() for z in values):
+            break
+    return values
 
 
-def conditions(T: Any, gamma: Sequence[Any]) -> tuple[Any, ...]:
-    """Numbers that are all positive if and only if the held loop is asymptotically stable."""
-    g0, g1, g2, g3 = gamma
-    h0, h1 = g0, 2 * g1 - 4 * T * g0
-    h2 = 4 * g2 - 6 * T * g1 + 6 * T * T * g0
-    h3 = 8 * g3 - 8 * T * g2 + 6 * T * T * g1 - 4 * T**3 * g0
-    h4 = 16 - 8 * T * g3 + 4 * T * T * g2 - 2 * T**3 * g1 + T**4 * g0
-    return h0, h1, h2, h3, h4, h1 * (h3 * h2 - h4 * h1) - h3 * h3 * h0
+@dataclass(frozen=True, slots=True)
+class HeldPoles:
+    """What the poles at the corners of the box tell about sampling periods.
 
-
-def held_matrix(step: float, beta: float, s: float, w: float, push: Sequence[float], integration: str = "exact") -> Any:
-    """Matrix (4 × 4) of one period in x1, x2, ξ1, ξ2, in floating point, for display and design.
-
-    Parameters
+    Attributes
     ----------
-    push : sequence of 4 float
-        b·K.
+    problem : LinearProblem
+        In SI.
+    gains : sequence of 4 Fraction
     """
-    F, G = held_plant(step, s, w, integration)
-    return F - beta * np.outer(G, push)
 
+    problem: LinearProblem
+    gains: Sequence[Fraction]
 
-def held_plant(step: float, s: float, w: float, integration: str = "exact") -> tuple[Any, Any]:
-    """F (4 × 4) and G (4) of x⁺ = Fx + G·u for an acceleration u held over a step [s]."""
-    chain = np.zeros((5, 5))
-    chain[0, 1], chain[1, :2], chain[1, 4], chain[2, 0], chain[3, 2] = 1, (s, -w), 1, 1, 1
-    if integration == "euler":
-        chain[2:4] = 0
-    whole = expm(chain * step)
-    if integration == "euler":
-        whole[2, 0] = whole[3, 2] = step
-    return whole[:4, :4], whole[:4, 4]
+    def at(self, step: Fraction) -> dict[Vertex, list[Any]]:
+        """Poles by corner (β, s [1/s²], w [1/s]) at a period [s]."""
+        scales = self.problem.scales()
+        inside, push = self.problem.nondimensional(scales), scales.gains_inside(self.gains)
+        return {
+            corner: poles(inside, push, step / scales.time, scaled)
+            for corner, scaled in zip(self.problem.vertices(), inside.vertices(), strict=True)
+        }
+
+    def unstable(self, step: Fraction) -> Vertex | None:
+        """Corner at which a period [s] is surely not asymptotically stable; None where none was found."""
+        if not self.gains[3]:  # then z = 1 is a pole, whatever the plant
+            return self.problem.vertices()[0]
+        return next((corner for corner, found in self.at(step).items() if any(abs(z) > 1 for z in found)), None)
+
+    def radius(self, step: Fraction) -> float:
+        """Spectral radius of a period [s], largest over the corners, measured."""
+        return max(float(abs(z).mid()) for found in self.at(step).values() for z in found)
+
+    def limit(self) -> tuple[Fraction, Fraction | None] | None:
+        """Longest period [s] that the corners allow, nearly, and a longer one that they refute.
+
+        Returns
+        -------
+        (Fraction, Fraction or None) or None
+            The second is None where none was refuted, up to four million times the fastest pole's time; None when
+            all periods are refuted.
+        """
+        loops = (floats(self.problem.loop(vertex, self.gains)) for vertex in self.problem.vertices())
+        first = low = rational(f"{0.5 / max(float(np.abs(np.linalg.eigvals(loop)).max()) for loop in loops):.3e}")
+        for _ in range(_DOUBLINGS):
+            if self.unstable(2 * low):
+                break
+            low *= 2
+        else:
+            return low, None
+        high = 2 * low
+        while self.unstable(low):
+            low, high = low / 2, low
+            if low < first / 2**12:
+                return None
+        while high / low > 1 + _TOLERANCE:
+            middle = (low + high) / 2
+            low, high = (low, middle) if self.unstable(middle) else (middle, high)
+        return low, high
