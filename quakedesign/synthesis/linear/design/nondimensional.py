@@ -1,4 +1,4 @@
-"""The Riccati design in nondimensional variables: cost, split of W, and the weight that meets a wish."""
+"""The Riccati design in nondimensional variables: cost, split of W, and the weight that meets a bandwidth."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,12 +12,13 @@ from scipy.optimize import brentq, minimize_scalar
 from quakedesign.certificates.sectors import Sectors
 from quakedesign.errors import ParameterError
 from quakedesign.synthesis.linear.design.algebraic_riccati import METHOD
-from quakedesign.synthesis.linear.design.specifications import Specifications, Weights
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Scales
-from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, diagonal, floats, total
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, diagonal, floats
 
 LIGHTEST = -14.0
-_HEAVIEST, _LIMIT, _ROUNDS = 0.0, 10.0, 5
+_HEAVIEST, _ROUNDS = 0.0, 5
+COST = diagonal((Fraction(1), Fraction(1, 100), Fraction(1), Fraction(1)))
+"""Q0 on x1, x2, ξ1, ξ2."""
 Choice = tuple[float, float]
 """R and the split of W."""
 
@@ -30,24 +31,14 @@ class ScaledDesign:
     problem : LinearProblem
         In SI.
     scales : Scales
-    wanted : Specifications
-    weights : Weights, optional
     """
 
-    def __init__(
-        self, problem: LinearProblem, scales: Scales, wanted: Specifications, weights: Weights | None = None
-    ) -> None:
+    def __init__(self, problem: LinearProblem, scales: Scales) -> None:
         self.outside, self.scales = problem, scales
         self.inside = problem.nondimensional(scales)
-        self.rate = wanted.rate * scales.time
-        self.exact_Q0 = weights.inside(scales)[0] if weights else wanted.default_weight(scales)
-        self.A, self.Q0 = (floats(m) for m in (self.shifted(), self.exact_Q0))
+        self.A, self.Q0 = (floats(m) for m in (self.inside.nominal(), COST))
         self.B = np.array([[0.0], [1.0], [0.0], [0.0]])
         self.g = tuple(float(g) for g in self.inside.bounds)
-
-    def shifted(self) -> Matrix:
-        """A0 + aI: the cost of the shifted plant guarantees the decay rate a (Anderson and Moore 1990, ch. 3.5)."""
-        return total(self.inside.nominal(), diagonal((self.rate,) * 4))
 
     def bound(self, split: float | Fraction) -> Any:
         """W with h² ≤ xᵀWx."""
@@ -94,35 +85,17 @@ class ScaledDesign:
         return max(abs(pole) for pole in vertex_poles(self.outside.sectors, self.gains(K)))
 
     def weight_for_pole(self, target: float) -> Choice:
-        """R at which the fastest pole has a modulus [rad/s], or the nearest one from 1e-14 to 1; and the split."""
-        return self._weight(lambda K: self.fastest_pole(K) / target, _HEAVIEST, 1e-6)
+        """R at which the fastest pole has a modulus [rad/s], or the nearest one from 1e-14 to 1; and the split.
 
-    def weight_for_gain(self, largest: float) -> Choice:
-        """Smallest R with |k1| at most a bound [Pa/m], and the split.
-
-        Raises
-        ------
-        ParameterError
-            When even the heaviest weight needs more.
+        The split of W follows in a few rounds.
         """
-        least = abs(self.gains(self.solve(10.0**_LIMIT)[0])[0])
-        if least > largest:
-            raise ParameterError(
-                f"largest_gain must be at least {least:.4g} Pa/m for the guarantee over this uncertainty at this "
-                f"settling time. Received {largest:.4g} Pa/m. Allow more, narrow the box, or give more time."
-            )
-        R, split = self._weight(lambda K: max(abs(self.gains(K)[0]), 1e-300) / largest, _LIMIT, 1e-12)
-        return R * (1 + 1e-7), split  # on the side where the bound holds
-
-    def _weight(self, ratio: Callable[[Any], float], high: float, tolerance: float) -> Choice:
-        """R at which a ratio that falls with R is 1, the split of W following in a few rounds."""
-        split, root = 0.5, high
+        split, root = 0.5, _HEAVIEST
         for _ in range(_ROUNDS):
 
             def excess(log_weight: float, split: float = split) -> float:
-                return math.log(ratio(self.solve(10.0**log_weight, split)[0]))
+                return math.log(self.fastest_pole(self.solve(10.0**log_weight, split)[0]) / target)
 
-            root = _root(excess, LIGHTEST, high, tolerance)
+            root = _root(excess, LIGHTEST, _HEAVIEST)
             best = self.best_split(10.0**root)
             if abs(best - split) < 1e-5:
                 break
@@ -147,10 +120,10 @@ def vertex_poles(needed: Sectors, gains: Sequence[float | Fraction]) -> list[com
     return poles
 
 
-def _root(excess: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
+def _root(excess: Callable[[float], float], low: float, high: float) -> float:
     """Zero of a decreasing function, or the end that is nearest to one."""
     if excess(low) <= 0:
         return low
     if excess(high) >= 0:
         return high
-    return float(brentq(excess, low, high, xtol=tolerance))
+    return float(brentq(excess, low, high, xtol=1e-6))

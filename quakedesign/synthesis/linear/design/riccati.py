@@ -14,8 +14,7 @@ from quakedesign.fault import Fault
 from quakedesign.symbolic.terms import Term
 from quakedesign.synthesis.linear.analysis.printed_theorem import decreases
 from quakedesign.synthesis.linear.design.algebraic_riccati import solve_care
-from quakedesign.synthesis.linear.design.nondimensional import Choice, ScaledDesign, sound_bound
-from quakedesign.synthesis.linear.design.specifications import Specifications, Weights
+from quakedesign.synthesis.linear.design.nondimensional import COST, Choice, ScaledDesign, sound_bound
 from quakedesign.synthesis.linear.plant.problem import LinearProblem
 from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, floats, outer, times, total
 from quakedesign.synthesis.lyapunov.quadratic import quadratic_terms
@@ -42,8 +41,6 @@ class RiccatiDesign:
         Nondimensional.
     split : float
         w of W = diag(g1²/w, g2²/(1−w), 0, 0) [-].
-    rate : float
-        a [1/s] with V̇ ≤ −2aV − xᵀQ0x over the whole uncertainty; 0 unless a settling time was asked for.
     residual : float
         Rigorous relative residual of the Riccati equation that S solves.
     E : ndarray, shape (4,)
@@ -60,7 +57,6 @@ class RiccatiDesign:
     S: Any
     E: Any
     split: float
-    rate: float
     residual: float
     fastest_pole: float
 
@@ -70,67 +66,37 @@ class RiccatiDesign:
         return _matrix(self.lyapunov)
 
 
-def riccati_design(
-    fault: Fault,
-    *,
-    bandwidth: float | None = None,
-    weights: Weights | None = None,
-    specifications: Specifications | None = None,
-    feedback: str = "error",
-) -> RiccatiDesign:
+def riccati_design(fault: Fault, *, bandwidth: float | None = None) -> RiccatiDesign:
     """Solve the Riccati equation with Q = Q0 + R·W, so that the guarantee holds over the whole uncertainty.
 
     W = diag(g1²/w, g2²/(1−w), 0, 0) bounds h² for |h| ≤ g1|x1| + g2|x2| (ERRATA 7), its split w chosen for the smallest
-    trace of S. Without weights Q0 is 1 for slip, 1/100 for slip rate and 1 for the integrals in nondimensional
-    variables, and R is such that the fastest pole meets a bandwidth or the gain its largest value.
+    trace of S. Q0 is 1 for slip, 1/100 for slip rate and 1 for the integrals in nondimensional variables, and R is such
+    that the fastest pole meets a bandwidth.
 
     Parameters
     ----------
     fault : Fault
     bandwidth : float, optional
         Largest modulus of a closed-loop pole over the uncertainty [rad/s]; 1.5/T_s without.
-    weights : Weights, optional
-        The user's Q0 and R, which then decide alone.
-    specifications : Specifications, optional
-        Settling time, largest gain, speed of the integral action; with a largest gain the bandwidth is not used unless
-        it is given too.
-    feedback : str
-        ``"error"`` or ``"state"`` (ERRATA 29).
 
     Returns
     -------
     RiccatiDesign
         With the nearest bandwidth that weights R from 1e-14 to 1 reach, where the wanted one is out of reach.
-
-    Raises
-    ------
-    ParameterError
-        When no weight meets the largest gain together with the other specifications.
     """
     problem = LinearProblem.of(fault)
-    wanted = specifications or Specifications()
-    task = ScaledDesign(problem, problem.scales(fault.reference.target_slip), wanted, weights)
-    if weights is not None:
-        given = float(weights.inside(task.scales)[1])
-        return _finished(task, (given, task.best_split(given)), feedback)
-    target = bandwidth
-    if target is None and wanted.largest_gain is None:
-        target = BANDWIDTH_TIMES_STEP / fault.sampling_time
-    choices = []
-    if target is not None:
-        choices.append(task.weight_for_pole(target))
-    if wanted.largest_gain is not None:
-        choices.append(task.weight_for_gain(float(wanted.largest_gain)))
-    return _finished(task, max(choices), feedback)
+    task = ScaledDesign(problem, problem.scales(fault.reference.target_slip))
+    target = BANDWIDTH_TIMES_STEP / fault.sampling_time if bandwidth is None else bandwidth
+    return _finished(task, task.weight_for_pole(target))
 
 
-def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesign:
+def _finished(task: ScaledDesign, choice: Choice) -> RiccatiDesign:
     """Design in SI with exact gains and an exact V, from a Riccati equation solved to the end."""
     R, split = choice
     weight = Fraction(R)
-    Q = total(task.exact_Q0, times(weight, sound_bound(task.inside.bounds, Fraction(split))))
+    Q = total(COST, times(weight, sound_bound(task.inside.bounds, Fraction(split))))
     unit = (Fraction(0), Fraction(1), Fraction(0), Fraction(0))
-    solution = solve_care(task.shifted(), times(1 / weight, outer(unit, unit)), Q)
+    solution = solve_care(task.inside.nominal(), times(1 / weight, outer(unit, unit)), Q)
     inner = [row[1] / weight for row in solution.X]
     gains = task.scales.gains_outside(inner)
     form = task.scales.form_outside(solution.X)
@@ -138,7 +104,7 @@ def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesig
     exact = _rounded_gains(task.outside, gains, _matrix(lyapunov))
     loop = task.inside.loop((Fraction(1), -task.inside.stiffness, task.inside.damping), inner)
     return RiccatiDesign(
-        controller=control_law("elqr").from_values(exact, feedback=feedback),  # type: ignore[arg-type]
+        controller=control_law("elqr").from_values(exact),  # type: ignore[arg-type]
         lyapunov=lyapunov,
         K=floats([gains])[0],
         Q=floats(Q),
@@ -146,7 +112,6 @@ def _finished(task: ScaledDesign, choice: Choice, feedback: str) -> RiccatiDesig
         S=floats(solution.X),
         E=np.linalg.eigvals(floats(loop)) / float(task.scales.time),
         split=split,
-        rate=float(task.rate / task.scales.time),
         residual=float(solution.residual),
         fastest_pole=task.fastest_pole([inner]),
     )
