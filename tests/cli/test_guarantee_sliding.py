@@ -70,6 +70,26 @@ def test_an_estimate_of_the_largest_stress_that_is_too_large_is_lowered_until_it
     assert tried == [41_000, 36_000, 30_000]
 
 
+def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_are_asked(monkeypatch):
+    stands, tried = {Fraction(1, 2): 0, Fraction(1, 4): 7_000, Fraction(1, 8): 90_000}, []
+
+    def proved(task, design, *, log_rate):
+        tried.append((log_rate, task.stress))
+        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS)
+
+    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
+    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(stands[log_rate]))
+    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
+    fault, half, quarter = load_fault("crustal-patch"), Fraction(1, 2), Fraction(1, 4)
+    assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800)).task.stress == 7_000
+    assert tried == [(half, 1), (quarter, 7_000)]
+    stands[half] = stands[quarter] = stands[Fraction(1, 8)] = 0
+    assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800)).found.task.stress == 1
+    tried.clear()
+    assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800), stress=Fraction(1, 2)).task.stress == half
+    assert tried == [(half, half)]
+
+
 def test_a_stress_far_beyond_what_a_law_stands_has_no_guarantee():
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     found = proved_sliding(replace(known.task, stress=20 * known.task.stress), known.held)

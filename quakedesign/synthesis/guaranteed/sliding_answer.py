@@ -27,6 +27,7 @@ from quakedesign.synthesis.guaranteed.slow_sliding import (
     two_digits,
 )
 
+_TRIFLE = Fraction(1)  # stress [Pa] that is tried where a law is estimated to stand none: another law may stand more
 _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of an estimate that may be too large
 
 
@@ -137,7 +138,7 @@ def answer_sliding(
             "--diffusion, such as '833 s', or --lag."
         )
     held_over = rational(fault.sampling_time) if step is None else step
-    task = sliding_task(fault, stress or Fraction(1), spread)
+    task = sliding_task(fault, stress or _TRIFLE, spread)
     pump = around.pop("pump", None)
     if pump is not None and pump.rate is not None:
         raise ParameterError(
@@ -151,11 +152,12 @@ def answer_sliding(
         reach = farthest(task, suitable(task, held_over), around, stressed=stress is not None)
         remedy = _remedy(fault, task, held_over, reach, around, prove, spread)
     for log_rate in LOG_RATES[1:]:
-        if answer.proved or reach.share < 1:
+        if (answer.proved and (stress or answer.task.stress > _TRIFLE)) or reach.share < 1:
             break
         tell(f"a law for |ln(v/V)| up to {log_rate}", 0.6)
         smaller = _answer(task, held_over, log_rate, around, prove, reach.numbers)
-        answer = smaller if smaller.proved else answer
+        more = smaller.proved and (not answer.proved or smaller.task.stress > answer.task.stress)
+        answer = smaller if more else answer
     if isinstance(answer.found, NoGuarantee) and remedy:
         return replace(answer, found=replace(answer.found, reason=f"{answer.found.reason}; {remedy}"))
     return answer
@@ -211,7 +213,7 @@ def _with_the_largest_stress(
     task: SlidingTask, design: Held, *, log_rate: Fraction, pump: Pump | None = None
 ) -> SlidingGuarantee | NoGuarantee:
     """A guarantee under about the largest stress that has one: what is estimated of it, or somewhat less."""
-    most = largest_stress(task, design, log_rate=log_rate) or Fraction(1)
+    most = largest_stress(task, design, log_rate=log_rate) or _TRIFLE
     found: SlidingGuarantee | NoGuarantee
     for share in _SHARES:
         tried = replace(task, stress=two_digits(share * most))
