@@ -13,6 +13,7 @@ _LONGEST_WORD = 200
 _LONGEST_MESSAGE = 2000
 _LONGEST_LINE = 200
 _STRENGTH = ",:;."  # of what divides a sentence, the last most
+_TIMES = (31_557_600.0, "years"), (86_400.0, "days"), (3600.0, "hours")
 _MARKS = re.compile(r"[(\[)\]]|[,:;.] ")
 
 
@@ -91,3 +92,9 @@ def _shortened(text: str, length: int) -> str:
     """Beginning and end of a text."""
     half = length // 2 - 12
     return text if len(text) <= length else f"{text[:half]}…({len(text)} characters)…{text[-half:]}"
+
+
+def lasting(seconds: float, digits: int = 4) -> str:
+    """A time in seconds, and in years, days or hours where it lasts two of them or more."""
+    unit = next(((size, name) for size, name in _TIMES if seconds >= 2 * size), None)
+    return f"{seconds:.{digits}g} s" + (f" ({seconds / unit[0]:.3g} {unit[1]})" if unit else "")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from quakedesign import errors
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
-from quakedesign.text import in_lines, nearest_name, one_line, visible
+from quakedesign.text import in_lines, lasting, nearest_name, one_line, visible
 
 EXCEPTIONS = [e for e in vars(errors).values() if isinstance(e, type) and issubclass(e, errors.QuakedesignError)]
 
@@ -120,3 +120,18 @@ def test_a_name_that_is_none_of_those_known_is_refused_with_all_of_them_and_the_
         assert str(refused.value) == f"box must be one of cta, elqr. Received {wrong!r}."
     with pytest.raises(ParameterError, match=r"^box must be one of none\. Received 'wide'\.$"):
         require_known("wide", (), "box")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [
+        (7199.0, "7199 s"),
+        (7200.0, "7200 s (2 hours)"),
+        (1.728e6, "1.728e+06 s (20 days)"),
+        (31_557_600.0, "3.156e+07 s (365 days)"),
+        (63_115_200.0, "6.312e+07 s (2 years)"),
+    ],
+)
+def test_a_long_time_is_told_in_a_unit_that_people_count_in(seconds, said):
+    assert lasting(seconds) == said
+    assert lasting(1_234_567.0, 6) == "1.23457e+06 s (14.3 days)"

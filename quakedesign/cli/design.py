@@ -61,6 +61,8 @@ class DesignOptions:
         Of such a fault: by how much of their values a, b and D_c may be off, such as 0.1.
     published_scheme
         Of the runs of published gains, see --scheme.
+    whole_task
+        Of such a fault: run all of a slow task, not 500 D_c/V of it; the proof is about all of it either way.
     """
 
     controller: str = "all"
@@ -79,6 +81,7 @@ class DesignOptions:
     stress: ExactPascals | None = None
     spread: str = "0"
     published_scheme: str = "continuous"
+    whole_task: Annotated[bool, Parameter(negative="")] = False
 
     def asked(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
         """Fault of a name, and what `designed_comparison` is asked about it; refused before anything heavy is loaded.
@@ -93,7 +96,8 @@ class DesignOptions:
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
         laws = "elqr" if self._behind(loaded) and self.controller == "all" else self._laws
         names = controllers(laws, loaded)
-        return loaded, {"names": names, "published_scheme": self.published_scheme, **self.told()}
+        shown = {"published_scheme": self.published_scheme, "whole_task": self.whole_task}
+        return loaded, {"names": names, **shown, **self.told()}
 
     def _behind(self, fault: "Fault") -> bool:
         """Whether the e-LQR alone is designed: friction without a state, behind a delay, a lag or rock."""

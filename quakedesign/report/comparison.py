@@ -54,9 +54,10 @@ def compare(
     with_published: bool = True,
     scheme: str | None = None,
     published_scheme: str | None = None,
+    whole_task: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> Comparison:
-    """Run all controllers of a fault over the whole task, step T_s.
+    """Run all controllers of a fault over the whole task, step T_s; of a slow one with a state over 500 D_c/V.
 
     Parameters
     ----------
@@ -70,6 +71,8 @@ def compare(
         Of the runs of designed and of published gains, see `quakedesign.loop.schemes`; ``continuous``, as in the
         paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed, as all
         designs do that are not continuous.
+    whole_task : bool
+        Run all of a task of friction with a state, however slow.
     progress : callable, optional
         Called with what is being done and the fraction done [-].
 
@@ -79,7 +82,8 @@ def compare(
     """
     schemes = {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}
     tell = progress or (lambda _what, _done: None)
-    return Comparison(**vars(compared(fault, designs, tell, with_published=with_published, schemes=schemes)))
+    how: dict[str, Any] = {"with_published": with_published, "whole_task": whole_task, "schemes": schemes}
+    return Comparison(**vars(compared(fault, designs, tell, **how)))
 
 
 def designed_comparison(
@@ -88,6 +92,7 @@ def designed_comparison(
     tell: Callable[[str, float], None],
     *,
     options: Mapping[str, Any] | None = None,
+    whole_task: bool = False,
     **schemes: Any,
 ) -> Comparison:
     """Comparison of a fault's designs of the named laws and the published gains.
@@ -100,9 +105,11 @@ def designed_comparison(
         Progress.
     options : mapping, optional
         Of `quakedesign.design`, such as ``objective`` and ``continuous``.
+    whole_task : bool
+        As of `compare`.
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """
     for name in filter(None, schemes.values()):
         simulation_scheme(name)
-    return compare(fault, designs_of(fault, names, tell, options), progress=tell, **schemes)
+    return compare(fault, designs_of(fault, names, tell, options), whole_task=whole_task, progress=tell, **schemes)

@@ -9,11 +9,13 @@ from quakedesign.bounds import LowerBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.certificates.premises import Domain, Variant
+from quakedesign.fault import Fault
 from quakedesign.report.linear import held_sentences, peaks_sentence
 from quakedesign.report.outcomes import run_sentences
 from quakedesign.simulation import Trajectory
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, Entry
 from quakedesign.synthesis import Design
+from quakedesign.text import lasting
 
 
 def guarantee_lines(entry: "Entry") -> list[str]:
@@ -49,6 +51,7 @@ def said(entry: "Entry") -> str:
     return "; ".join([*guarantee_lines(entry)[:2], headline(entry)])
 
 
+_WHOLE = 1e-3  # of a task that a run may leave out, as the last sample has no period
 HEADLINE = 200
 """Characters of a headline at most: two lines and a half of a terminal."""
 
@@ -79,7 +82,16 @@ def sentences(entry: "Entry") -> list[str]:
     outcome, *of_run = run_sentences(entry.run, design.fault) if entry.run else ("",)
     assumed = [f"assumed: {what}" for what in filter(None, [design.details.get("assumed")])]
     told = [outcome, *_verdict(design), *_step_verdict(entry), *_premises(entry), *of_run, *_bounds(entry), *assumed]
+    told += [part_of_task(entry.run, design.fault)] if entry.run else []
     return [sentence for sentence in (*told, *_reversed(entry.run)) if sentence]
+
+
+def part_of_task(run: Trajectory, fault: Fault) -> str:
+    """How much of the task a run shows that does not show all of it; empty for one that ended of itself."""
+    task, last = fault.reference.operation_time, float(run.time[-1])
+    if last > (1 - _WHOLE) * task or not run.outcome.harmless:
+        return ""
+    return f"shown: the first {lasting(last)} of {lasting(task)}; --whole-task runs all of it"
 
 
 def _verdict(design: Design) -> list[str]:

@@ -41,7 +41,7 @@ _WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "rock of L^2/D =
 SLIDING_LIMITS = (
     "the fault slides at the rate of its task from the start, and its far end rests: how it came to slide is not part "
     "of the run nor of the proof",
-    "the stress disturbance of the run is a sine with the period of the largest tide, or a quarter of a short task, "
+    "the stress disturbance of the run is a sine with the period of the largest tide, or a quarter of a short run, "
     "which need not be the worst; what a search found stands beside the guarantee",
 )
 

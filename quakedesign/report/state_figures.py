@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from quakedesign.studies.comparison import Compared, Entry
     from quakedesign.studies.state_runs import StateRun
 
-_PER_BAND = 16  # instants, four periods
+_BANDS = 600  # of a run at most: more are not seen, and make a file of many megabytes
+_PER_BAND = 16  # instants at least, four periods
 
 
 def state_figures(comparison: "Compared", natural: "StateRun") -> dict[str, Any]:
@@ -67,10 +68,15 @@ def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
     state.set_ylim(min(state.get_ylim()[0], 0.99), max(state.get_ylim()[1], 1.01))
     state.set_xlabel(f"time [{unit}]")
     shaken = f"shear stress up to {float(np.abs(run.stress).max()) / 1e3:.3g} kPa"
-    note = f"bands between the extremes of {_PER_BAND} instants; {shaken}"
+    note = f"bands between the extremes of {_width(run.time)} instants; {shaken}"
     return finish(drawing, f"{fault.name} held in slow sliding", [run], note)
 
 
 def _filled(axis: Any, time: "np.ndarray", values: "np.ndarray", shade: str) -> None:
-    middle, low, high = band(time, values, _PER_BAND)
+    middle, low, high = band(time, values, _width(time))
     axis.fill_between(middle, low, high, color=shade, linewidth=0.8)
+
+
+def _width(time: "np.ndarray") -> int:
+    """Instants of a band."""
+    return max(_PER_BAND, len(time) // _BANDS)

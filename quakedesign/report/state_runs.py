@@ -3,12 +3,12 @@
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.controllers import control_laws
+from quakedesign.text import lasting
 
 if TYPE_CHECKING:
     from quakedesign.studies.comparison import Compared
     from quakedesign.studies.state_runs import StateRun
 
-_YEAR = 31_557_600.0
 _MOST_EVENTS = 8
 _LOCKED = 0.5  # of what it is loaded by: a fault that slips less stores the rest
 FASTEST_PLATE = 1e-8
@@ -23,7 +23,7 @@ def state_run_lines(answer: dict[str, Any]) -> list[str]:
     state = ", ".join(f"{name} = {value:.4g} s" for name, value in answer["start"]["state"].items())
     lines = [
         f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.3g} m/s (an earthquake from "
-        f"{outcome['earthquake_from']:.3g} m/s on), {len(events)} events in {_time(answer['duration'])}, "
+        f"{outcome['earthquake_from']:.3g} m/s on), {len(events)} events in {lasting(answer['duration'])}, "
         f"slip {answer['slip']:.4g} m",
         f"loaded at {answer['loading_rate']:.4g} m/s; starts at {answer['start']['slip_rate']:.4g} m/s with {state}",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa",
@@ -36,7 +36,7 @@ def state_run_lines(answer: dict[str, Any]) -> list[str]:
             "goes; the recurrence interval that design tells, or a longer --duration, shows the event"
         )
     if cycle["recurrence_interval"] is not None:
-        lines.append(f"recurrence interval {_time(cycle['recurrence_interval'])}")
+        lines.append(f"recurrence interval {lasting(cycle['recurrence_interval'])}")
     if cycle["slip"] is not None:
         lines.append(f"slip of an event {cycle['slip']:.4g} m, magnitude {cycle['magnitude']:.2f}")
     lines += [_event_line(number, event) for number, event in enumerate(events[:_MOST_EVENTS], start=1)]
@@ -52,7 +52,7 @@ def cycle_sentence(run: "StateRun") -> str:
     if not run.slip_events:
         return f"Without control: the fault creeps, {peak}"
     size = "" if cycle["magnitude"] is None else f" of magnitude {cycle['magnitude']:.2f}"
-    again = "" if cycle["recurrence_interval"] is None else f" every {_time(cycle['recurrence_interval'])}"
+    again = "" if cycle["recurrence_interval"] is None else f" every {lasting(cycle['recurrence_interval'])}"
     return f"Without control: {run.outcome.kind}{size}{again}, {peak}, {_loading(run)}"
 
 
@@ -87,8 +87,8 @@ def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
     return [
         f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.4g} m/s, the reference's is "
         f"{answer['largest_reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
-        f"held over {answer['step']:.4g} s{path}{shaken}, for {_time(answer['duration'])}; without control errors grow "
-        f"by {answer['growth_rate']:.3g} 1/s",
+        f"held over {answer['step']:.4g} s{path}{shaken}, for {lasting(answer['duration'])}; without control errors "
+        f"grow by {answer['growth_rate']:.3g} 1/s",
         f"|ln(V/V_r)| at most {found['max_log_rate']:.3g}, slip error at most {found['max_slip_error']:.3g} m",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law asks for at most "
         f"{found['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
@@ -100,7 +100,3 @@ def _event_line(number: int, event: dict[str, Any]) -> str:
     nucleation = "" if event["nucleation"] is None else f"nucleation from {event['nucleation']:.6g} s, "
     arrest = "not over at the end of the run" if event["arrest"] is None else f"arrest {event['arrest']:.6g} s"
     return f"event {number}: {nucleation}onset {event['onset']:.6g} s, {arrest}, peak {event['peak_slip_rate']:.3g} m/s"
-
-
-def _time(seconds: float) -> str:
-    return f"{seconds:.4g} s" + (f" ({seconds / _YEAR:.3g} years)" if seconds > _YEAR else "")

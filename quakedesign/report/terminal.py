@@ -102,7 +102,7 @@ def _print_tables(comparison: Comparison, console: Any) -> None:
     console.print(f"{GRADES}.")
     console.print()
     console.print("closed loop", style="bold", end=", ")
-    console.print("errors after a quarter of the task; p < 0 is withdrawal")
+    console.print("errors after a quarter of the run; p < 0 is withdrawal")
     numbers = zip(COLUMNS, (17, 8, 8, 9, 9, 8, 8, 4), "lrrrrrrr", strict=True)
     console.print(table(numbers, rows(comparison)), soft_wrap=False)
     console.print(f"{scheme_sentence(comparison)}.")

@@ -142,7 +142,13 @@ class Compared:
 
 
 def compared(
-    fault: Fault, designs: Sequence[Design], tell: Tell, *, with_published: bool = True, schemes: Mapping[str, str]
+    fault: Fault,
+    designs: Sequence[Design],
+    tell: Tell,
+    *,
+    with_published: bool = True,
+    whole_task: bool = False,
+    schemes: Mapping[str, str],
 ) -> Compared:
     """Runs of all controllers of a fault, as `quakedesign.report.compare` shows them; schemes by origin."""
     require_fault(fault)
@@ -150,7 +156,7 @@ def compared(
         simulation_scheme(name)
     tell("uncontrolled", 0.0)
     if fault.friction.state_names:
-        return _slowly_compared(fault, designs, tell)
+        return _slowly_compared(fault, designs, tell, whole=whole_task)
     uncontrolled = natural_earthquake(fault)
     entries: list[Entry] = []
     at_once = not any(any(designed.path.values()) for designed in designs)
@@ -180,7 +186,7 @@ def _answer(fault: Fault, design: Design) -> Answer | SlidingAnswer | None:
     return replace(attacked(fault, found), compensation=design.compensation)
 
 
-def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell) -> Compared:
+def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, whole: bool) -> Compared:
     """Of friction with a state: its cycle, and its designs as they run."""
     natural = natural_run(fault)
     entries = []
@@ -188,7 +194,7 @@ def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell) -> Com
         entry = Entry(label=f"{designed.title} (designed)", origin="designed", design=designed, run=None)
         if designed.controller is not None:
             told = partial(tell, entry.label)
-            entry = replace(entry, run=designed_run(designed, natural.natural_peak, told))
+            entry = replace(entry, run=designed_run(designed, natural.natural_peak, told, whole=whole))
         entries.append(replace(entry, answer=designed.sliding))
     return Compared(fault=fault, uncontrolled=natural, entries=tuple(entries))
 

@@ -14,6 +14,7 @@ from quakedesign.rationals import rational
 from quakedesign.studies.needed_pressure import need_sentence, needed_pressure, ways
 from quakedesign.symbolic import derive
 from quakedesign.synthesis.analysis.sampling_adequacy import LARGEST_PRODUCT, SamplingAdequacy, sampling_adequacy
+from quakedesign.text import lasting
 
 SHEAR_SPEEDS = 500.0, 6000.0  # of soft sediments and of the mantle, m/s
 IN_A_LABORATORY = 10.0  # m; below it what slides need not be rock
@@ -155,7 +156,7 @@ def _box(fault: Fault) -> str:
 
 def _event(fault: Fault) -> list[str]:
     """What an earthquake of the fault is, as far as it is known without simulating one, and the task."""
-    task = f"target slip {fault.reference.target_slip:.4g} m in {fault.reference.operation_time:.6g} s"
+    task = f"target slip {fault.reference.target_slip:.4g} m in {lasting(fault.reference.operation_time, 6)}"
     if fault.friction.state_names:
         depends = "stress drop, magnitude and slip of an event depend on its history"
         return [f"{depends}: simulate a cycle (simulate --start late)", task]

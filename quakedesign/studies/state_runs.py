@@ -31,7 +31,8 @@ from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
 _RTOL = 1e-8
 _NATURAL = (True, "radau"), (True, "cvodes"), (False, "cvodes")  # inertia, method: of cycles, in this order
 _UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
-_SWINGS = 4  # of the stress at least, in a run over a task
+_SWINGS = 4  # of the stress at least, in a run that is shown
+_SHOWN = 500  # D_c/V of a slow task that are run: the loop settles within some tens
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,23 +216,35 @@ def natural_run(fault: Fault) -> StateRun:
     raise SimulationError(f"the natural cycle could not be computed: {failed}") from failed
 
 
-def designed_run(design: Design, natural_peak: float | None, progress: Callable[[float], None]) -> SlidingRun:
-    """The law of a design for slow sliding over its task, under the stress that it is designed for as a sine.
+def shown_time(fault: Fault, *, whole: bool = False) -> float:
+    """How much of a task [s] is run of a design for slow sliding: 500 D_c/V, in which the loop settles many times over.
 
-    Its period is that of the tide, or a quarter of a task that is shorter than four of them.
+    All of a shorter task, of one whose rate swells on the way, and of a `whole` one.
+    """
+    task = fault.reference
+    ageing = float(min(fault.friction.steady_state(task.target_slip / task.operation_time)))
+    return task.operation_time if whole or task.ramp else min(task.operation_time, _SHOWN * ageing)
+
+
+def designed_run(
+    design: Design, natural_peak: float | None, progress: Callable[[float], None], *, whole: bool = False
+) -> SlidingRun:
+    """The law of a design for slow sliding over its `shown_time`, under the stress that it is designed for as a sine.
+
+    Its period is that of the tide, or a quarter of a run that is shorter than four of them.
     """
     answer = design.sliding
     if answer is None or answer.held is None:
         raise ParameterError(f"a designed run needs a law for slow sliding. Received {design!r:.60}. Use simulate.")
+    duration = shown_time(design.fault, whole=whole)
     run = simulate_sliding(
         design.fault,
         answer.held.law,
         answer.held.step,
         lag=answer.held.lag,
         diffusion=answer.held.diffusion,
-        tide=Tide(
-            amplitude=float(answer.task.stress), period=min(TIDE, design.fault.reference.operation_time / _SWINGS)
-        ),
+        tide=Tide(amplitude=float(answer.task.stress), period=min(TIDE, duration / _SWINGS)),
+        duration=duration,
         inertia=True,
         progress=progress,
     )

@@ -18,7 +18,8 @@ from quakedesign.cli import main
 from quakedesign.errors import ParameterError, SimulationError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.report.folder import write_folder
-from quakedesign.report.state_figures import cycle
+from quakedesign.report.headlines import part_of_task, sentences
+from quakedesign.report.state_figures import cycle, slow_sliding
 from quakedesign.report.state_runs import cycle_sentence, state_run_lines
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
@@ -222,3 +223,39 @@ def test_a_locked_fault_whose_run_ends_before_its_event_is_not_said_to_creep_for
     answer |= {"start": {"slip_rate": 1e-12, "state": {"state": 1e6}}, "pressure": [0.0, 0.0], "resting": False}
     answer |= {"cycle": {"recurrence_interval": None, "slip": None}, "energy": {"relative_residual": 0.0}}
     assert any("does not creep for good" in line for line in state_run_lines(answer)) == locked
+
+
+def test_of_a_slow_task_the_beginning_is_run_and_the_report_says_so(comparison, monkeypatch):
+    (entry,) = comparison.entries
+    ageing = 8e-3 / 1e-6
+    slow = replace(PATCH, reference=replace(PATCH.reference, target_slip=5.0, operation_time=5e6))
+    assert state_runs.shown_time(slow) == 500 * ageing < 5e6
+    assert state_runs.shown_time(slow, whole=True) == 5e6
+    assert state_runs.shown_time(replace(slow, reference=replace(slow.reference, ramp=0.05))) == 5e6
+    assert state_runs.shown_time(SHORT) == 3e5
+    assert part_of_task(entry.run, SHORT) == ""
+    monkeypatch.setattr(state_runs, "_SHOWN", 3)
+    run = state_runs.designed_run(entry.design, None, lambda done: None)
+    assert 0 <= run.time[-1] - 3 * ageing <= 300
+    lowest = np.interp(3 / 4 * (3 * ageing / 4), run.time, run.stress)  # of a sine whose period is a quarter of the run
+    assert lowest == pytest.approx(-float(entry.guaranteed.task.stress), rel=1e-3)
+    said = "shown: the first 2.43e+04 s (6.75 hours) of 3e+05 s (3.47 days); --whole-task runs all of it"
+    assert part_of_task(run, SHORT) == said
+    assert said in sentences(replace(entry, run=run))
+    whole = state_runs.designed_run(entry.design, None, lambda done: None, whole=True)
+    assert whole.time[-1] == 3e5
+    assert part_of_task(replace(run, events={"opening": 1.0}), SHORT) == ""
+
+
+def test_the_figure_of_a_long_run_has_no_more_bands_than_are_seen(comparison):
+    (entry,) = comparison.entries
+    run = entry.run
+    many = 40
+    arrays = {
+        name: np.tile(value, many)
+        for name, value in vars(run).items()
+        if isinstance(value, np.ndarray) and value.shape == run.time.shape
+    }
+    long = replace(run, **arrays | {"time": np.linspace(0, 3e5, many * len(run.time))})
+    bands = slow_sliding(entry, long).axes[2].collections[0].get_paths()[0].vertices
+    assert len(bands) < 2 * 650 + 8
