@@ -114,7 +114,8 @@ def _between(controller: Controller, actuator: Actuator | None) -> tuple[Fractio
             "a loop transfer function has a lag, rock and, for a law of samples, a delay without jitter. Received "
             f"{', '.join(others)}. Leave them out, or simulate."
         )
-    return sum((stage.samples * own.step for stage in late if own), Fraction(0)), Actuator(stages=actuator.flowing)
+    periods = sum((stage.samples + Fraction(stage.part) for stage in late), Fraction(0))
+    return periods * (own.step if own else 0), Actuator(stages=actuator.flowing)
 
 
 def _flow_system(actuator: Actuator) -> Any:

@@ -152,10 +152,12 @@ class Instruments:
     ----------
     step : float
         T_s [s].
+    part : float
+        Share of it after which the pressure that is held changes.
     """
 
-    def __init__(self, step: float, reading: Any, late: Any, pumped: Any) -> None:
-        self.step = step
+    def __init__(self, step: float, part: float, reading: Any, late: Any, pumped: Any) -> None:
+        self.step, self.part = step, part
         self._reading, self._late, self._pumped = reading, late, pumped
 
     @classmethod
@@ -163,7 +165,8 @@ class Instruments:
         """Before the first sample."""
         late = [stage for stage in path.stages if isinstance(stage, Delay)]
         others = [stage for stage in path.stages if not isinstance(stage, Delay)]
-        return cls(step, _remembering(_read(transducer, step)), *(_remembering(_held(s, step)) for s in (late, others)))
+        stages = (_remembering(_held(s, step)) for s in (late, others))
+        return cls(step, Actuator(stages=path.stages).part, _remembering(_read(transducer, step)), *stages)
 
     def read(self, slip: float) -> float:
         """Slip [m] that is told."""
@@ -172,6 +175,11 @@ class Instruments:
     def pump(self, asked: float, planned: float) -> float:
         """Pressure [Pa] beside a planned one that is held, of what is asked for beside it."""
         return float(self._pumped(float(self._late(asked)) + planned)) - planned
+
+    def sections(self, now: float, before: float, after: float) -> list[tuple[float, float, float]]:
+        """Starts and lengths [s] between a sample and the next of what is held, with the pressures."""
+        late = self.part * self.step
+        return [(now, late, before)] * (late > 0) + [(now + late, self.step - late, after)]
 
 
 def _read(transducer: Transducer | None, step: float) -> Any:

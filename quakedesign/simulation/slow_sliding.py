@@ -220,18 +220,18 @@ def _followed(
         asked = float(output @ z) + float(law.feedback[0]) * error
         z = own @ z + fed[:, 0] * error
         acting = around.pump(asked, loop.planned(now))
-        before, after = (loop.pressure(now, p, 0.0, modes) for p in (held, acting))
-        if after >= loop.slider.normal_stress:
-            return np.array(rows), {"opening": now}
-        y, held = loop.slider.stepped(y, before, after), acting
-        try:
-            found = flow.follow(now, step, y, (held, now, *modes))[0]
-        except StoppedError:
-            return np.array(rows), {"diverged": now}
-        for share, values in zip(_SHARES, found.T, strict=True):
-            pressure = loop.pressure(now + share * step, held, share * step, modes)
-            rows.append([now + share * step, *values, asked, pressure])
-        y, modes = found[:, -1], held + (modes - held) * np.exp(-loop.decay * step)
+        for begin, lasting, changed in around.sections(now, held, acting):
+            before, after = (loop.pressure(begin, p, 0.0, modes) for p in (held, changed))
+            if after >= loop.slider.normal_stress:
+                return np.array(rows), {"opening": begin}
+            y, held = loop.slider.stepped(y, before, after), changed
+            try:
+                found = flow.follow(begin, lasting, y, (held, begin, *modes))[0]
+            except StoppedError:
+                return np.array(rows), {"diverged": begin}
+            for passed, values in zip(lasting * np.array(_SHARES), found.T, strict=True):
+                rows.append([begin + passed, *values, asked, loop.pressure(begin + passed, held, passed, modes)])
+            y, modes = found[:, -1], held + (modes - held) * np.exp(-loop.decay * lasting)
         progress(min(1.0, (now + step) / length))
     return np.array(rows), {}
 

@@ -187,7 +187,7 @@ def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Cont
     Raises
     ------
     ParameterError
-        Where none has a proof, or the delay is no whole number of periods.
+        Where none has a proof, or the delay is more than a run takes.
     """
     around: Any = {part: rational(time, part) for part, time in path.items()}
     Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **around))

@@ -55,10 +55,17 @@ def test_rock_of_unknown_storage_has_no_volume():
     assert actuator(0.1, diffusion=60.0, storage=1e-4).stores
 
 
-@pytest.mark.parametrize("delay", [-0.1, 0.05, 0.1001, float("nan"), float("inf"), 1e300])
-def test_a_delay_is_a_whole_number_of_periods(delay):
-    with pytest.raises(ParameterError, match=r"whole number of sampling periods of 0\.1 s"):
+@pytest.mark.parametrize("delay", [-0.1, 10.1, float("nan"), float("inf"), 1e300])
+def test_a_delay_that_cannot_be_run_is_refused(delay):
+    with pytest.raises(ParameterError, match=r"0 to 100 sampling periods of 0\.1 s"):
         actuator(0.1, delay=delay)
+
+
+@pytest.mark.parametrize(("delay", "samples", "part"), [(0.05, 0, 0.5), (0.125, 1, 0.25), (0.3, 3, 0), (0.7, 7, 0)])
+def test_a_delay_is_periods_and_a_part_of_one(delay, samples, part):
+    (stage,) = actuator(0.1, delay=delay).stages
+    assert stage.samples == samples
+    assert stage.part == pytest.approx(part, abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def test_an_actuator_in_units_gives_volume_and_flow_rate_in_units(run, tmp_path)
     assert code == 0
     told = answer["run"]["actuator"]
     for stage in (
-        "Delay(samples=2, jitter=0, seed=0)",
+        "Delay(samples=2, jitter=0, seed=0, part=0.0)",
         "Quantisation(quantum=1.0)",
         "Saturation(lowest=-5000.0, highest=20000.0)",
         "RateLimit(rate=1000000.0)",
@@ -227,7 +227,6 @@ BAD = {
     "no number": (*SHORT, "--lag", "long"),
     "not a number": (*SHORT, "--quantum", "nan"),
     "an angular frequency": (*SHORT, "--bandwidth", "3 rad/s", "--differentiator-bound", "1"),
-    "part of a period": (*SHORT, "--delay", "0.5 ms"),
     "a delay of no periods": (*SHORT, "--step", "0", "--delay", "1"),
     "a storage of nothing": (*SHORT, "--storage", "1"),
     "a withdrawal of nothing": (*SHORT, "--withdrawal", "1"),

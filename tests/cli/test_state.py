@@ -84,7 +84,6 @@ def test_a_locked_fault_starts_with_an_aged_state(capsys, patch):
     [
         (("--controller", "cta"), "no sliding mode"),
         (("--controller", "elqr", "--gains", "1", "2"), "designed gains"),
-        (("--controller", "elqr", "--delay", "50 s"), "a whole number of sampling periods"),
         (("--controller", "elqr", "--rate-noise", "1 um/s"), "rate_noise: not for friction with a state with control"),
         (("--controller", "elqr", "--storage", "1e-4 m^3/Pa"), "storage: not for friction with a state with control"),
         (("--controller", "elqr", "--start", "late"), "starts in steady sliding"),

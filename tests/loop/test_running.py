@@ -9,6 +9,7 @@ import control
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 
 from quakedesign import assess, simulate
 from quakedesign.certificates.guarantee import Guarantee, Held, guarantee, task_of
@@ -21,6 +22,7 @@ from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Variation, export_controller, to_casadi, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
+from quakedesign.simulation.closed_loop import ClosedLoop
 
 STEP = F("0.184")
 LAW = disturbance_estimate(
@@ -203,10 +205,37 @@ def test_what_a_law_is_designed_for_stands_in_every_run_unless_told(around, stag
     assert campaign_problem(REAL, law).scheme.actuator == told
 
 
-def test_a_delay_between_samples_is_not_run():
-    law = Held(law=LAW, step=STEP, delay=STEP / 3).controller
-    with pytest.raises(ParameterError, match="delay must be a whole number of sampling periods"):
-        simulate(REAL, law, duration=1.84)
+@pytest.mark.parametrize("lag", [0, F(1, 5)])
+@pytest.mark.parametrize("delay", [STEP / 3, STEP + F(1, 10)])
+def test_a_pressure_arrives_between_samples(delay, lag):
+    """The law by its recursion, the plant by SciPy between changes of the pressure; friction has a kink at slip 0."""
+    law, periods = Held(law=LAW, step=STEP, delay=delay, lag=lag).controller, 10
+    told = {"duration": periods * float(STEP), "samples": periods + 1, "initial_slip_rate": 1e-5}
+    run = simulate(REAL, law, substeps=16, **told)
+    plant, reference = ClosedLoop(REAL, law).plant, ClosedLoop(REAL, law).reference
+    update, measured, output, feedback = (
+        np.array(part, dtype=float) for part in (LAW.update, LAW.measured, LAW.output, LAW.feedback)
+    )
+    z, y, asked, found = np.zeros(2), np.array([0.0, 1e-5, 0.0]), [0.0, 0.0], []
+    step, (late, part) = float(STEP), divmod(delay, STEP)
+
+    def rates(t, y, held):
+        pressure = y[2] if lag else held
+        return [*plant(t, y[:2], pressure).full().ravel(), (held - y[2]) / float(lag) if lag else 0.0]
+
+    for k in range(periods):
+        found.append(y)
+        error = y[:2] - reference(k * step).full().ravel()[:2]
+        asked.append(output @ z + feedback @ error)
+        z = update @ z + measured @ error
+        changes = [k * step, k * step + float(part), (k + 1) * step]
+        for begin, end, held in zip(changes, changes[1:], asked[-2 - int(late) :], strict=False):
+            y = solve_ivp(rates, (begin, end), y, args=(held,), method="DOP853", rtol=1e-12, atol=1e-16).y[:, -1]
+    slips, speeds, _ = np.transpose(found)
+    assert np.abs(run.slip[:-1] - slips).max() < 1e-6 * np.abs(slips).max()
+    assert np.abs(run.slip_rate[:-1] - speeds).max() < 1e-6 * np.abs(speeds).max()
+    sooner = simulate(REAL, law, actuator=Actuator(), **told)
+    assert np.abs(run.slip - sooner.slip).max() > 0.1 * np.abs(slips).max()
 
 
 def test_a_verdict_on_a_law_of_samples_is_about_what_it_is_designed_for():

@@ -105,10 +105,12 @@ def along(time, rate, ramp, length):
     return rate * swollen, rate * (1 - ramp + ramp * (30 * s**2 - 60 * s**3 + 30 * s**4))
 
 
-def oracle(law, name, tide, count, off=(1.0,) * 6, *, ramp=0.0, length=5e5, read=float, pump=lambda asked, _: asked):
+def oracle(
+    law, name, tide, count, off=(1.0,) * 6, *, ramp=0.0, length=5e5, late=0.0, read=float, pump=lambda asked, _: asked
+):
     """Slip error and ln(v/V) at every sample: balance of forces by Lambert's function, LSODA between samples.
 
-    V is the first rate of the reference, whose mean is V/(1 - ramp).
+    V is the first rate of the reference, whose mean is V/(1 - ramp). A pressure acts `late` [s] after its sample.
     """
     a, b, d, sigma, stiffness, damping = (
         x * y for x, y in zip((A, B, D, NORMAL, STIFFNESS, DAMPING), off, strict=True)
@@ -138,12 +140,11 @@ def oracle(law, name, tide, count, off=(1.0,) * 6, *, ramp=0.0, length=5e5, read
     for k in range(count):
         slip = along(40.0 * k, mean, ramp, length)[0]
         error = read(slip + x) - slip
-        held = pump(float(output @ z) + float(law.feedback[0]) * error, STIFFNESS / MU * slip)
+        before, held = held, pump(float(output @ z) + float(law.feedback[0]) * error, STIFFNESS / MU * slip)
         z = update @ z + fed[:, 0] * error
-        part = solve_ivp(
-            field, (40.0 * k, 40.0 * (k + 1)), [x, w], method="LSODA", args=(held,), rtol=1e-10, atol=1e-15
-        )
-        x, w = part.y[:, -1]
+        change, end = 40.0 * k + late, 40.0 * (k + 1)
+        for span, acting in (((40.0 * k, change), before), ((change, end), held)):
+            x, w = solve_ivp(field, span, [x, w], method="LSODA", args=(acting,), rtol=1e-10, atol=1e-15).y[:, -1]
         found.append((x, rate(40.0 * (k + 1), x, w, held)))
     return np.array(found).T
 
@@ -196,6 +197,16 @@ def test_a_pump_that_is_late_and_cut_off_and_readings_in_steps_are_those_of_an_i
     controller = Held(law=law, step=STEP).controller
     same = simulate(fault(), controller, tide=tide, duration=2000.0, samples=200, **given)
     assert same.slip_rate[-1] == run.slip_rate[-1]
+
+
+def test_a_pump_acts_between_samples_as_with_an_independent_integrator():
+    law, tide = sliding_law(sliding_model(fault()), STEP), Tide(amplitude=90e3, period=3000.0)
+    run = simulate_sliding(fault(), law, STEP, stages=(Delay(samples=0, part=0.3),), tide=tide, duration=2000.0)
+    error, log_rate = oracle(law, "rate-and-state-aging", tide, 50, late=12.0)
+    assert run.slip_error[8::8] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
+    assert np.log(run.slip_rate[8::8] / V) == pytest.approx(log_rate, abs=1e-6)
+    sooner = oracle(law, "rate-and-state-aging", tide, 50)[1]
+    assert np.max(np.abs(log_rate - sooner)) > 1e-3
 
 
 def test_a_noisy_transducer_reads_other_slips_from_another_seed():

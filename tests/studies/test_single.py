@@ -168,8 +168,8 @@ def test_a_design_is_for_what_stands_around_it_in_the_run(monkeypatch):
     asked = designs_in_place_of_searches(monkeypatch, proved)
     assert choice(LAB, "elqr", ("designed",), path={"lag": 0.02, "delay": 0.05}, step=0.025).controller is law
     assert asked == [(0.025, "elqr", {"lag": F(1, 50), "delay": F(1, 20)})]
-    with pytest.raises(ParameterError, match="delay must be a whole number of sampling periods"):
-        choice(LAB, "elqr", ("designed",), path={"delay": 0.03}, step=0.025)
+    with pytest.raises(ParameterError, match="delay must be 0 to 100 sampling periods"):
+        choice(LAB, "elqr", ("designed",), path={"delay": 3.0}, step=0.025)
     assert len(asked) == 1
     limited = SimpleNamespace(found=proved.found, compensation=SimpleNamespace(limited="limited"))
     designs_in_place_of_searches(monkeypatch, limited)

@@ -67,7 +67,15 @@ class Stage(ABC):
 
 
 class SampledStage(Stage):
-    """A stage that acts once per sample."""
+    """A stage that acts once per sample.
+
+    Attributes
+    ----------
+    part : float
+        Share of a sampling period, below 1, after which what leaves it at a sample acts; until then the last one does.
+    """
+
+    part: float = 0.0
 
     @abstractmethod
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:

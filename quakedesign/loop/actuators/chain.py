@@ -46,19 +46,17 @@ class Actuator:
                     f"stages that act once per sample come first. Received {before.name} before {after.name}. "
                     "Change their order."
                 )
+        if len(between := [stage.name for stage in self.sampled if stage.part]) > 1:
+            raise ParameterError(
+                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Leave one out."
+            )
         if len(self._stores) > 1:
             names = ", ".join(stage.name for stage in self._stores)
             raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Leave one out.")
 
     @classmethod
     def meant_for(cls, sampling: Sampling) -> "Actuator":
-        """Delay, lag and rock for which a law of samples is designed; without stages where it is for none.
-
-        Raises
-        ------
-        ParameterError
-            For a delay that is no whole number of periods.
-        """
+        """Delay, lag and rock for which a law of samples is designed; without stages where it is for none."""
         step, kinds = float(sampling.step), {kind.name: kind for kind in (Delay, Lag, Diffusion)}
         times: dict[str, Any] = {name: float(time) for name, time in sampling.path.items() if time}
         return cls(stages=tuple(kinds[name].asked(step, **{name: time}) for name, time in times.items()))
@@ -79,6 +77,11 @@ class Actuator:
     def flowing(self) -> tuple[FlowStage, ...]:
         """Stages that move between samples."""
         return tuple(stage for stage in self.stages if isinstance(stage, FlowStage))
+
+    @property
+    def part(self) -> float:
+        """Share of a sampling period after which what leaves the sampled stages at a sample acts."""
+        return sum(stage.part for stage in self.sampled)
 
     @property
     def flow_start(self) -> tuple[float, ...]:

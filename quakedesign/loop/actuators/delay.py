@@ -1,5 +1,6 @@
 """Time that the computation takes."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -15,7 +16,7 @@ _SAME = 1e-9  # of a sampling period
 
 @dataclass(frozen=True, kw_only=True)
 class Delay(SampledStage):
-    """What is computed from one measurement acts a whole number of samples later; before that, nothing is injected.
+    """What is computed from one measurement acts some samples later; before that, nothing is injected.
 
     Attributes
     ----------
@@ -26,6 +27,8 @@ class Delay(SampledStage):
         once is not followed by anything older.
     seed : int
         Of the jitter, not negative.
+    part : float
+        Share of a sampling period by which it acts later still, at least 0 and below 1.
 
     Raises
     ------
@@ -38,7 +41,7 @@ class Delay(SampledStage):
         Option(
             name="delay",
             unit="s",
-            help="Time that the computation takes, a whole number of steps, such as '2 ms'.",
+            help="Time that the computation takes, such as '2 ms'.",
             default=0.0,
         ),
         Option(
@@ -52,11 +55,14 @@ class Delay(SampledStage):
     samples: int
     jitter: int = 0
     seed: int = 0
+    part: float = 0.0
 
     def __post_init__(self) -> None:
         for name, value in (("samples of a delay", self.samples), ("jitter", self.jitter)):
             if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_SAMPLES:
                 raise ParameterError(f"{name} must be a whole number, 0 to {MOST_SAMPLES}. Received {value!r}.")
+        if not 0 <= self.part < 1:
+            raise ParameterError(f"part of a delay must be at least 0 and below 1. Received {self.part!r}.")
         Measurement(seed=self.seed)
 
     @classmethod
@@ -66,15 +72,14 @@ class Delay(SampledStage):
         Raises
         ------
         ParameterError
-            For a delay that is no whole number of periods.
         """
-        count = round(delay / step) if step > 0 and 0 <= delay < 1e9 * step else -1
-        if count < 0 or abs(delay - count * step) > _SAME * step:
+        if not 0 <= delay <= MOST_SAMPLES * step:
             raise ParameterError(
-                f"delay must be a whole number of sampling periods of {step:g} s, since p is held over each. "
-                f"Received {delay:g} s. Change the delay or the step."
+                f"delay must be 0 to {MOST_SAMPLES} sampling periods of {step:g} s. Received {delay:g} s. "
+                "Change the delay or the step."
             )
-        return cls(samples=count, jitter=jitter or 0)
+        part, whole = math.modf(delay / step + _SAME)
+        return cls(samples=int(whole), jitter=jitter or 0, part=part - _SAME if part > 2 * _SAME else 0.0)
 
     @property
     def start(self) -> tuple[float, ...]:

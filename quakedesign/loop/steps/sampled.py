@@ -1,5 +1,6 @@
 """What the sampled schemes share: the law once per T_s, its pressure held while the plant moves on."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,8 +21,9 @@ MOST_SUBSTEPS = 100
 
 @dataclass(frozen=True)
 class Sample:
-    """Everything known at one sample (SX): the decision, the pressure that is held, and the memory afterwards."""
+    """Everything known at one sample (SX): the pressures held before and from it, and the memory afterwards."""
 
+    before: Any
     held: Any
     integrals: list[Any]
     numbers: list[Any]
@@ -84,14 +86,15 @@ class Sampled(Scheme, Decided):
     def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
         """See `Scheme.pressure`."""
         sample = self._sample(loop, counter, state, step)
-        return self.actuator.flow(sample.numbers, sample.flow, sample.held)[1]
+        return self.actuator.flow(sample.numbers, sample.flow, self._sections(sample)[0][0])[1]
 
     def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:
         """See `Scheme.outputs`."""
         if not self.actuator.stages:
             return {}
         sample = self._sample(loop, counter, state, step)
-        return {"well_pressure": sample.held} | self.actuator.flow(sample.numbers, sample.flow, sample.held)[2]
+        well = self._sections(sample)[0][0]
+        return {"well_pressure": well} | self.actuator.flow(sample.numbers, sample.flow, well)[2]
 
     @property
     def described(self) -> dict[str, tuple[str, str]]:
@@ -110,21 +113,30 @@ class Sampled(Scheme, Decided):
     def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
         """See `Scheme.advance`."""
         sample = self._sample(loop, counter, state, step)
-        given = ca.vertcat(counter, sample.held, *sample.numbers)
-        start, period = ca.vertcat(state[:2], *sample.flow), step / self.substeps
-        moving = loop.advance_often(method, self._motion(step), given, start, period, self.substeps)
+        moving = ca.vertcat(state[:2], *sample.flow)
+        for held, begin, share in self._sections(sample):
+            # With one entry more than the section before: repetitions are told apart by their numbers of arguments.
+            given = ca.vertcat(counter, held, *sample.numbers, *([begin] if begin else []))
+            times = math.ceil(share * self.substeps)
+            motion = self._motion(step, begin, share, times)
+            moving = loop.advance_often(method, motion, given, moving, share * step / times, times)
         rest = ca.vertcat(*sample.own, sample.held, *sample.kept, *sample.noise)
         first = 2 + len(sample.integrals)
         count = state.shape[0] - first - rest.shape[0] - len(sample.flow)
         constants = state[first : first + count]
         return ca.vertcat(moving[:2], *sample.integrals, constants, rest, moving[2:])
 
-    def _motion(self, step: float) -> Any:
+    def _sections(self, sample: Sample) -> tuple[tuple[Any, float, float], ...]:
+        """Pressures that are held between two samples, from which share of the period, and for which."""
+        late = self.actuator.part
+        return ((sample.before, 0, late), (sample.held, late, 1 - late)) if late else ((sample.held, 0, 1),)
+
+    def _motion(self, step: float, begin: float, share: float, times: int) -> Any:
         """Rates of plant and actuator under a pressure held, as `Stepped.advance_often` takes them."""
 
         def motion(plant: Any, passed: Any, now: Any, given: Any) -> Any:
             counter, held, *numbers = ca.vertsplit(given)
-            time = (counter + passed / self.substeps) * step
+            time = (counter + (begin + passed * share / times)) * step
             rates, pressure, _ = self.actuator.flow(numbers, ca.vertsplit(now[2:]), held)
             return ca.vertcat(plant(time, now[:2], pressure), *rates)
 
@@ -165,9 +177,8 @@ class Sampled(Scheme, Decided):
         held, excess, kept = self.actuator.hold(part["sampled"], part["kept"], pressure, step)
         winds = excess * push > 0
         integrals = [ca.if_else(winds, before[i], after[i]) for i in range(count)]
-        return Sample(
-            held, integrals, part["flowing"], [own[i] for i in range(self.own_size)], kept, noise, part["flow"]
-        )
+        memory = [own[i] for i in range(self.own_size)]
+        return Sample(part["held"][0], held, integrals, part["flowing"], memory, kept, noise, part["flow"])
 
     @staticmethod
     def _known(loop: Stepped, counter: Any, step: float, seen: Any) -> Values:

@@ -171,6 +171,9 @@ def test_a_coulomb_plant_takes_the_actuator_too(scheme):
     [
         (lambda: Delay(samples=-1), "whole number"),
         (lambda: Delay(samples=1.0), "whole number"),
+        (lambda: Delay(samples=1, part=1.0), "below 1"),
+        (lambda: Delay(samples=1, part=-0.1), "below 1"),
+        (lambda: Actuator(stages=(Delay(samples=1, part=0.5), Delay(samples=0, part=0.5))), "between samples"),
         (lambda: Quantisation(quantum=0.0), "quantum"),
         (lambda: Saturation(lowest=1.0, highest=2.0), "0 between"),
         (lambda: Saturation(lowest=-math.inf, highest=2.0), "finite"),
