@@ -1,128 +1,103 @@
-"""Trajectories of adaptive integrators resolved in time: points with nearly straight lines between, and crossings.
+"""CVODES and IDAS of CasADi as a solver of SciPy's `solve_ivp`, whose steps are nearly straight lines.
 
 A solver that answers only where it is asked passes over an earthquake between two questions. Here intervals are taken
-so short that in the middle of each of their pieces the value is nearly the mean of its ends. Slopes are not used: those
-of a stiff problem are lost in rounding.
+so short that in the middle of each of their pieces, the steps, the value is nearly the mean of its ends. Slopes are not
+used: those of a stiff problem are lost in rounding.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from collections import deque
+from typing import Any
 
 import numpy as np
+from scipy.integrate import DenseOutput, OdeSolver
 
-from quakedesign.errors import SimulationError
-from quakedesign.simulation.integrators import AdaptiveIntegrator
 from quakedesign.simulation.integrators.adaptive import Flow, StoppedError
 
-if TYPE_CHECKING:
-    Point = tuple[float, np.ndarray]
-
 AGREEMENT = 0.02
-PIECES = 32
-_LONGER = 4
+"""Share of the size of a variable that a straight line may miss."""
+SHARES = np.arange(1, 65) / 64
+"""Middle and end of every piece of an interval."""
+_PIECES, _LONGER = len(SHARES) // 2, 4
 _SHORTEST = 1e-15
 
 
-@dataclass(frozen=True)
-class Resolution:
-    """y' = f(t, y) under constant parameters, followed by one integrator.
+class Resolved(OdeSolver):  # type: ignore[misc]
+    """Steps of an interval at a time.
 
-    Attributes
+    Parameters
     ----------
-    scales : ndarray
-        Size of each variable, of which a straight line may miss the share `AGREEMENT`.
-    parameters : sequence of float
-    whole, pieces : Flow
-        Over an interval, with its end, or with the middle and the end of every piece.
+    fun, t0, y0, t_bound, vectorized
+        As of SciPy's `OdeSolver`.
+    pieces, whole : Flow
+        Over an interval, at `SHARES` of it, and with its end alone.
+    parameters : list of float
+        Of both.
     """
 
-    scales: "np.ndarray"
-    parameters: Sequence[float]
-    whole: Flow
-    pieces: Flow
+    t: float
+    y: Any
 
-    @classmethod
-    def of(
-        cls,
-        method: type[AdaptiveIntegrator],
-        rates: Any,
-        scales: "np.ndarray",
-        parameters: Sequence[float],
-        rtol: float,
-    ) -> "Resolution":
-        """Resolution by one integrator; raises `ParameterError` for a tolerance that it does not take."""
-        divided = [number / (2 * PIECES) for number in range(1, 2 * PIECES + 1)]
-        flows = (method.flow(rates, scales, shares, rtol=rtol) for shares in ([1.0], divided))
-        return cls(scales, parameters, *flows)
+    def __init__(
+        self, fun: Any, t0: float, y0: Any, t_bound: float, vectorized: bool, *,
+        pieces: Flow, whole: Flow, parameters: list[float], **_tolerances: Any,
+    ) -> None:  # fmt: skip
+        super().__init__(fun, t0, y0, t_bound, vectorized)
+        self._pieces, self._whole, self._parameters = pieces, whole, parameters
+        self._length, self._ahead = t_bound - t0, deque[tuple[float, Any]]()
 
-    def points(self, start: "Point", end: float) -> "list[Point]":
-        """Times [s] and values from a point to a time, the start left out, dense enough for straight lines between.
-
-        Raises
-        ------
-        SimulationError
-            When the solver stops, as when a value grows without bound.
-        """
-        found, now, length = list["Point"](), start, end - start[0]
-        while now[0] < end:
-            length = min(length, end - now[0])
-            ahead = self._ahead(now, length, end)
-            found += ahead
-            now = found[-1] if found else now
-            if len(ahead) == PIECES:
-                length *= _LONGER
-            elif len(ahead) < PIECES // _LONGER:
-                length /= _LONGER
-        return found
-
-    def _ahead(self, start: "Point", length: float, end: float) -> "list[Point]":
-        """Points of the first pieces of an interval that are nearly straight; none if it is too long."""
-        time, y = start
+    def _step_impl(self) -> tuple[bool, str | None]:
         try:
-            values = self._follow(self.pieces, time, length, y)
-        except SimulationError:
-            if length < _SHORTEST * end:
-                raise
-            return []
-        found, before = list["Point"](), start
-        for number in range(PIECES):
-            last = end if number == PIECES - 1 and time + length >= end else time + (number + 1) / PIECES * length
-            after = (last, values[:, 2 * number + 1])
-            bend = abs(values[:, 2 * number] - 0.5 * (before[1] + after[1]))
-            if length >= _SHORTEST * end and any(bend > AGREEMENT * self.scales):
-                break
-            found.append(after)
-            before = after
-        return found
-
-    def crossings(self, points: "Sequence[Point]", watched: int, level: float) -> list[float]:
-        """Times [s] at which one variable rises through a level, by bisection and secants on the solver itself."""
-        times = []
-        for (time, y), (later, after) in pairwise(points):
-            if y[watched] < level <= after[watched]:
-                times.append(self._crossing((time, y), later, watched, level))
-        return times
-
-    def _crossing(self, start: "Point", later: float, watched: int, level: float) -> float:
-        from scipy.optimize import brentq
-
-        time, y = start
-
-        def missing(share: float) -> float:
-            value = y if share == 0 else self._follow(self.whole, time, share, y)[:, -1]
-            return float(value[watched] - level)
-
-        whole = later - time
-        # A new start may meet the level a rounding after the interval.
-        return later if missing(whole) < 0 else time + brentq(missing, 0.0, whole, xtol=1e-15 * later, rtol=1e-15)
-
-    def _follow(self, flow: Flow, time: float, length: float, y: "np.ndarray") -> "np.ndarray":
-        try:
-            return flow.follow(time, length, y, self.parameters)[0]
+            while not self._ahead:
+                self._look_ahead()
         except StoppedError as error:
-            raise SimulationError(
-                f"the integration stopped between t = {time:.6g} s and {time + length:.6g} s: {error}. "
-                "Check that the slip rate stays finite, or loosen rtol."
-            ) from None
+            return False, f"{error} after t = {self.t:.6g} s."
+        self._before = self.y
+        self.t, self.y = self._ahead.popleft()
+        return True, None
+
+    def _look_ahead(self) -> None:
+        """Points of the first pieces of an interval that are nearly straight; none if it is too long."""
+        length = self._length = min(self._length, self.t_bound - self.t)
+        shortest = length < _SHORTEST * self.t_bound
+        try:
+            values = self._pieces.follow(self.t, length, self.y, self._parameters)[0].T
+        except StoppedError:
+            if shortest:
+                raise
+            values = np.full((len(SHARES), self.n), np.nan)
+        before = self.y
+        for share, middle, after in zip(SHARES[1::2], values[::2], values[1::2], strict=True):
+            straight = np.all(abs(middle - 0.5 * (before + after)) <= AGREEMENT * self._pieces.scales)
+            if not (straight or shortest):
+                break
+            last = share == 1 and self.t + length >= self.t_bound
+            self._ahead.append((self.t_bound if last else self.t + share * length, after))
+            before = after
+        if len(self._ahead) == _PIECES:
+            self._length *= _LONGER
+        elif len(self._ahead) < _PIECES // _LONGER:
+            self._length /= _LONGER
+        self.nfev += _PIECES
+
+    def _dense_output_impl(self) -> "_Between":
+        return _Between(self, {self.t_old: self._before, self.t: self.y})
+
+    def follow(self, start: float, y: Any, time: float) -> Any:
+        """Value at a time [s] from that at another."""
+        return self._whole.follow(start, time - start, y, self._parameters)[0][:, -1]
+
+
+class _Between(DenseOutput):  # type: ignore[misc]
+    """Values within a step, of the solver itself; its ends are as they are known."""
+
+    def __init__(self, solver: Resolved, known: dict[float, Any]) -> None:
+        super().__init__(solver.t_old, solver.t)
+        self._solver, self._known = solver, known
+
+    def _call_impl(self, t: Any) -> Any:
+        return np.array([self._at(float(time)) for time in t]).T if t.ndim else self._at(float(t))
+
+    def _at(self, time: float) -> Any:
+        return (
+            self._known[time] if time in self._known else self._solver.follow(self.t_old, self._known[self.t_old], time)
+        )

@@ -5,11 +5,12 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from quakedesign.errors import SimulationError, require_known
 from quakedesign.simulation.integrators import adaptive_integrators
 from quakedesign.simulation.integrators.adaptive import require_tolerance
-from quakedesign.simulation.resolution import Resolution
+from quakedesign.simulation.resolution import SHARES, Resolved
 
 METHODS = {"dop853": "DOP853", "radau": "Radau"}
 
@@ -87,16 +88,14 @@ class Problem:
         """
         _check(method, rtol)
         began, clock = float(times[0]), replace(load, start=load.start - float(times[0]))
-        solve = self._resolved if method in adaptive_integrators() else self._stepped
-        solution = solve(start, clock, times - began, every_step=every_step, method=method, rtol=rtol)
+        solution = self._stepped(start, clock, times - began, every_step=every_step, method=method, rtol=rtol)
         time = np.append(began + solution.time[:-1], times[-1]) if every_step else times
         return replace(solution, time=time, crossings=began + solution.crossings)
 
     def _stepped(
         self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
     ) -> Solution:
-        field, jacobian = self._bound(load)
-        crossing = self._crossing()
+        field, crossing, solver = self._field(load), self._crossing(), self._solver(method, load, rtol)
         spans = [times] if every_step or method == "dop853" else [times[i : i + 2] for i in range(len(times) - 1)]
         pieces: list[tuple[np.ndarray, np.ndarray]] = []
         crossed: list[np.ndarray] = []
@@ -106,12 +105,11 @@ class Problem:
                 field,
                 (span[0], span[-1]),
                 y,
-                method=METHODS[method],
                 t_eval=None if every_step else span,
                 events=crossing,
                 rtol=rtol,
                 atol=rtol * self.scales,
-                **({"jac": jacobian} if method == "radau" else {}),
+                **solver,
             )
             pieces.append((part.t, part.y) if not pieces else (part.t[1:], part.y[:, 1:]))
             crossed.append(part.t_events[0])
@@ -120,30 +118,29 @@ class Problem:
         values = np.concatenate([v for _, v in pieces], axis=1)
         return Solution(np.concatenate([t for t, _ in pieces]), values, np.concatenate(crossed), evaluations)
 
-    def _resolved(
-        self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
-    ) -> Solution:
+    def _solver(self, method: str, load: Ramp, rtol: float) -> dict[str, Any]:
+        """Solver of SciPy, and what it takes beside field, instants and tolerances."""
+        if method not in adaptive_integrators():
+            more = {"jac": self._jacobian(load)} if method == "radau" else {}
+            return {"method": METHODS[method], **more}
         time, y, size = ca.SX.sym("t"), ca.SX.sym("y", self.rates.size1_in(0)), len(load.value)
         pushed = ca.SX.sym("load", 2 * size + 1)
         now = pushed[:size] + pushed[size : 2 * size] * (time - pushed[2 * size])
         rates = ca.Function("rates", [time, y, pushed], [ca.densify(self.rates(y, now)[0])])
-        told = (*load.value, *load.slope, load.start)
-        resolution = Resolution.of(adaptive_integrators()[method], rates, self.scales, told, rtol)
-        points, wanted = [(float(times[0]), np.array(start))], [0]
-        for end in times[1:]:
-            points += resolution.points(points[-1], float(end))
-            wanted.append(len(points) - 1)
-        crossed = np.array(resolution.crossings(points, self.watched, self.level))
-        kept = points if every_step else [points[i] for i in wanted]
-        values = np.array([value for _, value in kept]).T
-        return Solution(np.array([t for t, _ in kept]), values, crossed, len(points))
+        pieces, whole = (
+            adaptive_integrators()[method].flow(rates, self.scales, shares, rtol=rtol) for shares in (SHARES, [1.0])
+        )
+        told = [*load.value, *load.slope, load.start]
+        return {"method": Resolved, "pieces": pieces, "whole": whole, "parameters": told}
 
-    def _bound(self, load: Ramp) -> tuple[Any, Any]:
-        """Field and Jacobian as functions of (t, y)."""
-        size = self.rates.size1_in(0)
-        field = _Bound.of(self.rates, 0, load, np.empty(size))
-        jacobian = _Bound.of(self.rates, 1, load, np.empty((size, size)))
-        return field.at, (lambda time, y: jacobian.at(time, y).T)
+    def _field(self, load: Ramp) -> Any:
+        """Field as a function of (t, y)."""
+        return _Bound.of(self.rates, 0, load, np.empty(self.rates.size1_in(0))).at
+
+    def _jacobian(self, load: Ramp) -> Any:
+        """Jacobian as a function of (t, y)."""
+        jacobian = _Bound.of(self.rates, 1, load, np.empty((self.rates.size1_in(0),) * 2))
+        return lambda time, y: jacobian.at(time, y).T
 
     def _crossing(self) -> Any:
         def crossing(_: float, y: "np.ndarray") -> float:
@@ -184,8 +181,6 @@ class _Bound:
 
 
 def _solve(*arguments: Any, **options: Any) -> Any:
-    from scipy.integrate import solve_ivp
-
     with np.errstate(over="ignore", invalid="ignore"):  # of trial steps that are too long, and rejected for it
         part = solve_ivp(*arguments, **options)
     if not part.success:
