@@ -6,20 +6,19 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import diags_array
 
 from quakedesign.errors import PolynomialError
 from quakedesign.rationals import nearest, rational
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.definiteness import positive_definite
-from quakedesign.sos.exact.polynomial import Exponents, combination, degree, times
+from quakedesign.sos.exact.polynomial import Exponents, combination, degree
 from quakedesign.sos.exact.reading import read
 from quakedesign.sos.exact.statement import Statement, statement
 from quakedesign.sos.solve.conic import Compiled, solve
-from quakedesign.sos.solve.decide import initial_blocks
 from quakedesign.sos.solve.engine import decide
-from quakedesign.sos.solve.faces import Block
-from quakedesign.sos.solve.rounding import relations
+from quakedesign.sos.solve.joint import shape_of
+from quakedesign.sos.solve.moment import pairs
 
 _ROOM = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 _BITS = (4, 8, 12, 18, 24, 32)
@@ -285,49 +284,26 @@ def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fra
 
 
 def _membership(vector: Any, parts: Sequence[Mapping[Any, Any]], template: Statement, margin: Any) -> list[Any]:
-    """Equation between the coefficients of the polynomial and of a sum of squares with margin."""
+    """Equations between the coefficients of the polynomial and of a sum of squares with margin."""
     import cvxpy as cp
 
-    blocks = initial_blocks(template)
-    rows = [r for _, _, r in relations(template)]
-    maps = [_map(block) for block in blocks]
-    keys = sorted({e for p in parts for e in p} | {e for m in maps for e, _, _, _ in m} | {e for r in rows for e in r})
-    index = {e: i for i, e in enumerate(keys)}
-    left = np.zeros((len(keys), len(parts)))
-    for j, part in enumerate(parts):
-        for e, c in part.items():
-            left[index[e], j] = float(c)
+    shape = shape_of(template)
+    known = [{e: c for e, c in part.items() if e in shape.index} for part in parts]
+    beyond = [[float(part.get(e, 0)) for part in parts] for e in {e for p in parts for e in p if e not in shape.index}]
+    left, triangles = np.array([shape.vector(part) for part in known]).T, shape.triangles()
     total: Any = left[:, 0] + left[:, 1:] @ vector
-    constraints = []
-    for block, entries in zip(blocks, maps, strict=True):
-        size = len(block.monomials)
-        gram = cp.Variable((size, size), symmetric=True)
+    constraints, start = [], 0
+    for block in shape.blocks:
+        gram = cp.Variable((block.size, block.size), symmetric=True)
+        rows, columns = pairs(block.size)
+        own = triangles[start : start + len(rows)].T @ diags_array(np.where(rows == columns, 1.0, 2.0))
+        total = total - own @ (gram[rows, columns] + margin * (rows == columns))
         constraints.append(gram >> 0)
-        matrix = _sparse(entries, index, size)
-        unit = matrix @ np.eye(size).flatten(order="F")
-        total = total - matrix @ cp.vec(gram, order="F") - margin * unit
-    if rows:
-        table = np.zeros((len(keys), len(rows)))
-        for j, r in enumerate(rows):
-            for e, c in r.items():
-                table[index[e], j] = float(c)
-        total = total - table @ cp.Variable(len(rows))
-    return [*constraints, total == 0]
-
-
-def _map(block: Block) -> list[tuple[Exponents, int, int, float]]:
-    entries = []
-    for i, left in enumerate(block.monomials):
-        for j, right in enumerate(block.monomials):
-            for e, c in block.weight.items():
-                entries.append((times(times(left, right), e), i, j, float(c)))
-    return entries
-
-
-def _sparse(entries: Any, index: Mapping[Exponents, int], size: int) -> Any:
-    rows = [index[e] for e, _, _, _ in entries]
-    columns = [i + j * size for _, i, j, _ in entries]
-    return coo_array(([c for *_, c in entries], (rows, columns)), shape=(len(index), size * size)).tocsr()
+        start += len(rows)
+    if shape.relation_count:
+        total = total - shape.relations().T @ cp.Variable(shape.relation_count)
+    vanishing = [row[0] + np.array(row[1:]) @ vector == 0 for row in beyond]
+    return [*constraints, *vanishing, total == 0]
 
 
 def _definite(vector: Any, rows: list[list[dict[Any, Any]]], margin: Any) -> Any:
