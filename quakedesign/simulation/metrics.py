@@ -2,10 +2,15 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 EVENTS = ("diverged", "opening", "reverse_slip", "stick")
+
+
+def _figure(unit: str) -> Any:
+    """Field with an SI unit, None unless given."""
+    return field(default=None, metadata={"unit": unit})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,26 +47,26 @@ class Metrics:
         Time that the computation took [s].
     """
 
-    max_slip_error: float | None = None
-    max_slip_rate_error: float | None = None
-    rms_slip_error: float | None = None
-    rms_slip_rate_error: float | None = None
-    mise_slip: float | None = None
-    mise_slip_rate: float | None = None
-    rms_pressure: float | None = None
-    pressure_total_variation: float | None = None
-    reverse_slip_fraction: float | None = None
-    peak_slip_rate: float | None = None
-    max_h_rate: float | None = None
-    max_pressure: float | None = None
-    min_pressure: float | None = None
-    settled_from: float
+    max_slip_error: float | None = _figure("m")
+    max_slip_rate_error: float | None = _figure("m/s")
+    rms_slip_error: float | None = _figure("m")
+    rms_slip_rate_error: float | None = _figure("m/s")
+    mise_slip: float | None = _figure("m^2")
+    mise_slip_rate: float | None = _figure("m^2/s^2")
+    rms_pressure: float | None = _figure("Pa")
+    pressure_total_variation: float | None = _figure("Pa")
+    reverse_slip_fraction: float | None = _figure("")
+    peak_slip_rate: float | None = _figure("m/s")
+    max_h_rate: float | None = _figure("m/s^3")
+    max_pressure: float | None = _figure("Pa")
+    min_pressure: float | None = _figure("Pa")
+    settled_from: float = field(metadata={"unit": "s"})
     steps: int
-    seconds: float
+    seconds: float = field(metadata={"unit": "s"})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures by name, as JSON can hold them."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return asdict(self)
 
     @staticmethod
     def unit(name: str) -> str:
@@ -79,7 +84,7 @@ class StickMetrics(Metrics):
         Share of the steps with x2 = 0 over t > settled_from [-].
     """
 
-    stick_fraction: float | None = None
+    stick_fraction: float | None = _figure("")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,39 +101,15 @@ class ActuatorMetrics(StickMetrics):
         Into the well, negative for withdrawal [m³/s].
     """
 
-    max_well_pressure: float | None = None
-    min_well_pressure: float | None = None
-    max_injected_volume: float | None = None
-    min_injected_volume: float | None = None
-    max_flow_rate: float | None = None
-    min_flow_rate: float | None = None
+    max_well_pressure: float | None = _figure("Pa")
+    min_well_pressure: float | None = _figure("Pa")
+    max_injected_volume: float | None = _figure("m^3")
+    min_injected_volume: float | None = _figure("m^3")
+    max_flow_rate: float | None = _figure("m^3/s")
+    min_flow_rate: float | None = _figure("m^3/s")
 
 
-_UNITS = {
-    "stick_fraction": "",
-    "max_well_pressure": "Pa",
-    "min_well_pressure": "Pa",
-    "max_injected_volume": "m^3",
-    "min_injected_volume": "m^3",
-    "max_flow_rate": "m^3/s",
-    "min_flow_rate": "m^3/s",
-    "max_slip_error": "m",
-    "max_slip_rate_error": "m/s",
-    "rms_slip_error": "m",
-    "rms_slip_rate_error": "m/s",
-    "mise_slip": "m^2",
-    "mise_slip_rate": "m^2/s^2",
-    "rms_pressure": "Pa",
-    "pressure_total_variation": "Pa",
-    "reverse_slip_fraction": "",
-    "peak_slip_rate": "m/s",
-    "max_h_rate": "m/s^3",
-    "max_pressure": "Pa",
-    "min_pressure": "Pa",
-    "settled_from": "s",
-    "steps": "",
-    "seconds": "s",
-}
+_UNITS: dict[str, str] = {each.name: each.metadata.get("unit", "") for each in fields(ActuatorMetrics)}
 
 
 def events(watched: dict[str, float]) -> dict[str, float]:

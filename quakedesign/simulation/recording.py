@@ -2,9 +2,10 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import field, fields
 from io import BytesIO
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,11 @@ from quakedesign.errors import ParameterError
 from quakedesign.output import write_whole
 
 CONVENTIONS = "CF-1.11"
+
+
+def signal(title: str, unit: str) -> Any:
+    """Field that is a signal, with its long name and SI unit; one that is None is none."""
+    return field(repr=False, metadata={"title": title, "unit": unit})
 
 
 class Recording(ABC):
@@ -22,18 +28,15 @@ class Recording(ABC):
     name : str
     time : ndarray
         [s], shape (n,).
-    described : mapping of str to (str, str)
-        Long name and SI unit of every field that is a signal; one that is None is none.
     """
 
     name: str
     time: "np.ndarray"
-    described: ClassVar[Mapping[str, tuple[str, str]]]
 
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
         """Values, long name and SI unit of every signal that this run has, by name."""
-        known = ((name, getattr(self, name), *told) for name, told in self.described.items())
-        return {name: (values, title, unit) for name, values, title, unit in known if values is not None}
+        known = ((each.name, getattr(self, each.name), each.metadata) for each in fields(self))  # type: ignore[arg-type]
+        return {name: (v, told["title"], told["unit"]) for name, v, told in known if told and v is not None}
 
     @abstractmethod
     def attributes(self) -> Mapping[str, Any]:

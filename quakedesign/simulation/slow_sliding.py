@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from fractions import Fraction
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,6 +20,7 @@ from quakedesign.simulation.integrators import adaptive_integrators
 from quakedesign.simulation.integrators.adaptive import StoppedError
 from quakedesign.simulation.metrics import Metrics
 from quakedesign.simulation.outcome import OutcomeCriterion
+from quakedesign.simulation.recording import signal
 from quakedesign.simulation.run import library_versions
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.sliding_conditions import Instruments, PressurePath, SlidingVariation, Tide
@@ -31,13 +32,6 @@ _SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run is recorded
 _RTOL = 1e-11
 PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 
-SIGNALS = {
-    "slip_error": ("slip less that of the reference", "m"),
-    "theta": ("state of friction", "s"),
-    "asked": ("pressure that the law asks for beside that of the reference", "Pa"),
-    "stress": ("shear stress disturbance", "Pa"),
-}
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SlidingRun(Trajectory):
@@ -46,14 +40,17 @@ class SlidingRun(Trajectory):
     Attributes
     ----------
     theta, asked, stress : ndarray
-        As in `SIGNALS`, shape (n,).
+        State of friction [s], pressure that the law asks for beside that of the reference, and shear stress disturbance
+        [Pa], shape (n,).
     """
 
-    described: ClassVar[Mapping[str, tuple[str, str]]] = {**Trajectory.described, **SIGNALS}
+    theta: "np.ndarray" = signal("state of friction", "s")
+    asked: "np.ndarray" = signal("pressure that the law asks for beside that of the reference", "Pa")
+    stress: "np.ndarray" = signal("shear stress disturbance", "Pa")
 
-    theta: "np.ndarray" = field(repr=False)
-    asked: "np.ndarray" = field(repr=False)
-    stress: "np.ndarray" = field(repr=False)
+    def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
+        """Values, long name and SI unit of every signal that this run has, by name."""
+        return super().signals() | {"slip_error": (self.slip - self.reference, "slip less that of the reference", "m")}
 
     @property
     def opened(self) -> float | None:

@@ -2,21 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from quakedesign.simulation.energy import EnergyBudget
-from quakedesign.simulation.recording import Recording
-
-SIGNALS = {
-    "load_point": ("displacement of the load point", "m"),
-    "slip": ("slip", "m"),
-    "slip_rate": ("slip rate", "m/s"),
-    "stretch": ("stretch of the spring", "m"),
-    "friction": ("friction coefficient", ""),
-    "pressure": ("fluid pressure", "Pa"),
-}
+from quakedesign.simulation.recording import Recording, signal
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,16 +44,14 @@ class StateTrajectory(Recording):
         Method, tolerance, evaluations and versions.
     """
 
-    described: ClassVar[Mapping[str, tuple[str, str]]] = SIGNALS
-
     name: str
     time: "np.ndarray" = field(repr=False)
-    load_point: "np.ndarray" = field(repr=False)
-    slip: "np.ndarray" = field(repr=False)
-    slip_rate: "np.ndarray" = field(repr=False)
-    stretch: "np.ndarray" = field(repr=False)
-    friction: "np.ndarray" = field(repr=False)
-    pressure: "np.ndarray" = field(repr=False)
+    load_point: "np.ndarray" = signal("displacement of the load point", "m")
+    slip: "np.ndarray" = signal("slip", "m")
+    slip_rate: "np.ndarray" = signal("slip rate", "m/s")
+    stretch: "np.ndarray" = signal("stretch of the spring", "m")
+    friction: "np.ndarray" = signal("friction coefficient", "")
+    pressure: "np.ndarray" = signal("fluid pressure", "Pa")
     states: "np.ndarray" = field(repr=False)
     state_names: tuple[str, ...]
     state_units: tuple[str, ...]

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -11,19 +11,7 @@ from quakedesign.simulation.energy import EnergyBudget
 from quakedesign.simulation.metrics import Metrics
 from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
 from quakedesign.simulation.plotting import NOTHING, Panel, figure, stress_figure
-from quakedesign.simulation.recording import Recording
-
-SIGNALS = {
-    "slip": ("slip x1", "m"),
-    "slip_rate": ("slip rate x2", "m/s"),
-    "pressure": ("fluid pressure p", "Pa"),
-    "reference": ("reference slip r", "m"),
-    "reference_rate": ("reference slip rate r'", "m/s"),
-    "matched_perturbation": ("matched perturbation h", "m/s^2"),
-    "friction": ("friction coefficient", ""),
-    "shear_stress": ("shear stress that resists slip", "Pa"),
-    "moment_rate": ("seismic moment rate", "N m/s"),
-}
+from quakedesign.simulation.recording import Recording, signal
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,18 +48,16 @@ class Trajectory(Recording):
         Method, step, scheme, backend and versions; the fault as a TOML file (``scenario``).
     """
 
-    described: ClassVar[Mapping[str, tuple[str, str]]] = SIGNALS
-
     name: str
     time: "np.ndarray" = field(repr=False)
-    slip: "np.ndarray" = field(repr=False)
-    slip_rate: "np.ndarray" = field(repr=False)
-    pressure: "np.ndarray" = field(repr=False)
-    reference: "np.ndarray | None" = field(repr=False)
-    reference_rate: "np.ndarray | None" = field(repr=False)
-    matched_perturbation: "np.ndarray | None" = field(repr=False)
-    friction: "np.ndarray" = field(repr=False)
-    shear_stress: "np.ndarray" = field(repr=False)
+    slip: "np.ndarray" = signal("slip x1", "m")
+    slip_rate: "np.ndarray" = signal("slip rate x2", "m/s")
+    pressure: "np.ndarray" = signal("fluid pressure p", "Pa")
+    reference: "np.ndarray | None" = signal("reference slip r", "m")
+    reference_rate: "np.ndarray | None" = signal("reference slip rate r'", "m/s")
+    matched_perturbation: "np.ndarray | None" = signal("matched perturbation h", "m/s^2")
+    friction: "np.ndarray" = signal("friction coefficient", "")
+    shear_stress: "np.ndarray" = signal("shear stress that resists slip", "Pa")
     moment_per_slip: float = field(repr=False)
     integrals: "np.ndarray" = field(repr=False)
     integral_units: tuple[str, ...]
@@ -104,7 +90,7 @@ class Trajectory(Recording):
 
     def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
         """Values, long name and SI unit of every signal that this run has, by name."""
-        found = super().signals()
+        found = super().signals() | {"moment_rate": (self.moment_rate, "seismic moment rate", "N m/s")}
         for number, (values, unit) in enumerate(zip(self.integrals, self.integral_units, strict=True), 1):
             found[f"xi_{number}"] = (values, f"integral state xi{number}", unit)
         return found
