@@ -7,14 +7,16 @@ in all; this is why slip, fault length and friction scale by different factors i
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import UnitError
+from quakedesign.fault.disturbance import Disturbance
 from quakedesign.fault.friction import FrictionLaw
 from quakedesign.fault.parameters import Fault
+from quakedesign.fault.reference import Reference
 from quakedesign.rationals import rational
 
 if TYPE_CHECKING:
@@ -37,21 +39,10 @@ _UNITS = (
 )
 
 PLANT_UNITS: Mapping[str, str] = {
-    "density": "kg/fault_m^3",
-    "shear_modulus": "shear_Pa/(slip_m/fault_m)",
-    "length": "fault_m",
-    "width": "fault_m",
-    "damping": "shear_N/(slip_m/s)",
-    "effective_normal_stress": "normal_Pa",
-    "sampling_time": "s",
-    "reference.target_slip": "slip_m",
-    "reference.operation_time": "s",
-    "reference.ramp": "slip_m/slip_m",
-    "disturbance.constant": "slip_m/s^2",
-    "disturbance.amplitude": "slip_m/s^2",
-    "disturbance.frequency": "rad/s",
-    "disturbance.slip_growth": "1/s^2",
-    "disturbance.rate_growth": "1/s",
+    f"{part}{each.name}": each.metadata.get("directed_unit", each.metadata["unit"])
+    for part, kind in (("", Fault), ("reference.", Reference), ("disturbance.", Disturbance))
+    for each in fields(kind)
+    if "unit" in each.metadata
 }
 """Units of the numbers of a `Fault`, by dotted name; with all three metres equal they are its SI units."""
 

@@ -1,6 +1,6 @@
 """What acts on the fault besides the spring, the dashpot, friction and the injected fluid."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from math import inf, nextafter
 from typing import TYPE_CHECKING, Any
@@ -69,16 +69,16 @@ class Disturbance:
         [1/s].
     """
 
-    constant: float = 0.0
-    amplitude: float = 0.0
-    frequency: float = 0.0
-    slip_growth: float = 0.0
-    rate_growth: float = 0.0
+    constant: float = field(default=0.0, metadata={"unit": "m/s^2"})
+    amplitude: float = field(default=0.0, metadata={"unit": "m/s^2"})
+    frequency: float = field(default=0.0, metadata={"unit": "rad/s"})
+    slip_growth: float = field(default=0.0, metadata={"unit": "1/s^2"})
+    rate_growth: float = field(default=0.0, metadata={"unit": "1/s"})
 
     def __post_init__(self) -> None:
         require_finite(constant=self.constant, slip_growth=self.slip_growth, rate_growth=self.rate_growth)
         require_nonnegative(amplitude=self.amplitude, frequency=self.frequency)
-        require_ordinary(**{field.name: getattr(self, field.name) for field in fields(self)})
+        require_ordinary(**{each.name: getattr(self, each.name) for each in fields(self)})
 
     def acceleration(self, slip: "sp.Expr", rate: "sp.Expr", time: "sp.Expr") -> "sp.Expr":
         """φ̂_e [m/s²] at a slip [m], slip rate [m/s] and time [s]."""

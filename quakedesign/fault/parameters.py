@@ -30,6 +30,8 @@ class Fault:
         G of the host rock [Pa].
     length : float
         L_ac, length of the activated fault [m].
+    width : float, optional
+        The side of the patch beside its length [m]; None for a square one, the paper's.
     damping : float
         η [kg/s], not negative.
     effective_normal_stress : float
@@ -41,8 +43,6 @@ class Fault:
         T_s [s].
     disturbance : Disturbance
     box : UncertaintyBox
-    width : float, optional
-        The side of the patch beside its length [m]; None for a square one, the paper's.
     assumed : tuple of str
         What a file left to physics or to the paper's example, each in a sentence.
 
@@ -60,17 +60,17 @@ class Fault:
 
     name: str
     source: str
-    density: float
-    shear_modulus: float
-    length: float
-    damping: float
-    effective_normal_stress: float
+    density: float = field(metadata={"unit": "kg/m^3", "directed_unit": "kg/fault_m^3", "symbol": r"\rho"})
+    shear_modulus: float = field(metadata={"unit": "Pa", "directed_unit": "shear_Pa/(slip_m/fault_m)", "symbol": "G"})
+    length: float = field(metadata={"unit": "m", "directed_unit": "fault_m", "symbol": "L"})
+    width: float | None = field(default=None, metadata={"unit": "m", "directed_unit": "fault_m"})
+    damping: float = field(metadata={"unit": "kg/s", "symbol": r"\eta"})
+    effective_normal_stress: float = field(metadata={"unit": "Pa", "symbol": r"\sigma'_n"})
     friction: FrictionLaw
     reference: Reference
-    sampling_time: float
+    sampling_time: float = field(metadata={"unit": "s", "symbol": "T_s"})
     disturbance: Disturbance = field(default_factory=Disturbance)
     box: UncertaintyBox = field(default_factory=lambda: uncertainty_box("paper"))
-    width: float | None = None
     assumed: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -1,6 +1,6 @@
 """The slip that the controller shall follow."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -28,9 +28,11 @@ class Reference:
         below 1; the rest comes at a constant rate. None: all of it at a constant rate.
     """
 
-    target_slip: float
-    operation_time: float
-    ramp: float | None = None
+    target_slip: float = field(metadata={"unit": "m", "symbol": "d_{max}"})
+    operation_time: float = field(metadata={"unit": "s", "symbol": "t_{op}"})
+    ramp: float | None = field(
+        default=None, metadata={"unit": "", "directed_unit": "slip_m/slip_m", "symbol": r"\lambda_r"}
+    )
 
     def __post_init__(self) -> None:
         require_positive(target_slip=self.target_slip, operation_time=self.operation_time)

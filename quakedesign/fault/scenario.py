@@ -13,28 +13,16 @@ from quakedesign.fault.defaults import completed
 from quakedesign.fault.disturbance import Disturbance, acceleration
 from quakedesign.fault.friction import friction_law
 from quakedesign.fault.parameters import Fault, require_plant
+from quakedesign.fault.reference import Reference
 from quakedesign.fault.sources import LARGEST_FILE, source_text
 from quakedesign.fault.tables import Table
 from quakedesign.fault.uncertainty import UncertaintyBox, uncertainty_box
-from quakedesign.fault.units import si_value
+from quakedesign.fault.units import si_value, units_of
 from quakedesign.rationals import rational
 
-PLANT = {
-    "density": "kg/m^3",
-    "shear_modulus": "Pa",
-    "length": "m",
-    "width": "m",
-    "damping": "kg/s",
-    "effective_normal_stress": "Pa",
-}
-TASK = {"target_slip": "m", "operation_time": "s", "ramp": "", "sampling_time": "s"}
-DISTURBANCE = {
-    "constant": "m/s^2",
-    "amplitude": "m/s^2",
-    "frequency": "rad/s",
-    "slip_growth": "1/s^2",
-    "rate_growth": "1/s",
-}
+PLANT = units_of(Fault)
+TASK = units_of(Reference) | {"sampling_time": PLANT.pop("sampling_time")}
+DISTURBANCE = units_of(Disturbance)
 WIDTHS = ("stiffness", "damping", "authority")
 OPTIONAL = ("damping", "width")  # of the plant
 _NO_SOURCE = "no source given"

@@ -13,6 +13,7 @@ from quakedesign.fault.parameters import Fault
 from quakedesign.fault.reference import Reference
 from quakedesign.fault.scenario import DISTURBANCE, OPTIONAL, PLANT, TASK, WIDTHS
 from quakedesign.fault.uncertainty import BOXES, UncertaintyBox
+from quakedesign.fault.units import units_of
 
 SCHEMA_NAME = "fault.schema.json"
 _EXAMPLES: dict[str, str | float] = {
@@ -81,11 +82,7 @@ def _values(part: object, units: Mapping[str, str]) -> dict[str, Any]:
 
 def _law_values(law: FrictionLaw) -> dict[str, Any]:
     options = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
-    return options | _values(law, _law_units(type(law)))
-
-
-def _law_units(law: type[FrictionLaw]) -> dict[str, str]:
-    return {key: field.metadata["unit"] for key, field in law.quantities().items()}
+    return options | _values(law, units_of(type(law)))
 
 
 def _entries(entries: Mapping[str, Any]) -> Iterator[str]:
@@ -134,7 +131,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
         "",
         f"[friction]  # {_first(friction)}",
         f"law = {_written(law)}  # or {', '.join(sorted(set(friction_laws()) - {law}))}",
-        *_asked(_law_units(friction), _described(friction), _optional(friction)),
+        *_asked(units_of(friction), _described(friction), _optional(friction)),
         "",
         f"{'' if asks else '# '}[task]  # what the fault shall do: slip slowly from rest to rest",
         *_asked(task, _task_described(), set(TASK) - asks),
@@ -232,7 +229,7 @@ def _quantities(units: Mapping[str, str], said: Mapping[str, str]) -> dict[str, 
 
 
 def _law_schema(law: type[FrictionLaw]) -> dict[str, Any]:
-    units, said = _law_units(law), _described(law)
+    units, said = units_of(law), _described(law)
     options = {field.name for field in fields(law)} - set(units)  # type: ignore[arg-type]
     properties = {
         "law": {"const": law.name, "description": _first(law)},

@@ -1,6 +1,7 @@
 """Quantities with units, at the boundary only."""
 
 import re
+from dataclasses import fields
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
@@ -139,6 +140,11 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
             f"{name} must be an angular frequency in rad/s. Received {quantity!r}. Give 2π times it in rad/s."
         )
     return float(converted.magnitude)
+
+
+def units_of(kind: Any) -> dict[str, str]:
+    """SI units of the fields of a dataclass that have one, by name."""
+    return {each.name: each.metadata["unit"] for each in fields(kind) if "unit" in each.metadata}
 
 
 def exact_value(quantity: str | float | Fraction, unit: str, name: str) -> Fraction:
