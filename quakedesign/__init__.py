@@ -30,6 +30,7 @@ _HOME = {
     "load_certificate": "certificates",
     "load_fault": "fault",
     "load_guarantee": "certificates",
+    "loop_margins": "simulation",
     "loop_transfer": "simulation",
     "published": "controllers",
     "run_campaign": "simulation.campaign",

@@ -16,6 +16,7 @@ from quakedesign.identification import identify as identify
 from quakedesign.report import compare as compare
 from quakedesign.simulation import Trajectory as Trajectory
 from quakedesign.simulation import export_controller as export_controller
+from quakedesign.simulation import loop_margins as loop_margins
 from quakedesign.simulation import loop_transfer as loop_transfer
 from quakedesign.simulation import simulate as simulate
 from quakedesign.simulation import to_casadi as to_casadi

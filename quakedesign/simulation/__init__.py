@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from quakedesign.simulation.integrators import integrators as integrators
     from quakedesign.simulation.interop import to_casadi as to_casadi
     from quakedesign.simulation.interop import to_iosystem as to_iosystem
+    from quakedesign.simulation.linear_models import LoopMargins as LoopMargins
+    from quakedesign.simulation.linear_models import loop_margins as loop_margins
     from quakedesign.simulation.linear_models import loop_transfer as loop_transfer
     from quakedesign.simulation.linear_models import to_statespace as to_statespace
     from quakedesign.simulation.loading import Load as Load

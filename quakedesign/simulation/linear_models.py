@@ -1,18 +1,23 @@
 """Faults and loops about an equilibrium, as python-control's StateSpace."""
 
-from dataclasses import replace
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq, minimize_scalar
 
 from quakedesign.controllers import Controller
-from quakedesign.errors import UnsupportedError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.checks import require_finite
 from quakedesign.loop.actuators import Actuator, Delay
 from quakedesign.simulation.interop import to_iosystem
 
+_GAINS = np.exp(np.linspace(0, math.log(1e4), 1000)[1:])  # factors among which the end of stability is looked for
+_FREQUENCIES = 5000
 _LINEAR = 1e-9  # relative difference of twice the answer and the answer to twice
 
 
@@ -100,6 +105,119 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actu
     if controller.sampling is not None:
         plant = _held(plant, controller.sampling.step, late)
     return control.ss(-law * plant, name=f"{controller.name} around {fault.name}", inputs=["p"], outputs=["answer"])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopMargins:
+    """How far one linear loop is from instability.
+
+    Attributes
+    ----------
+    stable : bool
+        Of the closed loop; without it no number is a margin.
+    gain_reduction : float or None
+        Largest factor below 1 on L that destabilises [-], or of an unstable loop stabilises; None if none does.
+    gain_margin : float or None
+        Smallest factor above 1 on L that does [-]; None if none does.
+    phase_margin : float or None
+        Smallest over all crossings [deg].
+    modulus_margin : float
+        min |1 + L| over all frequencies [-]: distance of the Nyquist curve from −1.
+    """
+
+    stable: bool
+    gain_reduction: float | None
+    gain_margin: float | None
+    phase_margin: float | None
+    modulus_margin: float
+
+
+def loop_margins(loop: Any) -> LoopMargins:
+    """Return the margins of a loop as `loop_transfer` gives it, to either side.
+
+    Stability of a loop in discrete time may be lost at half the sampling frequency, z = −1, where
+    ``control.stability_margins`` does not look. Factors from 1e-4 to 1e4 are tried.
+
+    Parameters
+    ----------
+    loop : control.StateSpace
+        L, with one input and one output and negative feedback.
+
+    Raises
+    ------
+    ParameterError
+        For a loop with more than one input or output.
+    """
+    import control
+
+    if (loop.ninputs, loop.noutputs) != (1, 1):
+        raise ParameterError(
+            f"loop must have one input and one output. Received {loop.ninputs} and {loop.noutputs}. Choose one of each."
+        )
+
+    def stable(factor: float) -> bool:
+        poles = control.feedback(factor * loop, 1).poles()
+        return bool(np.all(np.abs(poles) < 1) if loop.dt else np.all(poles.real < 0))
+
+    answers = _Answers.of(loop)
+    return LoopMargins(
+        stable=stable(1.0),
+        gain_reduction=_edge(stable, 1 / _GAINS),
+        gain_margin=_edge(stable, _GAINS),
+        phase_margin=answers.phase_margin,
+        modulus_margin=answers.modulus_margin,
+    )
+
+
+def _edge(stable: Callable[[float], bool], factors: "np.ndarray") -> float | None:
+    """First factor where what is true of 1 is not, to one part in 10¹²; None if there is none."""
+    at_once, inside = stable(1.0), 1.0
+    for outside in factors:
+        if stable(outside) != at_once:
+            while abs(outside / inside - 1) > 1e-12:
+                middle = math.sqrt(inside * outside)
+                inside, outside = (middle, outside) if stable(middle) == at_once else (inside, middle)
+            return float(outside)
+        inside = outside
+    return None
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """L along the edge of stability: x = ln ω of jω, or of e^{jω} up to half the sampling frequency."""
+
+    loop: Any
+    places: "np.ndarray"
+
+    @classmethod
+    def of(cls, loop: Any) -> "_Answers":
+        """From frequencies far below its poles and zeros to far above."""
+        roots = np.concatenate([loop.poles(), loop.zeros()])
+        known = np.abs(np.log(roots[np.abs(roots) > 1e-12]) if loop.dt else roots)
+        known = np.log(known[known > 1e-9 * np.max(known, initial=1.0)])
+        ends = np.min(known, initial=0.0) - 7, math.log(math.pi) if loop.dt else np.max(known, initial=0.0) + 7
+        return cls(loop, np.linspace(*ends, _FREQUENCIES))
+
+    def at(self, places: Any) -> Any:
+        """L there."""
+        return self.loop(np.exp(1j * np.exp(places)) if self.loop.dt else 1j * np.exp(places))
+
+    @property
+    def modulus_margin(self) -> float:
+        """min |1 + L| [-]."""
+        found = np.abs(1 + self.at(self.places))
+        least = int(np.argmin(found))
+        ends = self.places[max(least - 1, 0)], self.places[min(least + 1, len(found) - 1)]
+        inside = minimize_scalar(lambda x: abs(1 + self.at(x)), bounds=ends, method="bounded", options={"xatol": 1e-10})
+        return float(min(found[least], inside.fun))
+
+    @property
+    def phase_margin(self) -> float | None:
+        """Least angle [deg] between L and −1 where |L| is 1."""
+        sizes = np.log(np.abs(self.at(self.places)))
+        spans = [(self.places[i], self.places[i + 1]) for i in np.flatnonzero(np.diff(np.sign(sizes)))]
+        crossings = [brentq(lambda x: math.log(abs(self.at(x))), *span, xtol=1e-13) for span in spans]
+        return min((abs(float(np.degrees(np.angle(-self.at(x))))) for x in crossings), default=None)
 
 
 def _between(controller: Controller, actuator: Actuator | None) -> tuple[Fraction, Actuator]:

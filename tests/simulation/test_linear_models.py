@@ -65,6 +65,44 @@ def test_margins_are_where_the_loop_loses_stability():
     assert lower == pytest.approx(edge, rel=1e-6)
 
 
+def unstable_from(loop, factor):
+    """Factor towards 0.01 or 100 at which a pole of the closed loop leaves the circle, by bisection."""
+
+    def excess(power):
+        return np.max(np.abs(control.feedback(10.0**power * loop, 1).poles())) - 1
+
+    return 10 ** brentq(excess, 0, math.log10(factor), xtol=1e-13)
+
+
+@pytest.mark.parametrize("around", [{}, {"lag": F(1, 5)}])
+def test_margins_of_a_sampled_loop_are_where_its_poles_and_its_nyquist_curve_say(around):
+    """Up to half the sampling frequency, which python-control leaves out."""
+    law = qd.guarantee(REAL, **around).found.controller
+    loop = qd.loop_transfer(REAL, law)
+    found = qd.loop_margins(loop)
+    assert found.stable
+    assert found.gain_margin == pytest.approx(unstable_from(loop, 10.0), rel=1e-8)
+    assert found.gain_reduction == pytest.approx(unstable_from(loop, 0.03), rel=1e-6)
+    curve = loop(np.exp(1j * np.linspace(1e-3, np.pi, 100_001)))
+    assert found.modulus_margin == pytest.approx(np.abs(1 + curve).min(), rel=1e-6)
+    assert found.phase_margin == pytest.approx(control.stability_margins(loop)[1], rel=1e-3)
+
+
+@pytest.mark.parametrize("gain", [0.5, 1.25, 4.0])
+def test_margins_of_an_unstable_pole_are_its_closed_form(gain):
+    """L = k/(s − 1): stable from k = 1 on; |1 + L| falls from k − 1 at ω = 0 to 1; cos of the phase margin is 1/k."""
+    found = qd.loop_margins(control.tf([gain], [1, -1]))
+    assert (found.stable, found.gain_margin) == (gain > 1, None if gain > 1 else pytest.approx(1 / gain))
+    assert found.gain_reduction == (pytest.approx(1 / gain) if gain > 1 else None)
+    assert found.phase_margin == (pytest.approx(math.degrees(math.acos(1 / gain)), rel=1e-9) if gain > 1 else None)
+    assert found.modulus_margin == pytest.approx(min(abs(gain - 1), 1), rel=1e-5)
+
+
+def test_a_loop_of_two_signals_has_no_margins():
+    with pytest.raises(ParameterError, match="one input and one output"):
+        qd.loop_margins(qd.to_statespace(REAL))
+
+
 def test_a_law_of_samples_meets_a_fault_that_is_held():
     design = qd.design(REAL, "elqr")
     loop = qd.loop_transfer(REAL, design.controller)
