@@ -49,7 +49,7 @@ def identify(
     """
     from quakedesign.fault import load_fault
     from quakedesign.identification import identify as fitted
-    from quakedesign.identification import other_parts, read_record, save_fault
+    from quakedesign.identification import next_command, other_parts, read_record, save_fault, task_remarks
     from quakedesign.report.identification import identification_lines, require_format, save_figure
 
     for path, what in ((out, "fault file"), (figure, "figure")):
@@ -69,6 +69,7 @@ def identify(
     told = [f"written: {', '.join(map(str, written))}"] if written else []
     if out in written:
         told.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
+        told += [*task_remarks(identification, around), f"next: {next_command(identification, out)}"]
     if out is not None and not identification.identified:
         told.append(f"not written: {out}, which needs every parameter")
     places = {"figure": figure, "file": out if identification.identified else None}

@@ -48,8 +48,24 @@ def sliding_step(law: FrictionLaw, task: Reference) -> float:
         With a state.
     task : Reference
     """
-    ageing = float(min(law.steady_state(task.target_slip / task.operation_time)))
+    ageing = float(min(law.steady_state(mean_rate(task))))
     return _cut(min(ageing / AGEINGS, task.operation_time / _SHARE), digits=2)
+
+
+def mean_rate(task: Reference) -> float:
+    """V [m/s], the target slip over the operation time."""
+    return task.target_slip / task.operation_time
+
+
+def beyond_rates(law: FrictionLaw, rate: float) -> str:
+    """That a slip rate [m/s] lies outside the working range of a law, as one sentence; empty for one inside."""
+    slowest, fastest = law.working_rates
+    if slowest <= rate <= fastest:
+        return ""
+    return (
+        f"V = {rate:.3g} m/s is {'below' if rate < slowest else 'above'} the rates for which friction is known, "
+        f"{slowest:.2g} to {fastest:.2g} m/s (slowest_rate, fastest_rate): a, b and D_c are extrapolated"
+    )
 
 
 def step_assumed(fault: Fault) -> bool:

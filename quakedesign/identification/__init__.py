@@ -1,7 +1,14 @@
 """From a laboratory record to friction parameters: fits of the simulated experiment, with confidence regions."""
 
 from quakedesign.arguments import check_arguments
-from quakedesign.identification.fault_file import cover, identified_fault, other_parts, save_fault
+from quakedesign.identification.fault_file import (
+    cover,
+    identified_fault,
+    next_command,
+    other_parts,
+    save_fault,
+    task_remarks,
+)
 from quakedesign.identification.identify import identify
 from quakedesign.identification.record import Record, read_record
 from quakedesign.identification.result import Estimate, Identification
@@ -13,9 +20,11 @@ __all__ = [
     "cover",
     "identified_fault",
     "identify",
+    "next_command",
     "other_parts",
     "read_record",
     "save_fault",
+    "task_remarks",
 ]
 
 check_arguments(__name__)

@@ -13,10 +13,11 @@ from fractions import Fraction
 from itertools import product
 from math import log
 from pathlib import Path
+from shlex import quote
 
 from quakedesign.errors import RecordError
 from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox
-from quakedesign.fault.defaults import sliding_step, step_assumed
+from quakedesign.fault.defaults import beyond_rates, mean_rate, sliding_step, step_assumed
 from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.fault.template import fault_toml
 from quakedesign.identification.result import Estimate, Identification
@@ -25,6 +26,7 @@ from quakedesign.rationals import rational
 
 _DIGITS = 6
 _WEAKENING = {"residual", "drop", "critical_slip"}
+_OF_TASK = ("target slip", "operation time")
 _RATE_AND_STATE = ("direct_effect", "evolution_effect", "critical_slip")
 
 
@@ -138,6 +140,28 @@ def other_parts(identification: Identification, fault: Fault) -> str:
     return f"{shared}{kept}, disturbance{loaded}"
 
 
+def task_remarks(identification: Identification, fault: Fault) -> list[str]:
+    """What to look at in the task that a fault file of a record has from a fault: what was assumed, and its rate.
+
+    Parameters
+    ----------
+    identification : Identification
+    fault : Fault
+        That gives everything but friction.
+    """
+    law, task = identification.law, fault.reference
+    assumed = [said for said in fault.assumed if said.startswith(_OF_TASK)]
+    told = [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
+    beyond = beyond_rates(law, mean_rate(task)) if law.state_names else ""
+    return [*told, *filter(None, [beyond])]
+
+
+def next_command(identification: Identification, path: str | Path) -> str:
+    """The command that designs for a fault file of a record, for all constants that the record allows."""
+    spread = "" if covers(identification.law) else f" --spread {_spread(identification)}"
+    return f"quakedesign design {quote(str(path))}{spread}"
+
+
 def _at_rate_of(fault: Fault, law: FrictionLaw) -> FrictionLaw:
     """A law at the reference rate and on the working range of a fault.
 
@@ -204,6 +228,7 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
         f"from {fault.name}: {other_parts(identification, fault)}.",
         f"Best fit (95 % alone; box of all together); {said}.",
         *(_remark(estimate) for estimate in identification.estimates.values()),
+        *(f"{said}." for said in task_remarks(identification, fault)),
     ]
 
 

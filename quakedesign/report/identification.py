@@ -15,7 +15,7 @@ from quakedesign.report.figure_files import FORMATS, figure_bytes
 
 _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _MOST_OUTLIERS = 8
-_LONG = 0.01  # D_c [m] that no gouge of a laboratory has
+_SHORT, _LONG = 2e-7, 0.01  # D_c [m] that no gouge of a laboratory has
 
 
 def identification_lines(identification: Identification) -> list[str]:
@@ -26,8 +26,9 @@ def identification_lines(identification: Identification) -> list[str]:
     columns = f"{'parameter':24}{'value':>12}{'95 %: from':>14}{'to':>12}  unit"
     shown = [*identification.estimates.values(), *([identification.difference] if identification.difference else [])]
     tail = [
-        f"noise {fit.noise:.3g} of friction in {int(fit.kept.sum())} samples; {fit.agreeing} of {fit.starts} searches "
-        f"end in this fit (seed {identification.seed})",
+        f"noise {fit.noise:.3g} of friction in {int(fit.kept.sum())} samples; of {fit.starts} searches from different "
+        f"starts (seed {identification.seed}) {fit.agreeing} end in this fit"
+        f"{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
         *_warnings(identification),
         *_outliers(identification),
         f"assumed: {'; '.join(identification.notes)}",
@@ -47,10 +48,12 @@ def _row(estimate: Estimate) -> str:
 
 def _warnings(identification: Identification) -> list[str]:
     told, critical = [], identification.estimates.get("critical_slip")
-    if critical is not None and identification.law.state_names and critical.value > _LONG:
+    if critical is not None and identification.law.state_names and not _SHORT <= critical.value <= _LONG:
+        short, size = critical.value < _SHORT, critical.value
         told.append(
-            f"D_c of {100 * critical.value:.3g} cm is far longer than the some 10 to 100 um of laboratories: check the "
-            "unit of the displacement"
+            f"D_c of {f'{1e9 * size:.3g} nm' if short else f'{100 * size:.3g} cm'} is far "
+            f"{'shorter' if short else 'longer'} than the some 1 to 100 um of laboratories: check the unit of the "
+            "displacement"
         )
     if identification.fit.correlation > 2:
         told.append(

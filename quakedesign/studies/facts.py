@@ -9,7 +9,7 @@ from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.impossibility import longest_reaction
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault, fault_toml
-from quakedesign.fault.defaults import AGEINGS, sliding_step
+from quakedesign.fault.defaults import AGEINGS, beyond_rates, mean_rate, sliding_step
 from quakedesign.rationals import rational
 from quakedesign.studies.needed_pressure import need_sentence, needed_pressure, ways
 from quakedesign.symbolic import derive
@@ -57,7 +57,7 @@ def fault_sentences(fault: Fault) -> list[str]:
     """The same for people."""
     model = derive(fault)
     poles = ", ".join(f"{z.real:.4g}{z.imag:+.4g}i" if z.imag else f"{z.real:.4g}" for z in model.eigenvalues)
-    mean = fault.reference.target_slip / fault.reference.operation_time
+    mean = mean_rate(fault.reference)
     state = "unstable: " + "; ".join(model.reasons) if model.unstable else "stable without control"
     return [
         f"mass {fault.mass:.4g} kg, stiffness {fault.stiffness:.4g} N/m, natural frequency "
@@ -100,13 +100,14 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
 
 
 def _sliding_sentence(fault: Fault) -> list[str]:
-    """Which T_s suits a guarantee of slow sliding, where the fault's is more than a factor two off."""
+    """That friction is extrapolated, and which T_s suits a guarantee of slow sliding, where it is a factor two off."""
     if not fault.friction.state_names:
         return []
+    beyond = list(filter(None, [beyond_rates(fault.friction, mean_rate(fault.reference))]))
     suits = sliding_step(fault.friction, fault.reference)
     if suits / 2 <= fault.sampling_time <= 2 * suits:
-        return []
-    return [f"a guarantee of slow sliding wants sampling_time near D_c/({AGEINGS:g} V), here {suits:g} s"]
+        return beyond
+    return [*beyond, f"a guarantee of slow sliding wants sampling_time near D_c/({AGEINGS:g} V), here {suits:g} s"]
 
 
 def beyond_control(fault: Fault) -> list[str]:

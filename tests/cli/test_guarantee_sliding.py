@@ -90,6 +90,20 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
     assert tried == [(half, half)]
 
 
+def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch):
+    def proved(task, design, *, log_rate):
+        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
+
+    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
+    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
+    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
+    fault, around = load_fault("crustal-patch"), {"diffusion": Fraction(800)}
+    found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found
+    assert found.reason == "too much; a proof was found for a stress of at most 20 kPa: leave out --stress"
+    monkeypatch.setattr(sliding_answer, "proved_sliding", lambda task, design, *, log_rate: NONE)
+    assert sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found == NONE
+
+
 def test_a_stress_far_beyond_what_a_law_stands_has_no_guarantee():
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     found = proved_sliding(replace(known.task, stress=20 * known.task.stress), known.held)

@@ -50,6 +50,7 @@ def test_text_keeps_within_80_columns_and_says_what_is_not_from_the_record(recor
     assert "not from the record" not in out
     written = run(capsys, *told, "--out", str(tmp_path / "own.toml"))[1]
     assert "from lab-fault, not from the record: normal stress, size, task, T_s, disturbance" in written
+    assert f"next: quakedesign design {tmp_path / 'own.toml'}" in written
     assert max(map(len, out.splitlines())) <= 80
 
 

@@ -15,9 +15,20 @@ from quakedesign.errors import ParameterError, RecordError
 from quakedesign.fault import Disturbance, friction_law, load_fault
 from quakedesign.fault.defaults import step_assumed
 from quakedesign.fault.template import template
-from quakedesign.identification import Estimate, Record, cover, identified_fault, identify, other_parts, save_fault
+from quakedesign.identification import (
+    Estimate,
+    Record,
+    cover,
+    identified_fault,
+    identify,
+    next_command,
+    other_parts,
+    save_fault,
+    task_remarks,
+)
 from quakedesign.identification.setup import set_up
 from quakedesign.rationals import rational
+from quakedesign.report.identification import identification_lines
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
 synthetic = importlib.util.module_from_spec(SPECIFICATION)
@@ -185,6 +196,9 @@ def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, nam
     path = tmp_path / "state.toml"
     save_fault(replace(weak, law=law, estimates=estimates), patch, path)
     assert "--spread 0.063 of design and guarantee holds" in path.read_text()
+    assert next_command(replace(weak, law=law, estimates=estimates), "my own.toml") == (
+        "quakedesign design 'my own.toml' --spread 0.063"
+    )
     low, high = sliding_task(replace(patch, friction=law), Fraction(0), Fraction("0.063")).ranges["evolution_effect"]
     assert low < Fraction(b.value) * Fraction("0.9377") < high
 
@@ -203,6 +217,32 @@ def test_a_law_is_told_at_the_rate_at_which_its_fault_is_loaded_and_stays_the_sa
         )
     assert identified_fault(replace(weak, law=law), load_fault("lab-fault")).friction == law
     assert "reference rate" in other_parts(replace(weak, law=law), patch)
+
+
+def test_what_a_task_was_taken_from_and_a_rate_that_the_record_does_not_know_are_told(weak, tmp_path):
+    patch, lab, path = load_fault("crustal-patch"), load_fault("lab-fault"), tmp_path / "found.toml"
+    assert task_remarks(weak, lab) == []
+    assert next_command(weak, "found.toml") == "quakedesign design found.toml"
+    aged = replace(weak, law=replace(patch.friction, slowest_rate=1e-10, fastest_rate=9e-7))
+    assumed = ("damping 1 kg/s, x", "target slip 1 m, the next rest slip rounded down", "operation time 9 s, y")
+    taken, beyond = task_remarks(aged, replace(patch, assumed=assumed))
+    assert taken.startswith("assumed with the friction that is replaced: target slip 1 m, the next rest slip")
+    assert "operation time 9 s" in taken
+    assert "damping" not in taken
+    assert beyond.startswith("V = 1e-06 m/s is above the rates for which friction is known, 1e-10 to 9e-07 m/s")
+    assert task_remarks(replace(weak, law=patch.friction), patch) == []
+    save_fault(weak, replace(lab, assumed=assumed[1:2]), path)
+    assert "# assumed with the friction that is replaced: target slip 1 m" in path.read_text()
+
+
+@pytest.mark.parametrize(("slip", "said"), [(4e-8, "40 nm is far shorter"), (0.02, "2 cm is far longer"), (1e-6, "")])
+def test_a_critical_slip_of_no_laboratory_points_at_the_unit(weak, slip, said):
+    law = load_fault("crustal-patch").friction
+    told = Estimate(name="critical_slip", unit="m", value=slip, low=slip, high=slip, least=slip, most=slip)
+    found = replace(weak, law=law, estimates={"critical_slip": told})
+    lines = " ".join(" ".join(identification_lines(found)).split())
+    assert ("check the unit" in lines) == bool(said)
+    assert said in lines
 
 
 def test_friction_with_a_state_brings_its_sampling_time_unless_the_fault_has_one_for_it(weak, tmp_path):

@@ -27,3 +27,11 @@ def test_shear_waves_that_no_rock_has_are_pointed_out(density, unlikely):
     """833.3 kg/m³ makes 6000 m/s of 30 GPa; a block in a laboratory may be anything."""
     assert ("UNLIKELY for rock" in fault_sentences(replace(REAL, density=density))[1]) is unlikely
     assert "UNLIKELY" not in fault_sentences(load_fault("lab-fault"))[1]
+
+
+@pytest.mark.parametrize(("slowest", "fastest", "side"), [(2e-6, 1.0, "below"), (1e-9, 9e-7, "above"), (1e-6, 1.0, "")])
+def test_a_task_beyond_the_rates_of_its_friction_is_said_to_be_extrapolated(slowest, fastest, side):
+    """The patch slides at 1 µm/s."""
+    law = replace(PATCH.friction, slowest_rate=slowest, fastest_rate=fastest, reference_rate=(slowest * fastest) ** 0.5)
+    told = [line for line in fault_sentences(replace(PATCH, friction=law)) if "extrapolated" in line]
+    assert [f"V = 1e-06 m/s is {side} the rates" in line for line in told] == [True] * bool(side)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Unpack
 
 import numpy as np
 
+from quakedesign.bounds import LowerBound
 from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.guarantee.pump import Pump
@@ -158,9 +159,20 @@ def answer_sliding(
         smaller = _answer(task, held_over, log_rate, around, prove, reach.numbers)
         more = smaller.proved and (not answer.proved or smaller.task.stress > answer.task.stress)
         answer = smaller if more else answer
+    if isinstance(answer.found, NoGuarantee) and not remedy and stress:
+        pumped: dict[str, Any] = {} if pump is None else {"pump": pump}
+        remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, **around, **pumped))
     if isinstance(answer.found, NoGuarantee) and remedy:
         return replace(answer, found=replace(answer.found, reason=f"{answer.found.reason}; {remedy}"))
     return answer
+
+
+def _under_less(answer: SlidingAnswer) -> str:
+    """The stress for which a proof was found that is not for the one that was asked for; empty without one."""
+    if not answer.proved:
+        return ""
+    most = LowerBound(answer.task.stress).quantity("Pa")
+    return f"a proof was found for a stress of at most {most}: leave out --stress"
 
 
 def _remedy(

@@ -13,7 +13,7 @@ from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask, sliding_task
 from quakedesign.fault import Fault
-from quakedesign.fault.defaults import AGEINGS, sliding_step
+from quakedesign.fault.defaults import AGEINGS, beyond_rates, sliding_step
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed.rounding import short
 from quakedesign.synthesis.guaranteed.slow_sliding import LOG_RATES, searched_sliding, two_digits
@@ -162,8 +162,9 @@ def _slower(fault: Fault, task: SlidingTask, reach: Reach, around: Around, prove
     return (
         f"with this path for V = {float(asked.rate):.3g} m/s{_under(proof)}: in [task] target_slip = "
         f"'{fault.reference.target_slip:g} m', operation_time = '{time:g} s', sampling_time = '{float(step):g} s'"
+        f"{f' (but {beyond})' if (beyond := beyond_rates(fault.friction, float(asked.rate))) else ''}"
     )
 
 
 def _under(proof: SlidingGuarantee) -> str:
-    return f" under a stress of at most {float(proof.task.stress):.3g} Pa"
+    return f" under a stress of at most {float(proof.task.stress):.3g} Pa (a law designed for it alone may stand more)"

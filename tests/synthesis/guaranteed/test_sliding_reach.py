@@ -59,6 +59,10 @@ def test_where_a_well_is_too_far_a_slower_task_and_a_nearer_well_are_named():
     # 40 times slower with 5 % spare: 552000 s · 42 = 2.3e7 s, D_c/(20 V) = 6e-5 · 2.3e7/(20 · 0.05) s
     assert "operation_time = '2.3e+07 s', sampling_time = '1300 s'" in said
     assert "for V = 2.17e-09 m/s" in said
+    assert "extrapolated" not in said
+    known = replace(FAULT, friction=replace(GOUGE, slowest_rate=1e-8, reference_rate=1e-8))
+    said = what_would_do(known, TASK, reach, around, proved, spread=Fraction(0))
+    assert "(but V = 2.17e-09 m/s is below the rates for which friction is known" in said
 
     def unproved(task, held, log_rate):
         return NoGuarantee(reason="", small_gain=None)
