@@ -8,7 +8,14 @@ from markupsafe import Markup
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.report.grade import grade
-from quakedesign.report.headlines import domain_sentence, feedforward_rows, guarantee_lines, limit_lines, sentences
+from quakedesign.report.headlines import (
+    beside_guarantee,
+    domain_sentence,
+    feedforward_rows,
+    guarantee_lines,
+    limit_lines,
+    sentences,
+)
 from quakedesign.report.mathml import mathml
 from quakedesign.report.outcomes import run_sentences
 from quakedesign.report.units import unit_html
@@ -88,7 +95,7 @@ def _account(entry: "Entry") -> Account:
         guarantee=[line for line in said if line not in (*limits, *compensated)],
         run=run,
         limits=limits,
-        verdict=[sentence for sentence in sentences(entry) if sentence not in run],
+        verdict=beside_guarantee([sentence for sentence in sentences(entry) if sentence not in run], entry),
         proof=[*compensated, *_stepping(design.controller), *_slowly(entry), *domain],
         law=[mathml(equation) for equation in law_latex(design.controller)],
         gains=_gains(entry),

@@ -68,6 +68,13 @@ def remarks(entry: "Entry") -> list[str]:
     return told[_fitting(told) :]
 
 
+def beside_guarantee(told: Sequence[str], entry: "Entry") -> list[str]:
+    """What is told of a controller, without a reason that its `guarantee_lines` have given."""
+    reason, said = entry.design.details.get("reason"), " ".join(guarantee_lines(entry))
+    given = bool(reason) and str(reason) in said
+    return [line for line in told if not (given and line.endswith(str(reason)))]
+
+
 def _fitting(told: Sequence[str]) -> int:
     """How many sentences, joined, make a headline."""
     lengths = accumulate(len(sentence) + len("; ") for sentence in told)

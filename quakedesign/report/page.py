@@ -1,12 +1,13 @@
 """The report as one HTML page that holds its figures and equations and loads nothing."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
+from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.report.account import ASKED, Account, accounts
 from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.grade import GRADES
@@ -24,7 +25,7 @@ from quakedesign.text import visible
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
-    from quakedesign.studies.comparison import Compared
+    from quakedesign.studies.comparison import Compared, Entry
 
 MODEL_LIMITS = (
     "the model is a block with one degree of freedom: it says nothing of where an earthquake ends, of rupture speed, "
@@ -98,10 +99,18 @@ def answer(comparison: "Compared") -> list[str]:
             f"With a designed controller the slip rate never exceeds {', '.join(proved.values())}: proved, for the "
             f"loop as it runs, {covers}"
         )
-    without = [e.design.title for e in designed if e.design.title not in proved]
-    if without:
-        lines.append(f"No guarantee was found for the designed {', '.join(without)}")
+    for why, titles in _without(e for e in designed if e.design.title not in proved).items():
+        lines.append(f"No guarantee was found for the designed {', '.join(titles)}{f': {why}' if why else ''}")
     return [*lines, *left_out_lines(comparison)]
+
+
+def _without(entries: Iterable["Entry"]) -> dict[str, list[str]]:
+    """Titles of laws without a guarantee, by why there is none; no reason where nothing was asked."""
+    found: dict[str, list[str]] = {}
+    for entry in entries:
+        why = entry.guarantee.reason if isinstance(entry.guarantee, NoGuarantee) else entry.design.details.get("reason")
+        found.setdefault(str(why or ""), []).append(entry.design.title)
+    return found
 
 
 def _natural(comparison: "Compared") -> str:

@@ -9,6 +9,7 @@ from quakedesign.report.comparison import Comparison
 from quakedesign.report.grade import GRADES, grade
 from quakedesign.report.headlines import (
     FEEDFORWARD_COLUMNS,
+    beside_guarantee,
     domain_sentence,
     feedforward_rows,
     guarantee_lines,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True) -> None:
     """What came of it, fault, gains, verdicts with premises, and tables.
 
-    Unless `whole` no premise that holds, no domain, no variant.
+    Unless `whole` no premise that holds, no domain, no variant, and no tables of the one law of slow sliding.
     """
     console.print(comparison.fault.name, style="bold", end=" ")
     console.print(f"({comparison.fault.source})")
@@ -57,7 +58,8 @@ def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True
     shared = [] if whole else list(dict.fromkeys(line for entry in entries for line in _of_task(entry)))
     for line in [""] * bool(shared) + shared:
         console.print(line)
-    _print_tables(comparison, console)
+    if whole or not isinstance(comparison.uncontrolled, StateRun):
+        _print_tables(comparison, console)
 
 
 def _whole(entry: "Entry") -> list[str]:
@@ -65,8 +67,7 @@ def _whole(entry: "Entry") -> list[str]:
     others = [premise for premise in entry.design.premises if premise not in entry.design.conditions]
     return [
         *guarantee_lines(entry),
-        headline(entry),
-        *remarks(entry),
+        *_seen(entry),
         _gains(entry),
         *map(_line, entry.design.conditions),
         *(["of the certificate of its base gains, in continuous time:"] if others else []),
@@ -80,7 +81,11 @@ def _brief(entry: "Entry") -> list[str]:
     said = entry.answer and entry.answer.compensation and entry.answer.compensation.sentence()
     guaranteed = [line for line in guarantee_lines(entry) if line != said and line not in _of_task(entry)]
     failing = [_line(premise) for premise in entry.design.conditions if not premise.holds]
-    return [*guaranteed, headline(entry), *remarks(entry), _gains(entry), *failing]
+    return [*guaranteed, *_seen(entry), _gains(entry), *failing]
+
+
+def _seen(entry: "Entry") -> list[str]:
+    return beside_guarantee([headline(entry), *remarks(entry)], entry)
 
 
 def _of_task(entry: "Entry") -> list[str]:

@@ -13,12 +13,15 @@ import pytest
 from rich.console import Console
 
 from quakedesign import compare
+from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError, SimulationError, UnsupportedError
 from quakedesign.fault import load_fault
+from quakedesign.report.account import accounts
 from quakedesign.report.folder import write_folder
 from quakedesign.report.headlines import part_of_task, sentences
+from quakedesign.report.page import answer
 from quakedesign.report.state_figures import cycle, slow_sliding
 from quakedesign.report.state_runs import cycle_sentence, state_run_lines
 from quakedesign.report.terminal import print_comparison
@@ -90,6 +93,24 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     name, outcome, *_ = told.getvalue().splitlines()
     assert name.startswith("crustal-patch (")
     assert outcome == "  e-LQR (designed): guaranteed: slip rate <= 1.2e-06 m/s, slip error <= 8.33e-05 m"
+
+
+def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(comparison, monkeypatch):
+    why = "no law held over 300 s was found whose loop is stable; a proof was found for a stress of at most 7 kPa"
+    guarantee = comparison.entries[0].guarantee
+    none = SlidingAnswer(found=NoGuarantee(reason=why, small_gain=None), task=guarantee.task, held=None)
+    monkeypatch.setattr(state_feedback, "answer_sliding", lambda fault, **asked: none)
+    monkeypatch.setattr(compared_in, "natural_run", lambda fault: comparison.uncontrolled)
+    without, told = compare(SHORT, [design(SHORT, "elqr")]), io.StringIO()
+    assert accounts(without)[0].verdict == ["undecided"]
+    assert accounts(without)[0].guarantee == [f"guarantee: none: {why}"]
+    for whole in (False, True):
+        print_comparison(without, Console(file=told, width=200), whole=whole)
+        assert told.getvalue().count("whose loop is stable") == 1 + whole
+        assert ("closed loop" in told.getvalue()) == whole  # one law alone needs no table
+    (first, second, *_) = answer(without)
+    assert first.startswith("Without control")
+    assert second == f"No guarantee was found for the designed e-LQR: {why}"
 
 
 def test_the_report_is_the_one_of_all_faults(folder):
