@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from itertools import pairwise
 from math import ceil
 
@@ -13,6 +14,7 @@ from guarantee_reading import Refused, Row, need
 
 DOUBLINGS = 12  # at most 4096 periods are summed
 SHARE = 1024  # what is left of the past after those is below a 1024th, but for what the slowest mode leaves
+IN_COLUMNS = 6  # doublings of columns, after which rows are doubled
 TURNS, ROOM = 8, 1 << 40  # of sums that are solved for to bound themselves
 MAX_WORK = 3 * 10**7  # products of integers
 MAX_SUMS = 10**8  # the same of all periods before, the package's limit twice
@@ -152,18 +154,20 @@ def near_pieces(flow: Flow, here: Near, later: Fixed | None) -> Fixed:
 
 @dataclass
 class Past:
-    """All periods before: columns of many of them, and what bounds the rest."""
+    """All periods before: columns of some, which stand for others after each of the maps, and what bounds the rest."""
 
     columns: Fixed
     far: Fixed
     left: Fixed
+    maps: tuple[Fixed, ...] = ()
 
     def of(self, rows: Fixed) -> list[int]:
         """Bounds of the integrals for every row; equal rows are done once."""
         once = list(dict.fromkeys(map(tuple, rows.rows)))
         different = Fixed([list(line) for line in once], rows.error)
         rest = ((different * self.far).size() * self.left).size()
-        sums = zip(sums_of_product(different, self.columns), rest.rows, strict=True)
+        ahead = stacked(different, self.maps)
+        sums = zip(folded(sums_of_product(ahead, self.columns), len(once)), rest.rows, strict=True)
         found = dict(zip(once, (near + far for near, (far,) in sums), strict=True))
         return [found[tuple(line)] for line in rows.rows]
 
@@ -176,21 +180,48 @@ def past(flows: list[Flow], rows: int) -> Past:
         columns, period = columns.beside(pieces(flow, period)), period * flow.whole
     size = len(period.rows)
     place, seen, back = seen_alone(slowest(period), columns.sums())
-    sums = sums_of_product(seen, columns)
-    for _ in range(DOUBLINGS):
+    sums, rows_so_far, maps = sums_of_product(seen, columns), seen, tuple[Fixed, ...]()
+    for doubling in range(DOUBLINGS):
         width = len(columns.rows[0])
-        need(2 * width * size * (size + rows) <= MAX_SUMS, "the loop must forget its past sooner: it takes too long")
-        following = period * columns
-        sums = [a + b for a, b in zip(sums, sums_of_product(seen, following), strict=True)]
-        columns, period = columns.beside(following), period * period
+        work = 2 * (width << len(maps)) * size * (size + rows)
+        need(work <= MAX_SUMS, "the loop must forget its past sooner: it takes too long")
+        if doubling < IN_COLUMNS:
+            following = period * columns
+            columns, more = columns.beside(following), sums_of_product(seen, following)
+        else:
+            following = rows_so_far * period
+            more = folded(sums_of_product(following, columns), size)
+            rows_so_far, maps = rows_so_far.above(following), (*maps, period)
+        sums, period = [a + b for a, b in zip(sums, more, strict=True)], squared(period)
         far = period * back
         left = (seen * far).size()
         quick = Fixed([[v * (j != place)] for j, v in enumerate(sums)])
         if all(v * SHARE <= total for (v,), total in zip((left * quick).rows, sums, strict=True)):
-            return Past(columns, far, whole_sums(left, sums, place))
+            return Past(columns, far, whole_sums(left, sums, place), maps)
     raise Refused(f"the nominal loop must be stable, and seen to be within {2**DOUBLINGS} periods")
 
 
+@lru_cache(maxsize=16)  # all inputs of a loop ask for the same ones
+def stacked(rows: Fixed, maps: tuple[Fixed, ...]) -> Fixed:
+    """Rows as they are and after each of the maps, above those after two of them, and so on."""
+    if not maps:
+        return rows
+    fewer = stacked(rows, maps[:-1])
+    return fewer.above(fewer * maps[-1])
+
+
+@lru_cache(maxsize=64)
+def squared(period: Fixed) -> Fixed:
+    """Twice as many periods."""
+    return period * period
+
+
+def folded(sums: list[int], count: int) -> list[int]:
+    """Sums of so many rows, of those that were stacked after one another."""
+    return [sum(sums[i::count]) for i in range(count)]
+
+
+@lru_cache(maxsize=4)
 def slowest(period: Fixed) -> list[int]:
     """What the slowest mode is seen along, if there is one: a row of what is left of all states after long, in size.
 

@@ -1,6 +1,6 @@
 """L1 norms: bounds of every output for an input of size 1, from upper sums of impulse responses."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
@@ -13,6 +13,7 @@ from guarantee_pulse import Near, Pulse
 from guarantee_reading import Refused, Row
 
 STRETCHES, PARTS = 128, 6  # of time without samples, each of 2^PARTS pieces
+Sums = list[int]  # one for every output, in units of 2^-BITS
 LATE = 1 << 12  # what is left of the past after those is below a 4096th
 
 
@@ -38,75 +39,77 @@ def gains(
         units = Fixed([[v] for v in earlier[-size:]])
         news = list(since_event(flow, start))
         for i, h in enumerate(flow.pieces):
-            bent = (((phases[i] * square).size() * flow.nears[i]).size() * units).sums()
+            bent = times((((phases[i] * square).size() * flow.nears[i]).size() * units).sums(), h**2 / 8)
             for k in range(many):
                 first, last, more = (part[k] for part in news[i])
                 larger = max(earlier[many * i + k] + first, earlier[many * (i + 1) + k] + last)
-                found[k].append((larger + more + bent[k] * h**2 / 8) / (1 << BITS))
+                found[k].append(Fraction(larger + more + bent[k], 1 << BITS))
     return found
 
 
-def since_event(flow: Flow, outputs: Fixed) -> Iterator[tuple[Row, Row, Row]]:
+def since_event(flow: Flow, outputs: Fixed) -> Iterator[tuple[Sums, Sums, Sums]]:
     """What came since the event, in every piece: bounds at both ends, and of what may lie above both of them."""
     if flow.near:
         yield from near_event(flow, flow.near, outputs)
         return
     ends, size = flow.ends(), outputs.size()
-    heights = [sums_of(outputs * end) for end in ends]
-    total = [Fraction(0)] * len(size.rows)
+    heights = [(outputs * end).sums() for end in ends]
+    total = [0] * len(size.rows)
     for i, h in enumerate(flow.pieces):
-        bend, slope = sums_of(size * flow.bend(ends[i], i)), sums_of(size * flow.slope(ends[i], i))
+        bend, slope = (size * flow.bend(ends[i], i)).sums(), (size * flow.slope(ends[i], i)).sums()
         if flow.sudden:
-            yield heights[i], heights[i + 1], [v * h**2 / 8 for v in bend]
+            yield heights[i], heights[i + 1], times(bend, h**2 / 8)
         elif flow.masses:
             yield faded(flow, outputs, i)
         else:
-            parts = zip(total, heights[i], heights[i + 1], bend, strict=True)
-            following = [v + (a + b) * h / 2 + c * h**3 / 12 for v, a, b, c in parts]
-            yield total, following, [v * h**2 / 8 for v in slope]
+            following = plus(total, times(plus(heights[i], heights[i + 1]), h / 2), times(bend, h**3 / 12))
+            yield total, following, times(slope, h**2 / 8)
             total = following
 
 
-def faded(flow: Flow, outputs: Fixed, i: int) -> tuple[Row, Row, Row]:
+def faded(flow: Flow, outputs: Fixed, i: int) -> tuple[Sums, Sums, Sums]:
     """The same of what fades: pieces that have passed, and all that the present one may bring."""
     size, chord = outputs.size(), flow.pieces[i] ** 2 / 8
-    first, last = [Fraction(0)] * len(size.rows), [Fraction(0)] * len(size.rows)
-    ends = [sums_of(outputs * now) for now in (flow.entry, flow.steps[i] * flow.entry)]
-    bent = sums_of(size * flow.bend(flow.entry, i))
-    more = [flow.masses[i][0] * (max(a, b) + c * chord) for a, b, c in zip(*ends, bent, strict=True)]
+    first = last = [0] * len(size.rows)
+    ends = [(outputs * now).sums() for now in (flow.entry, flow.steps[i] * flow.entry)]
+    bent = (size * flow.bend(flow.entry, i)).sums()
+    more = times(plus(map(max, *ends), times(bent, chord)), flow.masses[i][0])
     for p, (heavy, moment) in enumerate(flow.masses[:i]):
         now, later = flow.ends(p)[i - p], flow.ends(p + 1)[i - p - 1]
-        slope = sums_of(size * (flow.nears[p] * flow.slope(later, i)).size())
-        bent = sums_of(size * flow.bend(now, i))
-        here, there = sums_of(outputs * now), sums_of(outputs * (flow.steps[i] * now))
-        first = [v + heavy * a for v, a in zip(first, here, strict=True)]
-        last = [v + heavy * a for v, a in zip(last, there, strict=True)]
-        more = [v + heavy * a * chord + moment * b for v, a, b in zip(more, bent, slope, strict=True)]
+        slope = (size * (flow.nears[p] * flow.slope(later, i)).size()).sums()
+        bent = (size * flow.bend(now, i)).sums()
+        first = plus(first, times((outputs * now).sums(), heavy))
+        last = plus(last, times((outputs * (flow.steps[i] * now)).sums(), heavy))
+        more = plus(more, times(bent, heavy * chord), times(slope, moment))
     return first, last, more
 
 
-def near_event(flow: Flow, here: Near, outputs: Fixed) -> Iterator[tuple[Row, Row, Row]]:
+def near_event(flow: Flow, here: Near, outputs: Fixed) -> Iterator[tuple[Sums, Sums, Sums]]:
     """The same of a pulse: the larger of both its sides, and what is there before the next event already."""
-    none, left, phase = [Fraction(0)] * len(outputs.rows), sum(flow.pieces), outputs
+    none, left, phase = [0] * len(outputs.rows), sum(flow.pieces), outputs
     square = flow.generator * flow.generator
     for step, h, within in zip(flow.steps, flow.pieces, flow.nears, strict=True):
         first, last, more, left = none, none, none, left - h
         following, bends = phase * step, ((phase * square).size() * within).size()
         for side, off in here.sides:
-            bent, far = sums_of(bends * side.size()), sums_of((phase.size() * within).size() * off)
-            first = list(map(max, first, sums_of(phase * side)))
-            last = list(map(max, last, sums_of(following * side)))
-            more = [max(v, b * h**2 / 8 + f) for v, b, f in zip(more, bent, far, strict=True)]
+            bent, far = (bends * side.size()).sums(), ((phase.size() * within).size() * off).sums()
+            first = list(map(max, first, (phase * side).sums()))
+            last = list(map(max, last, (following * side).sums()))
+            more = list(map(max, more, plus(times(bent, h**2 / 8), far)))
         phase = following
         if here.ahead and here.soon and left < here.reach:
-            there = zip(more, sums_of(outputs * here.ahead), sums_of(outputs.size() * here.soon), strict=True)
-            more = [sum(values, Fraction(0)) for values in there]
+            more = plus(more, (outputs * here.ahead).sums(), (outputs.size() * here.soon).sums())
         yield first, last, more
 
 
-def sums_of(values: Fixed) -> Row:
-    """Upper bounds of one column."""
-    return [Fraction(v) for v in values.sums()]
+def times(sums: Sums, factor: Fraction) -> Sums:
+    """Times a number that is not negative, rounded up."""
+    return [-(-v * factor.numerator // factor.denominator) for v in sums]
+
+
+def plus(*sums: Iterable[int]) -> Sums:
+    """Entry by entry."""
+    return list(map(sum, zip(*sums, strict=True)))
 
 
 def flow_gains(loop: Loop, entry: Row) -> Row:

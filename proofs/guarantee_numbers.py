@@ -1,11 +1,11 @@
 """Matrices of integers in units of 2^-BITS, each with a bound of its error, and their exponentials."""
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from itertools import chain, count
+from itertools import chain, compress, count
 from math import factorial, lcm
 
 from guarantee_reading import Row, need
@@ -32,9 +32,18 @@ class Fixed:
     rows: list[list[int]]
     error: int = 0
 
+    def __hash__(self) -> int:  # rows are never changed
+        return hash((*map(tuple, self.rows), self.error))
+
     def __mul__(self, other: "Fixed") -> "Fixed":
         columns = list(zip(*other.rows, strict=True))
-        rows = [[sum(map(int.__mul__, line, column)) >> BITS for column in columns] for line in self.rows]
+        if len(columns) >= MANY:
+            exact = long_product(self.rows, other.rows)
+        elif len(self.rows) >= MANY and columns:
+            exact = zip(*long_product(columns, zip(*self.rows, strict=True)), strict=True)
+        else:
+            exact = (combined(line, other.rows, columns) for line in self.rows)
+        rows = [[v >> BITS for v in line] for line in exact]
         widest = max(sum(map(abs, line)) for line in self.rows) + self.error * len(self.rows[0])
         tallest = max((sum(map(abs, column)) for column in columns), default=0)
         return bounded(Fixed(rows, (widest * other.error + tallest * self.error >> BITS) + 2))
@@ -66,6 +75,29 @@ class Fixed:
     def sums(self) -> list[int]:
         """Upper bounds of the sums of absolute values, row by row."""
         return [sum(map(abs, line)) + self.error * len(line) for line in self.rows]
+
+
+def combined(line: list[int], rows: list[list[int]], columns: list[tuple[int, ...]]) -> list[int]:
+    """A row times a matrix; most entries of a flow are 0."""
+    few = list(filter(None, line))
+    if 2 * len(few) > len(line):
+        return [sum(map(int.__mul__, line, column)) for column in columns]
+    picked = zip(*compress(rows, line), strict=True) if few else [()] * len(columns)
+    return [sum(map(int.__mul__, few, entries)) for entries in picked]
+
+
+def long_product(left: Iterable[Sequence[int]], right: Iterable[Sequence[int]]) -> list[list[int]]:
+    """The same of all rows: many columns at once, side by side in one long integer in places of whole bytes."""
+    left, right = list(left), list(right)
+    count, bits = len(right[0]), [max(max(map(abs, line)) for line in m).bit_length() for m in (left, right)]
+    width = (sum(bits) + len(right).bit_length()) // 8 + 1
+    half = 1 << 8 * width - 1
+    offset = int.from_bytes(half.to_bytes(width, "little") * count, "little")
+    shifted = (b"".join([(v + half).to_bytes(width, "little") for v in line]) for line in right)
+    places = [int.from_bytes(line, "little") - offset for line in shifted]
+    found = [(sum(map(int.__mul__, line, places)) + offset).to_bytes(width * count, "little") for line in left]
+    starts = range(0, width * count, width)
+    return [[int.from_bytes(line[i : i + width], "little") - half for i in starts] for line in found]
 
 
 def sums_of_product(left: Fixed, right: Fixed) -> list[int]:

@@ -110,9 +110,10 @@ def test_the_tail_of_the_past_is_the_rest_of_a_geometric_series(share, time, sud
 
 
 @pytest.mark.parametrize("sudden", [False, True])
-def test_a_slow_mode_that_several_states_see_counts_as_it_is(sudden):
-    """Beside a state that is reset: q = 1 − 2⁻¹⁵ and r = 1/3, seen by (1, 2) and (1, 1), make qᵏ + rᵏ of the entry."""
-    q, r = 1 - F(1, 2**15), F(1, 3)
+@pytest.mark.parametrize("quick", ["1/3", "49/50"])  # the second is gone after 512 periods
+def test_a_slow_mode_that_several_states_see_counts_as_it_is(quick, sudden):
+    """Beside a state that is reset: q = 1 − 2⁻¹⁵ and r, seen by (1, 2) and (1, 1), make qᵏ + rᵏ of the entry."""
+    q, r = 1 - F(1, 2**15), F(quick)
     jump = [[0, 0, 0], [0, 2 * r - q, 2 * r - 2 * q], [0, q - r, 2 * q - r]]
     found = gains_of_both([[0] * 3] * 3, [jump], [8], [1, 1, 0], [0, 2, 3], sudden=sudden)
     earlier = q / (1 - q) + r / (1 - r)
@@ -742,3 +743,24 @@ def test_columns_that_nothing_is_in_add_nothing():
     many = checker.Fixed([[0] * 99 for _ in range(3)])
     assert checker.sums_of_product(checker.Fixed([[1 << 192] * 3]), many) == [99 * 2]
     assert checker.sums_of_product(checker.Fixed([[0] * 3]), checker.Fixed([[1 << 192] * 99] * 3))[0] < 1 << 20
+
+
+@pytest.mark.parametrize("shape", [(3, 20, 64), (64, 20, 3), (70, 3, 70), (3, 1, 65)])
+@pytest.mark.parametrize("bits", [(192, 192), (3, 190), (190, 0), (0, 0)])
+def test_products_of_many_columns_and_of_many_rows_are_those_of_integers(bits, shape):
+    random, (height, inner, width) = Random(1), shape
+    left, right = entries(random, height, inner, bits[0]), entries(random, inner, width, bits[1])
+    columns = list(zip(*right, strict=True))
+    exact = [[sum(map(int.__mul__, line, column)) for column in columns] for line in left]
+    assert checker.long_product(left, right) == exact
+    found = checker.Fixed(left, 5) * checker.Fixed(right, 7)
+    assert found.rows == [[v >> checker.BITS for v in line] for line in exact]
+
+
+def test_places_of_a_long_integer_hold_the_largest_sums():
+    left, right = [[(1 << 190) - 1] * 20], [[(1 << 193) - 1, 1 - (1 << 193)]] * 20
+    assert checker.long_product(left, right) == [[20 * left[0][0] * v for v in right[0]]]
+
+
+def test_bounds_are_rounded_up_to_whole_units():
+    assert checker.times([10, 9, 0], F(1, 3)) == [4, 3, 0]
