@@ -8,6 +8,7 @@ CAPTIONS = {
     "slow-sliding": "Held in slow sliding under the stress that the guarantee allows, as a sine: slip and its "
     "reference, slip rate with what it never exceeds, fluid pressure in the fault, and state of friction over that of "
     "steady sliding.",
+    "sliding-errors": "How far slip and slip rate are from their references in that run.",
     "states": "Closed loop: slip and its reference on top, then the band that the slip rate of every law fills. The "
     "scale is linear near the reference rate and logarithmic beyond; dashed: the peak of the natural earthquake.",
     "pressure": "Fluid pressure that every law asks for; below zero fluid is withdrawn.",

@@ -21,7 +21,7 @@ PALE = 0.45
 _NOTE = 115  # of the smallest letters in a line of the width of a figure
 _LINE = 0.125  # height of a line of the smallest letters [in]
 _PALETTE = ("#0072B2", "#009E73", "#D55E00", "#E69F00", "#56B4E9", "#777777")
-_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 _YEAR = 31_557_600.0
 _TIMES = ((2 * _YEAR, _YEAR, "years"), (2 * 3600.0, 3600.0, "h"), (10 * 60.0, 60.0, "min"), (0.0, 1.0, "s"))
 

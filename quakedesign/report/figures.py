@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 def figures(comparison: "Compared") -> dict[str, Any]:
     """Figures by name: ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``; others with a state."""
     if isinstance(comparison.uncontrolled, StateRun):
-        slowly = {"errors": errors(comparison)} if runs_of(comparison.entries) else {}
-        return state_figures(comparison, comparison.uncontrolled) | slowly
+        return state_figures(comparison, comparison.uncontrolled)
     drawn = {"uncontrolled": uncontrolled(comparison)}
     if runs_of(comparison.entries):
         drawn |= {

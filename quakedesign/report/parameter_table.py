@@ -26,13 +26,16 @@ HEADINGS = ("parameter", "symbol", "value", "unit", "where")
 
 
 def parameter_rows(fault: Fault) -> list[Row]:
-    """One row a parameter under `HEADINGS`: those of the fault file, its uncertainty, and what follows from them."""
+    """One row a parameter under `HEADINGS`: those of the fault file, its uncertainty, and what follows from them.
+
+    No disturbance of friction with a state: what pushes such a fault is the stress of its guarantee.
+    """
     rows = [
         *_told(fault, PLANT, "fault"),
         *_told(fault.friction, fault.friction.quantities(), "friction"),
         *_told(fault.reference, [name for name in TASK if name != _STEP], "task"),
         *_told(fault, [_STEP], "task"),
-        *_told(fault.disturbance, DISTURBANCE, "disturbance"),
+        *([] if fault.friction.state_names else _told(fault.disturbance, DISTURBANCE, "disturbance")),
     ]
     rows += [_row(f"half-width of {name}", float(getattr(fault.box, name)), "", "uncertainty", "±") for name in WIDTHS]
     rows += [_row(name, getattr(fault, name), unit, "follows", symbol) for name, (symbol, unit) in _DERIVED.items()]

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quakedesign.report.drawing import NATURAL, SMALL, band, clock, colour, figure, finish, known, length, scaled
+from quakedesign.report.drawing import NATURAL, band, clock, colour, figure, finish, known, length, scaled
 from quakedesign.simulation.slow_sliding import SlidingRun
 
 if TYPE_CHECKING:
@@ -16,10 +16,10 @@ _PER_BAND = 16  # instants at least, four periods
 
 
 def state_figures(comparison: "Compared", natural: "StateRun") -> dict[str, Any]:
-    """``cycle``, and ``slow-sliding`` of the first law that ran."""
+    """``cycle``, and ``slow-sliding`` and ``sliding-errors`` of the first law that ran."""
     held = next(((e, e.run) for e in comparison.entries if isinstance(e.run, SlidingRun)), None)
     drawn = {"cycle": cycle(comparison, natural)}
-    return drawn if held is None else drawn | {"slow-sliding": slow_sliding(*held)}
+    return drawn if held is None else drawn | {"slow-sliding": slow_sliding(*held), "sliding-errors": errors(*held)}
 
 
 def cycle(comparison: "Compared", natural: "StateRun") -> Any:
@@ -34,9 +34,9 @@ def cycle(comparison: "Compared", natural: "StateRun") -> Any:
     rate.axhline(natural.loading_rate, color="grey", linestyle=":", label="loading rate")
     rate.set_ylabel("slip rate [m/s]")
     rate.set_xlabel(f"time [{passing}]")
-    rate.legend(loc="upper right", fontsize=SMALL)
-    made = f"method {run.provenance['method']}, tolerance {run.provenance['rtol']:g}, with inertia"
-    return finish(drawing, f"{name} without control", [], made)
+    moved = "with inertia" if natural.provenance["plant"] == "smooth" else natural.provenance["plant"]
+    made = f"method {run.provenance['method']}, tolerance {run.provenance['rtol']:g}, {moved}"
+    return finish(drawing, f"{name} without control", [], made, legend=rate)
 
 
 def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
@@ -49,27 +49,38 @@ def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
     slip.plot(time, run.slip / size, color=shade, linewidth=2.5)
     slip.plot(time, known(run.reference) / size, color="black", linestyle=":", linewidth=1, label="reference")
     slip.set_ylabel(f"slip [{name}]")
-    slip.legend(loc="lower right", fontsize=SMALL)
-    rate.set_yscale("log")
-    _filled(rate, time, run.slip_rate, shade)
-    rate.plot(time, speed, color="black", linestyle=":", linewidth=1, label="reference")
+    first = float(speed[0])
+    _filled(rate, time, run.slip_rate / first, shade)
+    rate.plot(time, speed / first, color="black", linestyle=":", linewidth=1, label="reference")
     if entry.guaranteed is not None:
-        rate.axhline(
-            float(entry.guaranteed.peak_slip_rate), color="black", linestyle="--", label="never exceeded, proved"
-        )
-    rate.set_ylabel("slip rate [m/s]")
-    rate.legend(loc="center right", fontsize=SMALL)
+        never = float(entry.guaranteed.peak_slip_rate) / first
+        rate.axhline(never, color="black", linestyle="--", label="never exceeded, proved")
+    rate.set_ylabel("slip rate / V [-]")
     largest, pascal = scaled(float(np.abs(run.pressure).max()) or 1.0, "Pa")
     _filled(pressure, time, run.pressure / largest, shade)
     pressure.set_ylabel(f"pressure [{pascal}]")
-    (steady,) = map(float, fault.friction.steady_state(float(speed[0])))
+    (steady,) = map(float, fault.friction.steady_state(first))
     _filled(state, time, run.theta / steady, shade)
     state.set_ylabel("state / steady [-]")
     state.set_ylim(min(state.get_ylim()[0], 0.99), max(state.get_ylim()[1], 1.01))
     state.set_xlabel(f"time [{unit}]")
     shaken = f"shear stress up to {float(np.abs(run.stress).max()) / 1e3:.3g} kPa"
-    note = f"bands between the extremes of {_width(run.time)} instants; {shaken}"
-    return finish(drawing, f"{fault.name} held in slow sliding", [run], note)
+    note = f"V = {first:.4g} m/s; bands between the extremes of {_width(run.time)} instants; {shaken}"
+    return finish(drawing, f"{fault.name} held in slow sliding", [run], note, legend=rate)
+
+
+def errors(entry: "Entry", run: SlidingRun) -> Any:
+    """Slip and slip rate less their references."""
+    drawing, axes = figure(2, 3.6)
+    divisor, unit = clock(float(run.time[-1]))
+    shown = ((known(run.slip_error), "m", "slip error"), (known(run.slip_rate_error), "m/s", "slip-rate error"))
+    for (axis,), (values, si, name) in zip(axes, shown, strict=True):
+        size, scale = scaled(float(np.abs(values).max()) or 1.0, si)
+        _filled(axis, run.time / divisor, values / size, colour(entry.design.name))
+        axis.set_ylabel(f"{name} [{scale}]")
+    axes[1, 0].set_xlabel(f"time [{unit}]")
+    note = f"bands between the extremes of {_width(run.time)} instants"
+    return finish(drawing, f"{entry.design.fault.name}: tracking errors", [run], note)
 
 
 def _filled(axis: Any, time: "np.ndarray", values: "np.ndarray", shade: str) -> None:

@@ -22,7 +22,8 @@ from quakedesign.report.account import accounts
 from quakedesign.report.folder import write_folder
 from quakedesign.report.headlines import part_of_task, sentences
 from quakedesign.report.page import answer
-from quakedesign.report.state_figures import cycle, slow_sliding
+from quakedesign.report.parameter_table import parameter_rows
+from quakedesign.report.state_figures import cycle, errors, slow_sliding
 from quakedesign.report.state_runs import cycle_sentence, state_run_lines
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
@@ -81,7 +82,7 @@ def test_the_folder_holds_the_certificate_the_figures_and_the_keys_of_all_design
     assert parse_guarantee((folder / elqr["certificate"]).read_text()).claims == comparison.entries[0].guarantee.claims
     assert found["uncontrolled"]["cycle"] == {"recurrence_interval": None, "slip": None, "magnitude": None}
     assert set(found["not_applicable"]) == {"cta", "dia"}
-    assert {path.stem for path in (folder / "figures").iterdir()} == {"cycle", "slow-sliding", "errors"}
+    assert {path.stem for path in (folder / "figures").iterdir()} == {"cycle", "slow-sliding", "sliding-errors"}
     page = (folder / "report.html").read_text()
     assert "state of rate-and-state friction, the age of contacts" in page
     assert "signed power" not in page  # of sliding modes, which such faults have not
@@ -200,9 +201,11 @@ def test_one_command_takes_a_preset_from_file_to_a_guaranteed_controller(preset,
 def test_a_cycle_is_drawn_in_a_unit_that_suits_it(last, unit):
     time = np.linspace(0, last, 5)
     run = SimpleNamespace(time=time, slip=time / last, slip_rate=1 + time, provenance={"method": "radau", "rtol": 1e-8})
-    drawn = cycle(
-        SimpleNamespace(fault=SimpleNamespace(name="own")), SimpleNamespace(trajectory=run, loading_rate=1e-6)
-    )
+    moved = {"min": "smooth", "s": "quasi-dynamic", "years": "smooth"}[unit]
+    natural = SimpleNamespace(trajectory=run, loading_rate=1e-6, provenance={"plant": moved})
+    drawn = cycle(SimpleNamespace(fault=SimpleNamespace(name="own")), natural)
+    assert drawn.texts[-1].get_text().endswith({"smooth": "with inertia", "quasi-dynamic": "quasi-dynamic"}[moved])
+    assert not any(axis.get_legend() for axis in drawn.axes)  # it would hide events
     assert drawn.axes[1].get_xlabel() == f"time [{unit}]"
     assert drawn.axes[0].lines[0].get_xdata()[-1] == pytest.approx(
         last / {"min": 60, "s": 1, "years": 31_557_600}[unit]
@@ -244,6 +247,25 @@ def test_a_locked_fault_whose_run_ends_before_its_event_is_not_said_to_creep_for
     answer |= {"start": {"slip_rate": 1e-12, "state": {"state": 1e6}}, "pressure": [0.0, 0.0], "resting": False}
     answer |= {"cycle": {"recurrence_interval": None, "slip": None}, "energy": {"relative_residual": 0.0}}
     assert any("does not creep for good" in line for line in state_run_lines(answer)) == locked
+
+
+def test_figures_of_slow_sliding_show_rates_over_the_reference_and_errors_with_their_sign(comparison):
+    (entry,) = comparison.entries
+    rate = slow_sliding(entry, entry.run).axes[1]
+    assert (rate.get_yscale(), rate.get_ylabel()) == ("linear", "slip rate / V [-]")
+    (never,) = (line.get_ydata()[0] for line in rate.lines if line.get_label() == "never exceeded, proved")
+    assert never == pytest.approx(float(entry.guaranteed.peak_slip_rate) / 1e-6)
+    slip, speed = errors(entry, entry.run).axes
+    assert (slip.get_yscale(), slip.get_ylabel(), speed.get_ylabel()) == (
+        "linear",
+        "slip error [µm]",
+        "slip-rate error [nm/s]",
+    )
+    seen = slip.collections[0].get_paths()[0].vertices[:, 1]
+    assert seen.min() == pytest.approx(1e6 * entry.run.slip_error.min())
+    assert seen.max() == pytest.approx(1e6 * entry.run.slip_error.max())
+    assert seen.min() < 0 < seen.max()
+    assert not [row for row in parameter_rows(SHORT) if row[-1] == "disturbance"]
 
 
 def test_of_a_slow_task_the_beginning_is_run_and_the_report_says_so(comparison, monkeypatch):
