@@ -1,10 +1,11 @@
 """Elementary functions of plain arithmetic: the same digits in every lane, on every processor, with any C library.
 
 Each is a straight line of sums, products, quotients, comparisons and choices, which IEEE 754 rounds in one way only, on
-exact powers of two (`two_to`) and exact parts of floats (`exponent_and_mantissa`). They are stated once, as CasADi
-expressions; `quakedesign.simulation.instructions` puts them into functions, `quakedesign.simulation.portable_c` into C.
-Errors are below one unit in the last place, those of powers (exponents up to 2) below one and a half, of the hyperbolic
-tangent below two. Zeros have no sign.
+exact powers of two (`two_to`) and exact parts of floats (`exponent_and_mantissa`, `near_cube_root`). They are stated
+once, as CasADi expressions; `quakedesign.simulation.instructions` puts them into functions,
+`quakedesign.simulation.portable_c` into C.
+Errors are below one unit in the last place, those of cube roots below 0.65, of other powers (exponents up to 2) below
+one and a half, of the hyperbolic tangent below two. Zeros have no sign. The power ⅓ of floats is the cube root.
 """
 
 import math
@@ -19,6 +20,7 @@ import casadi as ca
 _ROUNDER = 1.5 * 2.0**52  # sums with it have no digits behind the point
 _SPLITTER = 2.0**27 + 1
 _LEAST = 2.0**-1022  # with 53 digits
+THIRD = 1 / 3  # next to it
 _ROOT = float.fromhex("0x1.6a09e667f3bcdp+0")  # of 2
 _LN2 = Fraction(0xB17217F7D1CF79ABC9E3B39803F2F6AF40F343267298B62D8A0D175B8BAAFA2B, 2**256)  # of 77 digits
 _HALF_PI = Fraction(0x1921FB54442D18469898CC51701B839A252049C1114CF98E804177D4C76273644, 2**256)
@@ -31,7 +33,8 @@ _in_bits = ContextVar("in_bits", default=False)
 def verbatim(*, bits: bool = False) -> Iterator[None]:
     """While it lasts, CasADi keeps expressions as they are written: (x + y) − x stays, since it is not y.
 
-    With `bits`, expressions are for C, where `exponent_and_mantissa` looks at the bits: it is log and log1p then.
+    With `bits`, expressions are for C, where `exponent_and_mantissa` and `near_cube_root` look at the bits: they are
+    log, log1p and sinh then.
     """
     before, token = ca.GlobalOptions.getSimplificationOnTheFly(), _in_bits.set(bits)
     ca.GlobalOptions.setSimplificationOnTheFly(False)
@@ -79,6 +82,14 @@ _EXP = _economised([Fraction(1, math.factorial(n)) for n in range(2, 18)], -_R, 
 _SIN = _economised([Fraction((-1) ** n, math.factorial(2 * n + 1)) for n in range(1, 12)], Fraction(0), _Z, 7)
 _COS = _economised([Fraction((-1) ** n, math.factorial(2 * n)) for n in range(2, 12)], Fraction(0), _Z, 6)
 _ATANH = _economised([Fraction(2, 2 * n + 1) for n in range(1, 16)], Fraction(0), _S, 7)
+_LEFT = Fraction(955, 10000)  # of a number beside the cube of what is near its cube root
+_ROOT_BITS = 44693264  # two thirds of 1023·2¹⁶, less what makes `_LEFT` least
+_CUBE_ROOT = _economised(
+    [Fraction(math.prod(3 * k + 1 for k in range(n)), math.factorial(n) * 3**n) for n in range(1, 40)],
+    -_LEFT,
+    _LEFT,
+    12,
+)
 
 
 def two_to(exponent: Any) -> Any:
@@ -201,16 +212,47 @@ def _at_the_ends(x: Any, value: Any, at_zero: float, at_infinity: float) -> Any:
 
 
 def power(x: Any, a: Any) -> Any:
-    """x^a; for negative x no number unless a is whole."""
+    """x^a, the cube root where a is the float next to ⅓; for negative x no number unless a is whole."""
     if not a.is_constant():
-        return _any_power(x, a)
+        return choice(a == THIRD, cube_root(x), any_power(x, a))
     if float(a) == round(float(a)):
         return choice(x < 0, (-1.0) ** (float(a) % 2) * _power(-x, a), _power(x, a)) if a else ca.SX(1.0)
-    return _power(x, a)
+    return cube_root(x) if float(a) == THIRD else _power(x, a)
 
 
-def _any_power(x: Any, a: Any) -> Any:
-    """Power with an exponent that is not known yet."""
+def near_cube_root(x: Any) -> Any:
+    """A number of 17 bits whose cube is within a tenth of x, from 2⁻¹⁰²² on.
+
+    The leading bits of a float, its exponent and 16 of its fraction as one whole number, are nearly its logarithm: a
+    third of them are nearly those of the cube root (Kahan 1991).
+    """
+    if _in_bits.get():
+        return ca.sinh(x)
+    whole, mantissa = exponent_and_mantissa(x)
+    low = mantissa < 1
+    fraction = (mantissa * choice(low, ca.SX(2.0), ca.SX(1.0)) - 1) * 2.0**16
+    bits = (whole - low + 1023) * 2.0**16 + rounded(fraction - (0.5 - 2.0**-37))
+    third = ((bits - 1) * THIRD + (2.0**52 + _ROOT_BITS)) - 2.0**52
+    exponent = rounded(third * 2.0**-16 - (0.5 - 2.0**-17))
+    return (1 + (third - exponent * 2.0**16) * 2.0**-16) * two_to(exponent - 1023)
+
+
+def cube_root(x: Any) -> Any:
+    """x^⅓; no number below zero.
+
+    With y near it, whose cube is exact, and z = (x − y³)/x it is y(1 − z)^(−⅓).
+    """
+    small = x < _LEAST
+    scaled = x * choice(small, ca.SX(2.0**54), ca.SX(1.0))
+    near = near_cube_root(scaled)
+    left = (scaled - near * near * near) * (1 / scaled)
+    near = near * choice(small, ca.SX(2.0**-18), ca.SX(1.0))
+    value = near + near * left * _polynomial(left, _CUBE_ROOT)
+    return choice(ca.logic_and(x > 0, x < math.inf), value, choice(x < 0, ca.SX(math.nan), x))
+
+
+def any_power(x: Any, a: Any) -> Any:
+    """Power with an exponent that is not known yet, but for that of a cube root."""
     size = ca.fabs(a)
     whole, even = (ca.logic_or(size >= 2.0**51, rounded(part) == part) for part in (a, 0.5 * a))
     value = _power(choice(ca.logic_and(whole, x < 0), -x, x), a)

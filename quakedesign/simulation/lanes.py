@@ -21,7 +21,7 @@ from quakedesign.simulation.portable_c import (
 )
 
 LANES = 16
-LANE_FLAGS = ("-fno-math-errno", "-fno-trapping-math", "-fno-tree-pre", "-fno-thread-jumps")
+LANE_FLAGS = ("-fno-tree-pre", "-fno-thread-jumps")
 """What lets a compiler choose between values instead of branching; none of it changes a digit."""
 _WIDE = {"__AVX512F__": ("-mavx512f", "-mprefer-vector-width=512"), "__AVX2__": ("-mavx2",)}
 _LONGEST_QUESTION = 10

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 
 from quakedesign.simulation.c_files import c_file
-from quakedesign.simulation.elementary import FUNCTIONS, verbatim
+from quakedesign.simulation.elementary import FUNCTIONS, THIRD, any_power, cube_root, power, verbatim
 from quakedesign.simulation.instructions import Instruction, NotPortableError, instructions
 
 _ATOMIC = {
@@ -17,6 +17,7 @@ _ATOMIC = {
     ca.OP_CONSTPOW: "two_to",
     ca.OP_LOG: "exponent_of",
     ca.OP_LOG1P: "mantissa_of",
+    ca.OP_SINH: "near_cube_root",
 }
 _BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARED = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
@@ -112,7 +113,9 @@ def called_alone(code: int) -> str | None:
 @cache
 def elementary_c() -> str:
     """The elementary functions in C, to be inlined."""
-    return c_file("portable.c") + "".join(_function_c(function) for function in dict.fromkeys(FUNCTIONS.values()))
+    parts: list[Callable[..., Any]] = [*dict.fromkeys(FUNCTIONS.values()), cube_root, any_power]
+    written = "".join(_function_c(function) for function in parts if function is not power)
+    return c_file("portable.c") + written + c_file("power.c", third=constant(THIRD))
 
 
 def _function_c(function: Callable[..., Any]) -> str:

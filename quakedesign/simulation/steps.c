@@ -1,5 +1,5 @@
 
-CASADI_SYMBOL_EXPORT int advance(double* vector, long long steps) {
+EXPORTED int advance(double* vector, long long steps) {
   double first[${size}], second[${size}], work[${work}];
   casadi_int integers[${integers}];
   const double* arguments[${arguments}];
