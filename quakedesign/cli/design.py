@@ -8,7 +8,14 @@ from cyclopts import Parameter
 
 from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Formats, Output, Shaking
 from quakedesign.cli.shared import app, command_line, console, print_lines, progress
-from quakedesign.cli.units import ExactMetres, ExactMetresPerSecond, ExactPascals, ExactSeconds
+from quakedesign.cli.units import (
+    ExactMetres,
+    ExactMetresPerSecond,
+    ExactPascals,
+    ExactSeconds,
+    ExactSquareMetresPerSecond,
+    rock,
+)
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 if TYPE_CHECKING:
@@ -17,7 +24,7 @@ if TYPE_CHECKING:
 
 _SHARED = (
     *("objective", "continuous", "measured", "slip_noise", "rate_noise"),
-    *("delay", "lag", "diffusion", "stress", "spread", "disturbance_class"),
+    *("delay", "lag", "stress", "spread", "disturbance_class"),
 )
 
 
@@ -54,6 +61,10 @@ class DesignOptions:
         The same of the time constant of pump and pipe.
     diffusion
         The same of L²/D of the rock between well and fault. With rate-and-state friction D_c/(10 V) unless given.
+    well
+        Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
+    diffusivity
+        Of the rock between well and fault, such as '0.5 m^2/s'.
     stress
         Of such a fault: bound of the shear stress disturbance, such as '25 kPa'; the largest that the design stands
         unless given.
@@ -78,6 +89,8 @@ class DesignOptions:
     delay: ExactSeconds = "0"
     lag: ExactSeconds = "0"
     diffusion: ExactSeconds | None = None
+    well: ExactMetres | None = None
+    diffusivity: ExactSquareMetresPerSecond | None = None
     stress: ExactPascals | None = None
     spread: str = "0"
     published_scheme: str = "continuous"
@@ -102,7 +115,7 @@ class DesignOptions:
     def _behind(self, fault: "Fault") -> bool:
         """Whether the e-LQR alone is designed: friction without a state, behind a delay, a lag or rock."""
         return not fault.friction.state_names and any(
-            time not in (None, "0") for time in (self.delay, self.lag, self.diffusion)
+            time not in (None, "0") for time in (self.delay, self.lag, self._rock)
         )
 
     def told(self) -> dict[str, Any]:
@@ -118,7 +131,13 @@ class DesignOptions:
                 f"--scheme is for gains designed with --continuous, others run as guaranteed. Received {self.scheme}. "
                 "Give both, or none."
             )
-        return {"options": {name: getattr(self, name) for name in _SHARED}, "scheme": self.scheme}
+        options = {name: getattr(self, name) for name in _SHARED} | {"diffusion": self._rock}
+        return {"options": options, "scheme": self.scheme}
+
+    @property
+    def _rock(self) -> str | None:
+        """L²/D [s], however it was told."""
+        return rock(self.diffusion, self.well, self.diffusivity)
 
     @property
     def _laws(self) -> str:

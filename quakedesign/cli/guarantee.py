@@ -16,8 +16,10 @@ from quakedesign.cli.units import (
     ExactPascals,
     ExactPascalsPerSecond,
     ExactSeconds,
+    ExactSquareMetresPerSecond,
     Gains,
     Whole,
+    rock,
 )
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.output import require_room
@@ -38,6 +40,10 @@ class Surroundings:
         it.
     diffusion
         L²/D of the rock between well and fault; the designed e-LQR carries a model of it.
+    well
+        Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
+    diffusivity
+        Of the rock between well and fault, such as '0.5 m^2/s'.
     slip_noise
         Bound of the error of the measured slip, whatever its course, such as '1 um'; q/2 for readings in steps of q.
         simulate takes a standard deviation by this name.
@@ -66,6 +72,8 @@ class Surroundings:
     delay: ExactSeconds = "0"
     lag: ExactSeconds = "0"
     diffusion: ExactSeconds = "0"
+    well: ExactMetres | None = None
+    diffusivity: ExactSquareMetresPerSecond | None = None
     slip_noise: ExactMetres = "0"
     rate_noise: ExactMetresPerSecond = "0"
     initial_slip: ExactMetres = "0"
@@ -83,11 +91,13 @@ class Surroundings:
         Raises
         ------
         ParameterError
-            For a withdrawal without a largest pressure.
+            For a withdrawal without a largest pressure, or for a well that is not told as one.
         """
         from quakedesign.synthesis.guarantee import exact_surroundings
 
-        return exact_surroundings(**given(asdict(self)))
+        told = asdict(self)
+        told["diffusion"] = rock(self.diffusion, told.pop("well"), told.pop("diffusivity"))
+        return exact_surroundings(**given(told))
 
 
 _ALONE = Surroundings()

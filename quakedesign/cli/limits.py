@@ -5,7 +5,15 @@ from typing import Literal
 
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
 from quakedesign.cli.shared import app
-from quakedesign.cli.units import ExactMetres, ExactMetresPerSecond, Pascals, SquareMetresPerSecond
+from quakedesign.cli.units import (
+    ExactMetres,
+    ExactMetresPerSecond,
+    ExactSeconds,
+    ExactSquareMetresPerSecond,
+    Pascals,
+    rock,
+)
+from quakedesign.rationals import rational
 
 
 @app.command
@@ -14,7 +22,10 @@ def limits(
     /,
     *,
     pressure: Pascals | None = None,
-    diffusivity: SquareMetresPerSecond = 1.0,
+    diffusivity: ExactSquareMetresPerSecond = "1",
+    lag: ExactSeconds = "0",
+    diffusion: ExactSeconds | None = None,
+    well: ExactMetres | None = None,
     stress: Pascals | None = None,
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
     slip_noise: ExactMetres = "0",
@@ -37,6 +48,12 @@ def limits(
         Largest withdrawal, such as '20 MPa'; the effective normal stress unless given.
     diffusivity
         Of the rock between well and fault, such as '1 m^2/s'.
+    lag
+        Of a fault with rate-and-state friction: time constant of pump and pipe behind which a design is proved.
+    diffusion
+        Of such a fault: L²/D of the rock behind which a design is proved; that of a near well unless given.
+    well
+        Its distance in place of that, such as '40 m', with --diffusivity.
     stress
         Of a fault with rate-and-state friction, whose limits are those of its linearisation about slow sliding: bound
         of the shear stress disturbance, such as '25 kPa'; the largest that a design stands unless given.
@@ -64,7 +81,9 @@ def limits(
     answer = all_limits(
         loaded,
         pressure=pressure,
-        diffusivity=diffusivity,
+        diffusivity=float(rational(diffusivity)),
+        lag=lag,
+        diffusion=diffusion if well is None else rock(diffusion, well, diffusivity),
         stress=stress,
         measured=measured,
         slip_noise=slip_noise,

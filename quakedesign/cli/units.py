@@ -63,6 +63,31 @@ def _exact_reader(unit: str) -> Callable[[Any, Sequence[Any]], str]:
     return read
 
 
+def rock(diffusion: str | None, well: str | None, diffusivity: str | None) -> str | None:
+    """L²/D [s] as it is told, or of the distance of a well [m] and the diffusivity of the rock [m²/s].
+
+    Raises
+    ------
+    ParameterError
+        For both, for one of the two alone, or for one that is not positive.
+    """
+    if well is None and diffusivity is None:
+        return diffusion
+    if well is None or diffusivity is None or diffusion not in (None, "0"):
+        raise ParameterError(
+            "a well is told by its distance and the diffusivity of the rock, or by L^2/D. Received "
+            f"well {well}, diffusivity {diffusivity}, diffusion {diffusion}. Give --well and --diffusivity, or "
+            "--diffusion alone."
+        )
+    distance, spread = rational(well, "well"), rational(diffusivity, "diffusivity")
+    if distance <= 0 or spread <= 0:
+        raise ParameterError(
+            f"the distance of a well and a diffusivity must be positive. Received {well} m and {diffusivity} m^2/s. "
+            "Leave out --well for the nearest."
+        )
+    return str(distance**2 / spread)
+
+
 def _with_unit(text: str, unit: str, name: str) -> float:
     from quakedesign.fault.units import si_value
 
@@ -76,10 +101,10 @@ Hertz = Annotated[float, Parameter(converter=quantity("Hz"))]
 Metres = Annotated[float, Parameter(converter=quantity("m"))]
 MetresPerSecond = Annotated[float, Parameter(converter=quantity("m/s"))]
 Pascals = Annotated[float, Parameter(converter=quantity("Pa"))]
-SquareMetresPerSecond = Annotated[float, Parameter(converter=quantity("m^2/s"))]
 ExactSeconds = Annotated[str, Parameter(converter=_exact_reader("s"))]
 ExactPascals = Annotated[str, Parameter(converter=_exact_reader("Pa"))]
 ExactPascalsPerSecond = Annotated[str, Parameter(converter=_exact_reader("Pa/s"))]
+ExactSquareMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m^2/s"))]
 ExactMetres = Annotated[str, Parameter(converter=_exact_reader("m"))]
 ExactMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m/s"))]
 Whole = Annotated[int, Parameter(converter=whole)]

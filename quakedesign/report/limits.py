@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from quakedesign.bounds import Bound, LowerBound, UpperBound
+from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.output import whole_folder
 from quakedesign.rationals import rational
 from quakedesign.report.drawing import NATURAL, figure, finish
@@ -76,8 +77,15 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
         f"the others: pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference needs, "
         f"D = {float(limits.diffusivity):g} m^2/s; a constant stress that begins after a sample makes errors grow "
         "without bound, even if the controller knows everything from the next sample on",
-        "proved: one design with the well near the fault, of the fault itself with inertia; pressure at the fault",
+        f"proved: one design{_path(limits.guarantee)}, of the fault itself with inertia; pressure at the fault",
     ]
+
+
+def _path(found: SlidingGuarantee | None) -> str:
+    """What the design that is proved stands behind."""
+    ways = {} if found is None else {"a lag of": found.held.lag, "rock of L^2/D =": found.held.diffusion}
+    told = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]
+    return f" behind {' and '.join(told)}" if told else ""
 
 
 def _undecided(limits: Limits) -> list[str]:

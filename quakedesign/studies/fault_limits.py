@@ -7,6 +7,7 @@ from typing import Any
 
 from quakedesign.bounds import Bound, LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task, task_of
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.impossibility import (
     Noise,
     farthest_well,
@@ -268,6 +269,8 @@ def limits(
     *,
     pressure: float | None = None,
     diffusivity: float = 1.0,
+    lag: float | str | Fraction = 0,
+    diffusion: float | str | Fraction | None = None,
     stress: float | None = None,
     measured: str = MEASURED[0],
     slip_noise: float | str | Fraction = 0,
@@ -288,6 +291,10 @@ def limits(
         the reference needs, in both directions.
     diffusivity : float
         Of the rock between well and fault [m²/s].
+    lag : float, str or Fraction
+        Of friction with a state: time constant of pump and pipe [s] behind which a design is proved.
+    diffusion : float, str or Fraction, optional
+        The same of L²/D of the rock [s]; that of a well near the fault without it and a lag.
     stress : float, optional
         Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that a design stands unless
         given.
@@ -306,8 +313,9 @@ def limits(
     Raises
     ------
     ParameterError
-        For a negative pressure, a diffusivity that is not positive, a stress without friction that has a state, none
-        where no design stands any, noise with it, negative noise, or noise of a slip rate that is not measured.
+        For a negative pressure, a diffusivity that is not positive, a stress, lag or rock without friction that has a
+        state, no stress where no design stands any, noise with it, negative noise, or noise of a slip rate that is
+        not measured.
     """
     told = Told(
         measured=measured,
@@ -320,11 +328,17 @@ def limits(
                 f"no limit of slow sliding is known for noise. Received {fault.friction.name}, told {told.words()}. "
                 "Leave noise out: what cannot be done without it cannot be done with it."
             )
-        return _sliding_limits(fault, pressure, diffusivity, stress, prove)
+        path: Around = {"lag": rational(lag, "lag"), "diffusion": rational(diffusion or 0, "diffusion")}
+        return _sliding_limits(fault, pressure, diffusivity, stress, path if prove else None)
     if stress is not None:
         raise ParameterError(
             f"stress needs friction with a state. Received {fault.friction.name}. Leave it out: the disturbance of the "
             "fault is meant."
+        )
+    if rational(lag, "lag") or diffusion is not None:
+        raise ParameterError(
+            "designs of limits stand behind a lag or rock with rate-and-state friction alone. Received "
+            f"{fault.friction.name}. Leave them out; guarantee proves a law behind them, or that none can be."
         )
     task, step = task_of(fault), rational(fault.sampling_time)
     withdrawal, spread = _given(fault, pressure, diffusivity)
@@ -395,12 +409,16 @@ def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fr
 
 
 def _sliding_limits(
-    fault: Fault, pressure: float | None, diffusivity: float, stress: float | None, prove: bool
+    fault: Fault, pressure: float | None, diffusivity: float, stress: float | None, path: Around | None
 ) -> SlidingLimits:
+    """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path."""
     withdrawal, spread = _given(fault, pressure, diffusivity)
     model, step = sliding_model(fault), rational(fault.sampling_time)
     asked = None if stress is None else rational(stress, "stress")
-    answer = answer_sliding(fault, diffusion=near_path(model), stress=asked) if prove else None
+    answer = None
+    if path is not None:
+        near: Around = path if any(path.values()) else {"diffusion": near_path(model)}
+        answer = answer_sliding(fault, stress=asked, **near)
     found = answer.found if answer is not None and isinstance(answer.found, SlidingGuarantee) else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:

@@ -12,6 +12,9 @@ import pytest
 from quakedesign.certificates.command import check_files
 from quakedesign.certificates.guarantee import Held, NoGuarantee, guarantee, task_of
 from quakedesign.cli import main
+from quakedesign.cli.design import DesignOptions
+from quakedesign.cli.guarantee import Surroundings
+from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.fault.sources import source_text as load_text
 from quakedesign.synthesis import answer
@@ -350,3 +353,19 @@ def test_means_count_from_their_middle(call, tmp_path):
     assert (loop["delay"], loop["jitter"]) == ("1/1000", {"measured": "0", "delay": "0", "mean": "1/500"})
     code, _, err = call(*given[:-1], "--averaging-time=-1 ms")
     assert (code, "jitter must be 0 or more, and averaging too" in err) == (2, True)
+
+
+def test_a_well_is_told_by_its_distance_and_the_diffusivity_of_the_rock():
+    """(40 m)²/(0.5 m²/s) = 3200 s, exactly."""
+    assert Surroundings(well="40", diffusivity="0.5").exact()["diffusion"] == 3200
+    assert Surroundings(diffusion="7").exact()["diffusion"] == 7
+    told = DesignOptions(well="1/3", diffusivity="2").told()["options"]
+    assert (told["diffusion"], DesignOptions().told()["options"]["diffusion"]) == ("1/18", None)
+    behind = DesignOptions(well="40", diffusivity="0.5").asked("real-fault")[1]
+    assert behind["names"] == ["elqr"]
+    for wrong in ({"well": "40"}, {"diffusivity": "1"}, {"well": "40", "diffusivity": "1", "diffusion": "3"}):
+        with pytest.raises(ParameterError, match="a well is told by its distance and the diffusivity"):
+            Surroundings(**wrong).exact()
+    for wrong in ({"well": "0", "diffusivity": "1"}, {"well": "40", "diffusivity": "-1"}):
+        with pytest.raises(ParameterError, match="must be positive"):
+            DesignOptions(**wrong).told()

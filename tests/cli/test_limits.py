@@ -123,3 +123,29 @@ def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, m
     monkeypatch.setattr(fault_limits, "answer_sliding", lambda fault, **asked: answer)
     assert run(str(file)) == 0
     assert "errors of this fault swing while they grow, or do not grow" in " ".join(capsys.readouterr().out.split())
+
+
+def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are_told(monkeypatch, capsys):
+    """(40 m)²/(2 m²/s) = 800 s."""
+    known, asked = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text()), []
+
+    def answered(fault, *, stress, **around):
+        asked.append(around)
+        return SlidingAnswer(found=known, task=known.task, held=known.held)
+
+    monkeypatch.setattr(fault_limits, "answer_sliding", answered)
+    patch = ("crustal-patch", "--stress", "25 kPa")
+    assert run(*patch, "--well", "40 m", "--diffusivity", "2 m^2/s", "--lag", "5 s") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert f"proved: one design behind rock of L^2/D = {float(known.held.diffusion):.4g} s, of the fault" in told
+    assert "D = 2 m^2/s" in told
+    assert run(*patch, "--diffusion", "9 s") == run(*patch, "--diffusivity", "2") == 0
+    assert asked == [{"lag": 5, "diffusion": 800}, {"lag": 0, "diffusion": 9}, {"diffusion": asked[2]["diffusion"]}]
+    assert asked[2]["diffusion"] == pytest.approx(800)  # D_c/(10 V)
+    capsys.readouterr()
+    for others in (("--well", "40 m", "--diffusion", "9 s"), ("--well", "-1 m")):
+        assert run(*patch, *others) == 2
+    assert run("lab-fault", "--well", "1 m") == run("lab-fault", "--lag", "1 s") == 2
+    errors = capsys.readouterr().err.splitlines()
+    assert ["a well is told by" in errors[0], "must be positive" in errors[1]] == [True, True]
+    assert all("with rate-and-state friction alone" in line for line in errors[2:])
