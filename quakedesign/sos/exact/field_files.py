@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import PolynomialError
+from quakedesign.input import read_text
 
 _LARGEST = 1 << 16  # bytes
 
@@ -17,14 +18,9 @@ def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
     PolynomialError
         When the file cannot be read, or has other contents.
     """
+    content = read_text(path, "a field's file", largest=_LARGEST, refusal=PolynomialError)
     try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise PolynomialError(f"{path} must be a file that can be read. Received: {error.strerror}.") from None
-    if len(content) > _LARGEST:
-        raise PolynomialError(f"a field's file must have at most {_LARGEST} bytes. Received {len(content)}.")
-    try:
-        raw: dict[str, Any] = tomllib.loads(content.decode())
+        raw: dict[str, Any] = tomllib.loads(content)
     except (ValueError, RecursionError) as error:
         reason = str(error).partition("\n")[0]
         raise PolynomialError(f"{path} must be TOML. Received: {reason}. Quote polynomials.") from None

@@ -6,16 +6,14 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
 
 from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, Held, Task
 from quakedesign.loop import NOISES, PeriodicLoop
 from quakedesign.loop.implicit_root import root_of
 from quakedesign.loop.periodic import Matrix, Row
+from quakedesign.synthesis.guaranteed.poles import PERIODS, moved, periods_to_forget
 
-_PERIODS, _MOST_PERIODS = 64, 512
-_FORGOTTEN = 100  # a course is over when what was at first is down to the hundredth part
 _PIECES = 6
 _SWEEPS = 8
 _MANY, _FEW = 512, 2  # courses that switch after random times, and their sweeps: where the fault sticks, sweeps stall
@@ -217,7 +215,7 @@ class _Search:
         self.punctual = bool(held and (held.law.first or any(held.start)))  # at first
         if periods is None:
             periods = _periods_to_forget(self.parts, len(loop.states))
-            courses = 2 * max(courses // 2 * _PERIODS // periods, _LEAST_COURSES)
+            courses = 2 * max(courses // 2 * PERIODS // periods, _LEAST_COURSES)
         paces = np.where(np.arange(courses) // 2 % 2, 1, _SLOW)
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.rest_limit = None
@@ -432,15 +430,9 @@ def _flowing(flow: np.ndarray) -> _Event:
 
 
 def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, event: _Event) -> _Pieces:
-    (size, count), length = inputs.shape, float(event.duration) / _PIECES
-    steps, added = [], []
-    for flow in vertices:
-        whole = np.zeros((size + count, size + count))
-        whole[:size, :size], whole[:size, size:] = flow, inputs
-        found: Any = expm(whole * length)
-        steps.append(found[:size, :size])
-        added.append(found[:size, size:])
-    return _Pieces(event, _widened(event.jump, size), np.array(steps), np.array(added), length)
+    length = float(event.duration) / _PIECES
+    steps, added = zip(*(moved(flow, inputs, length) for flow in vertices), strict=True)
+    return _Pieces(event, _widened(event.jump, len(inputs)), np.array(steps), np.array(added), length)
 
 
 def _periods_to_forget(parts: list[_Pieces], size: int) -> int:
@@ -449,9 +441,7 @@ def _periods_to_forget(parts: list[_Pieces], size: int) -> int:
     for part in parts:
         jump = np.eye(len(part.jump)) if part.of.late else part.jump
         maps = np.linalg.matrix_power(part.steps, _PIECES) @ jump @ maps
-    kept = np.abs(np.linalg.eigvals(maps[:, :size, :size])).max()
-    pace = -np.log(np.clip(kept, 1e-9, 1 - 1e-9))
-    return int(np.clip(np.ceil(np.log(_FORGOTTEN) / pace), _PERIODS, _MOST_PERIODS))
+    return periods_to_forget(np.abs(np.linalg.eigvals(maps[:, :size, :size])).max())
 
 
 def _widened(jump: Any, size: int) -> np.ndarray:

@@ -1,6 +1,6 @@
 """What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds."""
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import log
 from typing import Any
 
@@ -12,11 +12,13 @@ from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.fault import Fault
 from quakedesign.loop import LinearLaw, RestLimit
+from quakedesign.sos.exact.strict import texts
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
 from quakedesign.synthesis.guaranteed.families import MEASURED
 from quakedesign.synthesis.guaranteed.poles import own_poles
 
+_TOLD = ("step", "slip_noise", "rate_noise", "initial_slip", "initial_slip_rate", "jitter", "delay_jitter", "averaging")
 _GROWS = 1 + 1e-6  # a factor per sample; eigenvalues that are 1 twice are rounded by less
 
 
@@ -145,29 +147,22 @@ class Answer:
                 "small_gain": None if gain is None else gain.exact,
                 "shorter": shorter,
             }
-        bounds = self.found.bounds()
+        bounds, held = self.found.bounds(), self.found.held
         small = None if isinstance(bounds, NoGuarantee) else float(bounds.small_gain)
         return {
             "verdict": "proved",
             "guarantee": self.found.sentence(),
             **self.found.claims.to_dict(),
             "small_gain": small,
-            "worst_found": _seen(self.worst),
-            "worst_found_with_stick": _seen(self.worst_with_stick),
+            "worst_found": self.worst and asdict(self.worst),
+            "worst_found_with_stick": self.worst_with_stick and asdict(self.worst_with_stick),
             "grows_at_rest": self.grows_at_rest,
             "rest_limit": _rest_limit(self.found.rest_limit),
             "limit": _limit(self.limit),
-            "step": str(self.found.held.step),
-            "measured": MEASURED[self.found.held.law.of_slip_alone],
-            "slip_noise": str(self.found.held.slip_noise),
-            "rate_noise": str(self.found.held.rate_noise),
-            "initial_slip": str(self.found.held.initial_slip),
-            "initial_slip_rate": str(self.found.held.initial_slip_rate),
-            "jitter": str(self.found.held.jitter),
-            "delay_jitter": str(self.found.held.delay_jitter),
-            "averaging": str(self.found.held.averaging),
-            "pump": None if self.found.held.pump is None else self.found.held.pump.to_dict(),
-            "law": _law(self.found.held.law),
+            "measured": MEASURED[held.law.of_slip_alone],
+            **{name: str(getattr(held, name)) for name in _TOLD},
+            "pump": None if held.pump is None else held.pump.to_dict(),
+            "law": _law(held.law),
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
 
@@ -195,10 +190,6 @@ def _with_room(seen: Answer, found: Guarantee) -> Answer:
     return seen if wider.leaves_with_stick or wider.found.check() is not Verdict.PROVED else wider
 
 
-def _seen(worst: WorstFound | None) -> dict[str, float] | None:
-    return None if worst is None else {"slip_error": worst.slip_error, "slip_rate_error": worst.slip_rate_error}
-
-
 def _limit(limit: SmallestPeak | None) -> dict[str, str | None] | None:
     if limit is None:
         return None
@@ -213,13 +204,7 @@ def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
 
 def _law(law: LinearLaw) -> dict[str, Any]:
     root = law.root
-    lines = {} if root is None else {"slopes": [str(v) for v in root.slopes], "remainder": str(root.remainder)}
-    return {
-        **lines,
-        "states": list(law.states),
-        "update": [[str(v) for v in row] for row in law.update],
-        "measured": [[str(v) for v in row] for row in law.measured],
-        "output": [str(v) for v in law.output],
-        "feedback": [str(v) for v in law.feedback],
-        "applied": [str(v) for v in law.applied],
-    }
+    lines = {} if root is None else {"slopes": texts(root.slopes), "remainder": str(root.remainder)}
+    matrices = {name: [texts(row) for row in getattr(law, name)] for name in ("update", "measured")}
+    rows = {name: texts(getattr(law, name)) for name in ("output", "feedback", "applied")}
+    return {**lines, "states": list(law.states), **matrices, **rows}

@@ -13,10 +13,9 @@ from quakedesign.cache import search_once
 from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask
 from quakedesign.certificates.slow_sliding.small_gain import loop_of, model_of
 from quakedesign.loop import PeriodicLoop
+from quakedesign.synthesis.guaranteed.poles import moved, periods_to_forget
 
 _PIECES = 4  # of a part of the period
-_PERIODS, _MOST_PERIODS = 64, 512
-_FORGOTTEN = 100  # a course is over when what was at first is down to the hundredth part
 _SLOPES = (1.0, 1.15)  # of e^y − 1 over y, in the linear loop that a course is found for
 _NEWTON = 4
 _AXES = ("direct_effect", "evolution_effect", "critical_slip")
@@ -86,8 +85,7 @@ def _remembered(maps: list[tuple[Any, Any, Any]]) -> int:
     whole = np.eye(len(maps[0][0]))
     for step, _, jump in maps:
         whole = step @ jump @ whole
-    pace = -np.log(np.clip(np.abs(np.linalg.eigvals(whole)).max(), 1e-9, 1 - 1e-9))
-    return int(np.clip(np.ceil(np.log(_FORGOTTEN) / pace), _PERIODS, _MOST_PERIODS))
+    return periods_to_forget(np.abs(np.linalg.eigvals(whole)).max())
 
 
 class SlidingPieces:
@@ -119,7 +117,7 @@ class SlidingPieces:
         loop = loop_of(self._claim.held, plain, self._corner)
         flow, pushes = np.array(loop.flow, dtype=float), np.zeros((len(loop.states), 2))
         pushes[:, 0], pushes[0, 1] = np.array(loop.inputs["stress"], dtype=float), -self._rate
-        return loop, [(*_held(flow, pushes, length), jump) for length, jump in _parts(loop)]
+        return loop, [(*moved(flow, pushes, length), jump) for length, jump in _parts(loop)]
 
     def largest(self, stress: np.ndarray, ahead: np.ndarray) -> np.ndarray:
         """Largest |ln(v/V)| and slip error [m] of courses of the stress [Pa] and of r′/V − 1, (pieces, courses)."""
@@ -173,11 +171,3 @@ def _parts(loop: PeriodicLoop) -> list[tuple[float, np.ndarray]]:
         jumps = [np.array(segment.jump, dtype=float), *[still] * (_PIECES - 1)]
         found += [(float(segment.duration) / _PIECES, jump) for jump in jumps]
     return found
-
-
-def _held(flow: np.ndarray, pushes: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
-    size, count = pushes.shape
-    whole = np.zeros((size + count, size + count))
-    whole[:size, :size], whole[:size, size:] = flow, pushes
-    found: Any = expm(whole * length)
-    return found[:size, :size], found[:size, size:]

@@ -20,10 +20,10 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Verdict
-from quakedesign.synthesis.linear.analysis.inverse_optimality_problem import NOTHING, Question, refutes
+from quakedesign.synthesis.linear.analysis.inverse_optimality_problem import Question, refutes
 from quakedesign.synthesis.linear.analysis.inverse_optimality_search import bound_of, candidates, near, propose
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Scales
-from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, characteristic, definite, hurwitz, times, total
+from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, characteristic, definite, hurwitz
 
 _BITS = (30, 60, 120, 200)
 
@@ -78,7 +78,6 @@ def inverse_optimality(
     gains: Sequence[Fraction],
     *,
     printed: Sequence[Fraction] | None = None,
-    floor: Sequence[Sequence[Fraction]] | None = None,
 ) -> InverseOptimality:
     """Decide whether K is optimal for a Q that covers the uncertainty.
 
@@ -90,8 +89,6 @@ def inverse_optimality(
         K in SI, exact.
     printed : (Fraction, Fraction), optional
         Row G [Pa/m, Pa·s/m] of the printed test, D = GᵀG; without it the sound bound of the problem.
-    floor : matrix (4 × 4) of Fraction, optional
-        Q0/R in SI that Q/R must exceed by R·D; any positive definite one without.
 
     Returns
     -------
@@ -102,10 +99,7 @@ def inverse_optimality(
     K = scales.gains_inside(gains)
     row = None if printed is None else (printed[0] * scales.slip / scales.pressure,
                                         printed[1] * scales.states[1] / scales.pressure)  # fmt: skip
-    least = NOTHING
-    if floor is not None:
-        least = times(1 / scales.pressure**2, scales.form_inside(floor))
-    question = Question(inside, K, row, least)
+    question = Question(inside, K, row)
     loop = inside.loop((Fraction(1), -inside.stiffness, inside.damping), K)
     if not hurwitz(characteristic(loop)):
         reason = "the nominal loop is not asymptotically stable (Routh, exact)"
@@ -126,7 +120,7 @@ def _proof(question: Question, scales: Scales) -> InverseOptimality | None:
         left = question.F(P, D)
         if question.covers(D) and definite(left) and definite(P):
             return InverseOptimality(
-                verdict=Verdict.PROVED, P=P, bound=D, Q0=total(left, question.floor), scales=scales,
+                verdict=Verdict.PROVED, P=P, bound=D, Q0=left, scales=scales,
                 reason="P, Q0 positive definite, exactly",
             )  # fmt: skip
     return None

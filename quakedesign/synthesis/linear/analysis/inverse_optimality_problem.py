@@ -23,12 +23,11 @@ NOTHING = diagonal((Fraction(0),) * 4)
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A, K, the bound and the floor in nondimensional numbers; B = (0, 1, 0, 0)ᵀ."""
+    """A, K and the bound in nondimensional numbers; B = (0, 1, 0, 0)ᵀ."""
 
     inside: LinearProblem
     K: tuple[Fraction, ...]
     printed: tuple[Fraction, Fraction] | None
-    floor: Matrix
 
     def P(self, free: Sequence[Fraction]) -> Matrix:
         """Symmetric matrix with second column K and six free entries."""
@@ -40,14 +39,8 @@ class Question:
         return tuple(tuple(row) for row in rows)
 
     def F(self, P: Matrix, D: Matrix) -> Matrix:
-        """−(AᵀP + PA) + KᵀK − D − Q0/R."""
-        parts = (
-            times(-1, lyapunov(self.inside.nominal(), P)),
-            outer(self.K, self.K),
-            times(-1, D),
-            times(-1, self.floor),
-        )
-        return total(*parts)
+        """−(AᵀP + PA) + KᵀK − D."""
+        return total(times(-1, lyapunov(self.inside.nominal(), P)), outer(self.K, self.K), times(-1, D))
 
     @property
     def fixed_bound(self) -> Matrix | None:

@@ -67,7 +67,7 @@ def sliding_law(
     scaled_step = step * model.state_rate
     fades = [short(exp(-float(layer.rate(i) * scaled_step)), _DIGITS) for i in range(modes)] if layer else []
     seen = _reading(model, shares)
-    moved = _exponential(_flow(seen, layer, modes) * float(scaled_step))
+    moved = expm(_flow(seen, layer, modes) * float(scaled_step))
     size = 2 + modes
     own = [[short(v, _DIGITS) for v in row[: size + 2]] for row in moved[:2]]
     for row in own:  # (x, z, modes, level, pressure): a level that the pressure balances moves nothing
@@ -101,10 +101,6 @@ def _flow(seen: Any, layer: Layer | None, modes: int) -> Any:
         speed = float(layer.rate(i)) if layer else 0.0
         flow[2 + i, 2 + i], flow[2 + i, -1] = -speed, speed
     return flow
-
-
-def _exponential(matrix: Any) -> Any:
-    return expm(matrix)
 
 
 def _gains(update: list[list[Fraction]], seen: Any, w: Weights) -> tuple[list[Fraction], list[Fraction]]:
