@@ -16,9 +16,9 @@ _PER_BAND = 16  # instants at least, four periods
 
 
 def state_figures(comparison: "Compared", natural: "StateRun") -> dict[str, Any]:
-    """``cycle``, and ``slow-sliding`` and ``sliding-errors`` of the first law that ran."""
+    """``cycle``, where it is known, and ``slow-sliding`` and ``sliding-errors`` of the first law that ran."""
     held = next(((e, e.run) for e in comparison.entries if isinstance(e.run, SlidingRun)), None)
-    drawn = {"cycle": cycle(comparison, natural)}
+    drawn = {} if natural.failed else {"cycle": cycle(comparison, natural)}
     return drawn if held is None else drawn | {"slow-sliding": slow_sliding(*held), "sliding-errors": errors(*held)}
 
 

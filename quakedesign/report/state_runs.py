@@ -48,6 +48,8 @@ def state_run_lines(answer: dict[str, Any]) -> list[str]:
 
 def cycle_sentence(run: "StateRun") -> str:
     """What a fault whose friction has a state does without control, with its last complete event."""
+    if run.failed:
+        return f"Without control: unknown, since its cycle could not be computed ({run.failed.rstrip('.')})"
     cycle, peak = run.cycle, f"slip rate up to {run.outcome.peak_slip_rate:.3g} m/s"
     if not run.slip_events:
         return f"Without control: the fault creeps, {peak}"

@@ -30,6 +30,7 @@ from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
 
 _RTOL = 1e-8
 _NATURAL = (True, "radau"), (True, "cvodes"), (False, "cvodes")  # inertia, method: of cycles, in this order
+_MOMENT = 1e-3  # of the state's age at first, over which any solver goes on
 _UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
 _SWINGS = 4  # of the stress at least, in a run that is shown
 _SHOWN = 500  # D_c/V of a slow task that are run: the loop settles within some tens
@@ -48,6 +49,8 @@ class StateRun:
     trajectory : StateTrajectory
     seconds : float
         Time that it took [s], where that was measured.
+    failed : str
+        Why what the fault does is not known: the trajectory is but the first instants. Empty otherwise.
     """
 
     fault: Fault
@@ -55,10 +58,13 @@ class StateRun:
     start: StartingState
     trajectory: StateTrajectory
     seconds: float = 0.0
+    failed: str = ""
 
     @property
     def outcome(self) -> Outcome:
-        """Earthquake, slow slip or creep."""
+        """Earthquake, slow slip or creep; unknown where that could not be computed."""
+        if self.failed:
+            return Outcome(kind="unknown", peak_slip_rate=None, share_of_natural=None)
         return cycle_outcome(self.fault, self.trajectory)
 
     @property
@@ -197,12 +203,8 @@ def run_state(
 def natural_run(fault: Fault) -> StateRun:
     """What a fault does that is loaded at the reference rate of its law, with inertia: its cycle, or that it creeps.
 
-    Where one method cannot go on another one is taken, and without inertia if there is none: the run says which.
-
-    Raises
-    ------
-    SimulationError
-        Where none can.
+    Where one method cannot go on another one is taken, and without inertia if there is none: the run says which. Where
+    none can it says why, in `failed`.
     """
     began, rate = perf_counter(), fault.friction.operating_rate
     start = disturbed(fault, rate)
@@ -213,7 +215,11 @@ def natural_run(fault: Fault) -> StateRun:
             failed = error
             continue
         return StateRun(fault=fault, loading_rate=rate, start=start, trajectory=run, seconds=perf_counter() - began)
-    raise SimulationError(f"the natural cycle could not be computed: {failed}") from failed
+    moment = _MOMENT * min(start.state)
+    begun = simulate_state(
+        fault, rate, duration=moment, start_rate=rate, start_state=start.state, inertia=False, method="cvodes"
+    )
+    return StateRun(fault=fault, loading_rate=rate, start=start, trajectory=begun, failed=str(failed))
 
 
 def shown_time(fault: Fault, *, whole: bool = False) -> float:

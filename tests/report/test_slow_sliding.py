@@ -226,15 +226,32 @@ def test_a_cycle_that_one_method_cannot_follow_is_computed_by_another(monkeypatc
     assert state_runs.natural_run(SHORT).trajectory is still
     assert tried == [(True, "radau"), (True, "cvodes"), (False, "cvodes")]
     monkeypatch.setattr(state_runs, "_NATURAL", ((True, "radau"),))
-    with pytest.raises(SimulationError, match="natural cycle could not be computed: the integration stopped"):
-        state_runs.natural_run(SHORT)
+    unknown = state_runs.natural_run(SHORT)
+    assert (unknown.failed, unknown.natural_peak, unknown.outcome.kind) == ("the integration stopped", None, "unknown")
+    assert unknown.metrics.peak_slip_rate is None
+
+
+def test_a_design_goes_on_where_no_cycle_can_be_computed(comparison, monkeypatch, tmp_path):
+    def stopped(*_, **__):
+        raise SimulationError("the integration stopped.")
+
+    monkeypatch.setattr(state_runs, "cycles", stopped)
+    natural, told = state_runs.natural_run(SHORT), io.StringIO()
+    without = type(comparison)(fault=SHORT, uncontrolled=natural, entries=comparison.entries)
+    found = write_folder(without, tmp_path / "patch", force=False)
+    assert found["uncontrolled"]["outcome"]["kind"] == "unknown"
+    assert {path.stem for path in (tmp_path / "patch" / "figures").iterdir()} == {"slow-sliding", "sliding-errors"}
+    print_comparison(without, Console(file=told, width=200))
+    said = "Without control: unknown, since its cycle could not be computed (the integration stopped)"
+    assert said in told.getvalue()
+    assert said in (tmp_path / "patch" / "report.html").read_text()
 
 
 @pytest.mark.parametrize(("rate", "length", "warned"), [(1e-6, 4e3, True), (1e-6, 1.0, False), (1e-9, 4e3, False)])
 def test_a_fault_that_is_loaded_faster_than_any_plate_is_told_which_key_says_so(rate, length, warned):
     event = {"magnitude": 5.7, "recurrence_interval": 9e5}
     outcome = SimpleNamespace(kind="earthquake", peak_slip_rate=0.3)
-    run = {"cycle": event, "outcome": outcome, "slip_events": (event,), "provenance": {"plant": "smooth"}}
+    run = {"cycle": event, "outcome": outcome, "slip_events": (event,), "provenance": {"plant": "smooth"}, "failed": ""}
     said = cycle_sentence(SimpleNamespace(fault=SimpleNamespace(length=length), loading_rate=rate, **run))
     assert f"loaded at {rate:.3g} m/s (with inertia)" in said
     assert ("FASTER than any plate: that is reference_rate of [friction]" in said) == warned
