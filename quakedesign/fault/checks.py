@@ -52,6 +52,20 @@ class Problems:
         raise error from None
 
 
+def require_all(*checks: Callable[[], None]) -> None:
+    """Make every check, and refuse all that is wrong at once.
+
+    Raises
+    ------
+    QuakedesignError
+    """
+    problems = Problems()
+    for check in checks:
+        with problems.collected():
+            check()
+    problems.refuse()
+
+
 def require_seed(seed: int) -> None:
     """Refuse what is no seed.
 

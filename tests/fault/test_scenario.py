@@ -2,13 +2,14 @@
 
 import math
 import os
+from dataclasses import replace
 from fractions import Fraction as F
 from importlib.resources import files
 
 import pytest
 
 from quakedesign.errors import ParameterError, ScenarioError, UnitError, UnknownNameError
-from quakedesign.fault import load_fault, parse_fault, presets
+from quakedesign.fault import friction_law, load_fault, parse_fault, presets
 from quakedesign.rationals import rational
 
 REAL = (files("quakedesign.fault") / "presets" / "real-fault.toml").read_text(encoding="utf-8")
@@ -346,3 +347,18 @@ def test_a_stress_that_no_fault_feels_is_refused_by_its_size(stress, density, sa
         parse_fault(text, "own.toml")
     with pytest.raises(ParameterError, match=r"(amplitude|density) must be of a size"):
         parse_fault(edited(AMPLITUDE, 'amplitude = "1e200 Pa"').replace("2500 kg", "1e-250 kg"), "own.toml")
+
+
+def test_all_values_of_a_friction_law_that_are_wrong_are_said_at_once():
+    with pytest.raises(ParameterError) as refused:
+        friction_law("exponential-slip-weakening")(residual=-0.4, drop=-0.1, critical_slip=-0.02)
+    told = [str(part) for part in refused.value.parts]
+    assert [part.split()[0] for part in told] == ["residual", "drop", "critical_slip"]
+    patch = load_fault("crustal-patch").friction
+    with pytest.raises(ParameterError) as refused:
+        replace(patch, direct_effect=-1.0, stress_sensitivity=-1.0, reference_rate=1e3)
+    told = [str(part).split()[0] for part in refused.value.parts]
+    assert told == ["direct_effect", "stress_sensitivity", "reference_rate"]
+    with pytest.raises(ParameterError) as refused:
+        friction_law("slip-rate-weakening")(residual=-0.4, drop=0.1, critical_rate=0.0)
+    assert len(refused.value.parts) == 2

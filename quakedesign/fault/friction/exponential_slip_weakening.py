@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExponentialSlipWeakening(SlipWeakening):
-    """μ(slip) = residual + drop · exp(−slip/critical_slip), eq. mu with drop = −Δμ > 0.
+    """μ(slip) = residual + drop · exp(−slip/critical_slip), eq. mu of the paper, whose Δμ is −drop.
 
     The law meets the bounds of eq. mug only for slip ≥ 0; `extended` holds μ at its static value for
     slip < 0 (ERRATA 12).

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault.checks import require_nonnegative, require_positive
+from quakedesign.fault.checks import require_all, require_nonnegative, require_positive
 from quakedesign.fault.friction.base import FrictionLaw
 from quakedesign.rationals import float_above, float_below, fraction_of, rational
 
@@ -61,8 +61,14 @@ class RateAndState(FrictionLaw):
     stress_sensitivity: float = field(default=0.0, metadata={"unit": "", "symbol": r"\alpha"})
 
     def __post_init__(self) -> None:
-        require_positive(**{name: getattr(self, name) for name in self.quantities() if name != "stress_sensitivity"})
-        require_nonnegative(stress_sensitivity=self.stress_sensitivity)
+        positive = {name: getattr(self, name) for name in self.quantities() if name != "stress_sensitivity"}
+        require_all(
+            lambda: require_positive(**positive),
+            lambda: require_nonnegative(stress_sensitivity=self.stress_sensitivity),
+            self._require_working_range,
+        )
+
+    def _require_working_range(self) -> None:
         if not self.slowest_rate <= self.reference_rate <= self.fastest_rate:
             raise ParameterError(
                 "reference_rate must lie between slowest_rate and fastest_rate. Received "

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
-from quakedesign.fault.checks import require_positive
+from quakedesign.fault.checks import require_all, require_positive
 from quakedesign.fault.friction.weakening import Weakening
 
 if TYPE_CHECKING:
@@ -32,8 +32,7 @@ class SlipRateWeakening(Weakening):
     critical_rate: float = field(metadata={"unit": "m/s", "symbol": "v_c"})
 
     def __post_init__(self) -> None:
-        Weakening.__post_init__(self)
-        require_positive(critical_rate=self.critical_rate)
+        require_all(lambda: Weakening.__post_init__(self), lambda: require_positive(critical_rate=self.critical_rate))
 
     def coefficient(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
         """Friction coefficient [-] for rate ≥ 0."""

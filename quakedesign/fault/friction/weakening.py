@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from quakedesign.fault.checks import require_nonnegative, require_positive
+from quakedesign.fault.checks import require_all, require_nonnegative, require_positive
 from quakedesign.fault.friction.base import FrictionLaw
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ class Weakening(FrictionLaw):
     residual : float
         Kinetic friction coefficient μ_res [-], positive.
     drop : float
-        Static minus kinetic friction coefficient −Δμ [-], not negative.
+        Static minus kinetic friction coefficient Δμ [-], not negative; the paper's Δμ has the opposite sign.
 
     Raises
     ------
@@ -31,14 +31,14 @@ class Weakening(FrictionLaw):
     drop: float = field(metadata={"unit": "", "symbol": r"\Delta\mu"})
 
     def __post_init__(self) -> None:
-        require_positive(residual=self.residual)
-        require_nonnegative(
-            "It is the static minus the kinetic coefficient; the paper's Δμ has the opposite sign.", drop=self.drop
+        remedy = "It is the static minus the kinetic coefficient; the paper's Δμ has the opposite sign."
+        require_all(
+            lambda: require_positive(residual=self.residual), lambda: require_nonnegative(remedy, drop=self.drop)
         )
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Kinetic and static friction coefficient [-], μ_res and μ_max = μ_res − Δμ."""
+        """Kinetic and static friction coefficient [-], μ_res and μ_max = μ_res + drop."""
         return self.residual, self.residual + self.drop
 
     @property
@@ -65,8 +65,7 @@ class SlipWeakening(Weakening):
     critical_slip: float = field(metadata={"unit": "m", "symbol": "d_c"})
 
     def __post_init__(self) -> None:
-        Weakening.__post_init__(self)
-        require_positive(critical_slip=self.critical_slip)
+        require_all(lambda: Weakening.__post_init__(self), lambda: require_positive(critical_slip=self.critical_slip))
 
     def extended(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
         """Friction coefficient [-], held at its static value for slip < 0 (ERRATA 12)."""
