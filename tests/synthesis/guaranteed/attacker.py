@@ -5,7 +5,7 @@ p = Cz + Dy, z ← Fz + Gy at every sample, held from a delay later, through a l
 where there is one; y = (e1, e2), or (e1, e2, w) with w by a rule, of the errors as they are measured.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,6 +75,44 @@ def numbers(claim, force=None):
         pace=float(task.reference_rates[0]),
         rock=float(held.diffusion),
         lag=float(held.lag),
+    )
+
+
+def sliding(controller, weight, authority, claim, divisor):
+    """The same of a 2-CTA or 2-DIA; the end of the implicit step is found here."""
+    known = numbers(claim)
+    step, scale, a = known.step, float(controller.scale), float(weight)
+    gain = step * float(authority)
+    push, k = gain / divisor, [float(v) for v in controller.gains.values()]
+
+    def pull(slip, rate, sign):
+        """q, with a given selection of the sign of the slip."""
+        if controller.name == "cta":
+            smooth = scale ** (2 / 3) * k[0] * np.cbrt(slip) + scale**0.5 * k[1] * np.sign(rate) * abs(rate) ** 0.5
+            return push * (smooth + step * scale * (k[2] * sign + k[3] * np.sign(rate)))
+        inner = np.sign(rate) * abs(rate) ** 1.5 + scale**0.5 * k[0] ** 1.5 * slip
+        return push * (scale**0.5 * k[1] * np.cbrt(inner) + step * scale * k[2] * sign)
+
+    def ends(e1, e2):
+        dead = -e1 / step
+        low, high = (dead - e2 + pull(0 * e1, dead, sign) for sign in (-1, 1))
+        found, moving = dead.copy(), (low > 0) | (high < 0)
+        if moving.any():
+            left, right, p, q = np.full(moving.sum(), -50.0), np.full(moving.sum(), 50.0), e1[moving], e2[moving]
+            for _ in range(90):
+                w = (left + right) / 2
+                above = w - q + pull(p + step * w, w, np.sign(p + step * w)) > 0
+                left, right = np.where(above, left, w), np.where(above, w, right)
+            found[moving] = (left + right) / 2
+        return found
+
+    return replace(  # z = (e2 before, what was asked for before [Pa], estimate [Pa])
+        known,
+        F=np.array([[0, 0, 0], [a / gain, a, -(1 - a)], [-a / gain, -a, 1 - a]]),
+        G=np.array([[0, 1, 0], [0, -(1 + a) / gain, 1 / gain], [0, a / gain, 0]]),
+        C=np.array([a / gain, a, -(1 - a)]),
+        D=np.array([0, -(1 + a) / gain, 1 / gain]),
+        ends=ends,
     )
 
 
@@ -272,3 +310,58 @@ def drifting(held, change, pieces, choose):
         return s, w, beta, now[0]
 
     return slow
+
+
+def mixed(held, pieces, count, seed, memory):
+    """Courses of every kind at once, and the noise beside them: `choose` and `hear` for `run`.
+
+    Most courses push along a nominal response of either error, of either end of β, that ends at a random time and
+    begins anew, some with random turns; others turn at random alone. s, w and β follow the state, or turn at random.
+    With a slope of β it is one function of the slip for a whole course, which rises and falls as steeply as it may,
+    once or many times. `memory`: over how many periods responses are followed.
+    """
+    random, past = np.random.default_rng(seed), memory * pieces
+    nominals = [replace(held, beta=(gain, gain)) for gain in held.beta]
+    responses = np.vstack([responses_of(one, memory, pieces) for one in nominals])
+    which, end = random.integers(len(responses), size=count), random.integers(1, past + 1, size=count)
+    end[random.random(count) < 0.5] = past
+    alone, turning = random.random(count) < 0.25, random.random(count) < 0.5
+    share = np.where(alone | turning, 10.0 ** random.uniform(-2.5, 0, count), 0)
+    turns, start = np.zeros((5, count), dtype=int), random.integers(2, size=(5, count))
+    follows, wavy = random.random((3, count)) < 0.7, np.full(count, bool(held.slope))
+    spans = (held.beta[1] - held.beta[0]) / (held.slope or 1) * 10.0 ** random.uniform(-2, 0.5, count)
+    phase = random.random(count)
+
+    def choose(k, e, v):
+        place = (k + past - end) % past
+        turns[:] += random.random((5, count)) < share
+        own = np.array((1, -1))[(turns + start) % 2]
+        way = own[0] * np.where(alone, 1, np.sign(responses[which, 0, place]))
+        toward = [
+            np.where(follow, way * x, side) > 0 for follow, x, side in zip(follows, (*e, v), own[1:4], strict=True)
+        ]
+        s, w, beta = (
+            np.where(up, ends[1], ends[0]) for up, ends in zip(toward, (held.s, held.w, held.beta), strict=True)
+        )
+        slip = e[0] + held.pace * k * held.step / pieces
+        wave = held.beta[0] + held.slope * spans * np.abs((slip / spans / 2 + phase) % 1 - 0.5) * 2
+        return s, w, np.where(wavy, np.clip(wave, *held.beta), beta), way * held.force
+
+    def hear(k):
+        place = (k + past - end) % past
+        signs = np.where(turning, 1 - 2 * random.integers(2, size=(2, count)), np.sign(responses[which, 1:, place].T))
+        return np.array(held.noise)[:, None] * signs
+
+    return choose, hear if any(held.noise) else None
+
+
+def responses_of(held, periods, pieces):
+    """Of both errors at the end: to a kick, and to noise of slip and of slip rate, at every earlier small step."""
+    size = 1e-6  # where a sliding mode is told it: well within its bounds
+    found = [responses(held, periods, pieces, size=size)]
+    count = periods * pieces
+    for place in (0, 1):
+        pushed = np.outer(np.arange(2) == place, np.ones(count)) * size
+        told = lambda k, pushed=pushed: pushed * (np.arange(count) == k)  # noqa: E731
+        found.append(run(held, periods, pieces, nominal(held), count, hear=told)[1])
+    return np.array(found).swapaxes(0, 1)

@@ -89,6 +89,19 @@ def test_no_course_leaves_the_claims_and_some_come_near(row):
     assert rate <= claim.claims.slip_rate_error <= ROWS[row][2] * rate
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("row", ROWS)
+def test_no_mixed_course_of_ten_thousand_leaves_the_claims(row):
+    claim, periods, courses = proved(row), 40, 10_000
+    held = numbers(claim)
+    held = held if claim.slow_gain else replace(held, slope=0.0)
+    choose, _ = attacker.mixed(held, PIECES, courses, seed=4, memory=20)
+    off = moved(claim, held, periods, courses, seed=6)
+    slip, rate = attacker.run(held, periods, PIECES, choose, courses, off=off)[0].max(axis=1)
+    assert slip <= claim.claims.slip_error
+    assert claim.claims.slip_rate_error / ROWS[row][2] <= rate <= claim.claims.slip_rate_error
+
+
 @pytest.mark.parametrize("row", ["jitter", "of the delay", "sliding mode"])
 def test_the_search_stays_inside_and_finds_more_than_on_time(row):
     claim = proved(row)

@@ -70,48 +70,9 @@ def numbers(row):
     return attacked(*loop(row))
 
 
-def attacked(controller, weight, authority, claim):
-    """The same of any loop; the attacker finds the end of the implicit step of the 2-CTA and 2-DIA itself."""
-    step, gain, scale = float(STEP), float(STEP * authority), float(controller.scale)
-    push, a = gain / float(DIVISOR), float(weight)
-    k = [float(v) for v in controller.gains.values()]
-
-    def pull(slip, rate, sign):
-        """q, with a given selection of the sign of the slip."""
-        if controller.name == "cta":
-            smooth = scale ** (2 / 3) * k[0] * np.cbrt(slip) + scale**0.5 * k[1] * np.sign(rate) * abs(rate) ** 0.5
-            return push * (smooth + step * scale * (k[2] * sign + k[3] * np.sign(rate)))
-        inner = np.sign(rate) * abs(rate) ** 1.5 + scale**0.5 * k[0] ** 1.5 * slip
-        return push * (scale**0.5 * k[1] * np.cbrt(inner) + step * scale * k[2] * sign)
-
-    def ends(e1, e2):
-        dead = -e1 / step
-        low, high = (dead - e2 + pull(0 * e1, dead, sign) for sign in (-1, 1))
-        found, moving = dead.copy(), (low > 0) | (high < 0)
-        if moving.any():
-            left, right, p, q = np.full(moving.sum(), -50.0), np.full(moving.sum(), 50.0), e1[moving], e2[moving]
-            for _ in range(90):
-                w = (left + right) / 2
-                above = w - q + pull(p + step * w, w, np.sign(p + step * w)) > 0
-                left, right = np.where(above, left, w), np.where(above, w, right)
-            found[moving] = (left + right) / 2
-        return found
-
-    return attacker.Held(  # z = (e2 before, what was asked for before [Pa], estimate [Pa])
-        F=np.array([[0, 0, 0], [a / gain, a, -(1 - a)], [-a / gain, -a, 1 - a]]),
-        G=np.array([[0, 1, 0], [0, -(1 + a) / gain, 1 / gain], [0, a / gain, 0]]),
-        C=np.array([a / gain, a, -(1 - a)]),
-        D=np.array([0, -(1 + a) / gain, 1 / gain]),
-        b=float(TASK.authority),
-        s=tuple(map(float, TASK.slip_chord)),
-        w=tuple(map(float, TASK.rate_chord)),
-        beta=tuple(map(float, TASK.beta)),
-        step=step,
-        delay=0.0,
-        force=float(TASK.amplitude + TASK.reference_force),
-        ends=ends,
-        noise=(float(claim.held.slip_noise), float(claim.held.rate_noise)),
-    ), claim
+def attacked(*found):
+    *_, claim = found
+    return attacker.sliding(*found, divisor=float(DIVISOR)), claim
 
 
 @pytest.mark.parametrize("courses", [1_000, pytest.param(10_000, marks=pytest.mark.slow)])

@@ -140,6 +140,64 @@ def test_what_the_search_finds_is_reached_by_another_integrator_and_stays_below_
     assert plant.largest(pushed, pushed / 8000 * float(swing))[0] <= worst.log_rate
 
 
+def followed(stress, corner, pieces=4):
+    """Largest |ln(v/V)|, |slip error|, |ln(state)| and |p - p*| of many courses at once, of stress by small step.
+
+    By Lambert's function and RK4; `corner` has a, b and D_c of every course.
+    """
+    normal, stiffness, damping, speed, mu, lag, period = 50e6, 6e6, 2e7, 1.2e-6, 0.6, 10.0, 50.0
+    own, fed, output = (np.array(part, float) for part in (HELD.law.update, HELD.law.measured, HELD.law.output))
+    (a, b, d), courses, h = corner, stress.shape[1], period / pieces
+
+    def log_rate(x, z, p, s):
+        driving = (s - stiffness * x + mu * p + damping * speed) / (normal - p) - b * z
+        scale = a * (normal - p) / damping
+        return np.log(scale / speed * lambertw(np.exp(driving / a) * speed / scale).real)
+
+    def rates(x, z, p, s):
+        y = log_rate(x, z, p, s)
+        return np.array([speed * np.expm1(y), speed / d * (np.exp(-z) - np.exp(y))])
+
+    state, p, law, held = np.zeros((2, courses)), np.zeros(courses), np.zeros((len(output), courses)), np.zeros(courses)
+    largest, half, whole = np.zeros((4, courses)), math.exp(-h / 2 / lag), math.exp(-h / lag)
+    for number, s in enumerate(stress):
+        if number % pieces == 0:
+            held = output @ law + float(HELD.law.feedback[0]) * state[0]
+            law = own @ law + np.outer(fed[:, 0], state[0])
+        middle, end = held + (p - held) * half, held + (p - held) * whole
+        k1 = rates(*state, p, s)
+        k2 = rates(*(state + h / 2 * k1), middle, s)
+        k3 = rates(*(state + h / 2 * k2), middle, s)
+        k4 = rates(*(state + h * k3), end, s)
+        state, p = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), end
+        moved = np.maximum(*(np.abs(log_rate(*state, p, way * s)) for way in (1, -1)))
+        largest = np.maximum(largest, np.abs([moved, *state, p]))
+    return largest, log_rate(*state, p, 0 * p)
+
+
+def corners_of(ranges, courses, random):
+    ends = [ranges[name] for name in ("direct_effect", "evolution_effect", "critical_slip")]
+    return [np.array(end, float)[random.integers(2, size=courses)] for end in ends]
+
+
+@pytest.mark.parametrize("courses", [200, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_no_course_of_many_leaves_what_is_proved(courses):
+    """Stresses that push along a nominal response up to a random time, with random turns or without, or turn alone."""
+    stress, count, random = 8000, 160, np.random.default_rng(7)  # small steps for which a response is followed
+    found = proved_sliding(task("0.02", stress), HELD)
+    _, response = followed(np.eye(count), corners_of(task("0", stress).ranges, count, random))
+    end = np.where(random.random(courses) < 0.5, count, random.integers(1, count + 1, size=courses))
+    place = (np.arange(2 * count)[:, None] + count - end) % count
+    share = np.where(random.random(courses) < 0.5, 10.0 ** random.uniform(-2.5, 0, courses), 0)
+    turns = np.cumsum(random.random(place.shape) < share, axis=0) + random.integers(2, size=courses)
+    along = np.where(random.random(courses) < 0.8, np.sign(response)[place], 1)
+    largest, _ = followed(stress * along * (1 - 2 * (turns % 2)), corners_of(found.task.ranges, courses, random))
+    claims = found.claims
+    for seen, most in zip(largest, (claims.log_rate, claims.slip_error, claims.log_state, claims.push), strict=True):
+        assert seen.max() <= most
+    assert largest[0].max() > claims.log_rate / 3
+
+
 def test_the_box_is_searched_at_its_corners():
     ends = [(c.ranges["direct_effect"][0], c.ranges["critical_slip"][1]) for c in corners(task("0.1", 8000))]
     assert len(ends) == 8
