@@ -70,6 +70,9 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
         "its task, without inertia; of the fault itself it is true as far as that is",
         "slip-rate error: even with slip, slip rate, state and stress known up to the sample; the stress may jump",
     ]
+    if limits.rock:
+        holds = "IMPOSSIBLE for every controller, in the same sense" if limits.beyond else "not shown to be impossible"
+        told.append(f"the well that was asked about, L^2/D = {float(limits.rock):.4g} s: {holds}")
     if limits.largest_step.impossible_beyond is None:
         return [*told, "the others: none is known, since errors of this fault swing while they grow, or do not grow"]
     return [

@@ -234,10 +234,19 @@ class SlidingLimits(Limits):
     ----------
     push : SlidingPush
     guarantee : SlidingGuarantee or None
+    rock : Fraction
+        L²/D [s] of the well that was asked about; 0 without one.
     """
 
     push: SlidingPush
     guarantee: SlidingGuarantee | None
+    rock: Fraction
+
+    @property
+    def beyond(self) -> bool:
+        """Whether no controller can hold the fault through the rock that was asked about."""
+        farthest = self.largest_diffusion_time.impossible_beyond
+        return farthest is not None and self.rock > farthest
 
     @property
     def against(self) -> str:
@@ -411,14 +420,17 @@ def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fr
 def _sliding_limits(
     fault: Fault, pressure: float | None, diffusivity: float, stress: float | None, path: Around | None
 ) -> SlidingLimits:
-    """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path."""
+    """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path.
+
+    Where a path or no stress is told, the stress is that which the design with a near well stands; behind a path that
+    is impossible no design is looked for.
+    """
     withdrawal, spread = _given(fault, pressure, diffusivity)
     model, step = sliding_model(fault), rational(fault.sampling_time)
     asked = None if stress is None else rational(stress, "stress")
-    answer = None
-    if path is not None:
-        near: Around = path if any(path.values()) else {"diffusion": near_path(model)}
-        answer = answer_sliding(fault, stress=asked, **near)
+    told = path if path is not None and any(path.values()) else None
+    near: Around = {"diffusion": near_path(model)}
+    answer = None if path is None else answer_sliding(fault, stress=asked, **near)
     found = answer.found if answer is not None and isinstance(answer.found, SlidingGuarantee) else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
@@ -427,13 +439,17 @@ def _sliding_limits(
             f"was found that stands any{_why(answer)}. Give --stress, such as '25 kPa'."
         )
     push = SlidingPush(model=model, amplitude=amplitude)
+    impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
+    rock, farthest = (told or {}).get("diffusion", Fraction(0)), impossible["largest_diffusion_time"]
+    if told is not None and (farthest is None or rock <= farthest):
+        behind = answer_sliding(fault, stress=asked, **told).found
+        found = behind if isinstance(behind, SlidingGuarantee) else None
     proved: dict[str, Bound | None] = {}
     if found is not None:
         proved["peak_slip_rate_error"] = _above_the_reference(found)
         proved["largest_step"] = LowerBound(step)
         proved["largest_diffusion_time"] = LowerBound(found.held.diffusion)
         proved["smallest_pressure"] = found.claims.push
-    impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
     known = _limits(impossible, proved, KNOWING, ", of the linearised plant")
     return SlidingLimits(
         fault=fault,
@@ -445,6 +461,7 @@ def _sliding_limits(
         told=Told(),
         push=push,
         guarantee=found,
+        rock=rock,
     )
 
 

@@ -140,10 +140,17 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     assert f"proved: one design behind rock of L^2/D = {float(known.held.diffusion):.4g} s, of the fault" in told
     assert "D = 2 m^2/s" in told
     assert run(*patch, "--diffusion", "9 s") == run(*patch, "--diffusivity", "2") == 0
-    assert asked == [{"lag": 5, "diffusion": 800}, {"lag": 0, "diffusion": 9}, {"diffusion": asked[2]["diffusion"]}]
-    assert asked[2]["diffusion"] == pytest.approx(800)  # D_c/(10 V)
-    capsys.readouterr()
-    for others in (("--well", "40 m", "--diffusion", "9 s"), ("--well", "-1 m")):
+    near = {"diffusion": asked[0]["diffusion"]}
+    assert near["diffusion"] == pytest.approx(800)  # D_c/(10 V)
+    assert asked == [near, {"lag": 5, "diffusion": 800}, near, {"lag": 0, "diffusion": 9}, near]
+    assert "L^2/D = 9 s: not shown to be impossible" in " ".join(capsys.readouterr().out.split())
+    asked.clear()
+    assert run(*patch, "--well", "100 km") == 0
+    assert asked == [near]  # no design is looked for behind what is impossible
+    told = " ".join(capsys.readouterr().out.split())
+    assert "L^2/D = 1e+10 s: IMPOSSIBLE for every controller" in told
+    assert f"proved: one design behind rock of L^2/D = {float(known.held.diffusion):.4g} s" in told
+    for others in (("--well", "40 m", "--diffusion", "9 s"), ("--well", "0 m")):
         assert run(*patch, *others) == 2
     assert run("lab-fault", "--well", "1 m") == run("lab-fault", "--lag", "1 s") == 2
     errors = capsys.readouterr().err.splitlines()
