@@ -50,9 +50,13 @@ IMPORTS = {
         *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
         *("guarantee_loop", "guarantee_layer", "guarantee_slow"),
     ),
+    "guarantee_reach": (
+        *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
+        *("guarantee_loop", "guarantee_flows", "guarantee_bounds"),
+    ),
     "guarantee": (
         *("guarantee_reading", "guarantee_task", "guarantee_root"),
-        *("guarantee_loop", "guarantee_slow", "guarantee_bounds"),
+        *("guarantee_loop", "guarantee_slow", "guarantee_bounds", "guarantee_reach"),
     ),
     "slow_sliding": (
         *("guarantee_reading", "guarantee_task", "guarantee_numbers"),

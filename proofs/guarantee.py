@@ -10,6 +10,7 @@ from typing import Any
 
 from guarantee_bounds import bounds
 from guarantee_loop import read_loop
+from guarantee_reach import bounds_within, read_reach
 from guarantee_reading import Row, keys, lower, need, numbers, upper
 from guarantee_root import root_within
 from guarantee_slow import read_slow
@@ -28,7 +29,7 @@ def verify(document: dict[str, Any]) -> list[str]:
     Refused
         When a rule is broken, or a claim does not follow.
     """
-    more = [name for name in ("slow_gain", "start") if name in document]
+    more = [name for name in ("slow_gain", "start", "reach") if name in document]
     keys(document, "the file", "format", "kind", "fault", "reference", "disturbance", "loop", "claims", *more)
     given = document["claims"] if type(document["claims"]) is dict else {}
     asked = ASKED if any(name in given for name in ASKED) else ()
@@ -50,7 +51,12 @@ def verify(document: dict[str, Any]) -> list[str]:
     within = loop.root is None or root_within(loop.root, loop.step, *errors)
     need(within, "the root of the implicit step must lie between its lines for all errors that are claimed")
     slow = read_slow(document["slow_gain"], task, loop) if "slow_gain" in more else None
-    (slip, rate, *pushes), small = bounds(task, loop, slow, claims["slip_error"])
+    need(("reach" in more) == (loop.longest > 0), "samples that follow no clock need a reach, and no others have one")
+    need(not (slow and loop.longest), "samples that follow no clock must have no slow gain")
+    if loop.longest:
+        (slip, rate, *pushes), small = bounds_within(task, loop, read_reach(document["reach"], loop))
+    else:
+        (slip, rate, *pushes), small = bounds(task, loop, slow, claims["slip_error"])
     need(not slow or slip < claims["slip_error"], "the slip error that moves the input gain must stay below its claim")
     steps = [pushes.pop() / task.b] if loop.stepped else []
     ends = [end for push in pushes for end in (task.rest[0] - push / task.b, task.rest[1] + push / task.b)]
@@ -86,7 +92,9 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
     loop = document["loop"]
     when = "for a pressure that acts at once (continuous time), which no sampled controller has"
     if "step" in loop:
-        when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s"
+        often = f"every {loop['step']} s"
+        often += f" to {loop['longest']} s, each time anew" if "longest" in loop else ""
+        when = f"{often}, {loop['delay']} s late, lag {loop['lag']} s"
         when += f", rock of distance^2/diffusivity = {loop['diffusion']} s" if "diffusion" in loop else ""
     kind = f"any acceleration of at most {lower(task.amplitude)} m/s^2"
     if task.change is not None:

@@ -48,7 +48,8 @@ class Loop:
     is one more input, the last one. Where `asked`, the last output is the pressure at the valve. `start` has the
     columns of the box from which it starts, none where that is rest. `pump` has its limits as told. Where the
     valve's last step counts it is the last output, `stepped`, and `pulse` says when it may be made. `off` is by how
-    much measurements are early or late, and `told` says which of e1 and e2 have an input for that and noise.
+    much measurements are early or late, and `told` says which of e1 and e2 have an input for that and noise. Where
+    samples follow no clock each comes `step` to `longest` after the last; else that is 0.
     """
 
     flow: list[Row]
@@ -69,6 +70,7 @@ class Loop:
     pulse: Pulse | None = None
     off: Fraction = Fraction(0)
     told: list[int] = field(default_factory=list)
+    longest: Fraction = Fraction(0)
 
 
 @dataclass
@@ -88,6 +90,7 @@ class Held:
     first: list[Row]  # what the law makes of slip and slip rate before its first sample
     jitter: Row  # of measurements, of pressures besides, and over how long a measurement is a mean
     pump: dict[str, Fraction]
+    longest: Fraction  # interval from sample to sample; 0 where they follow a clock
 
     def __post_init__(self) -> None:
         whole, self.part = self.delay // self.step, self.delay % self.step  # arrival after a sample
@@ -129,7 +132,11 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     loop = Loop(flow, events, outputs, inputs, root, step, law.noise, cuts, start=starts_of(law, errors), pump=law.pump)
     loop = with_left_out(loop, law) if law.diffusion else loop
     loop = replace(loop, outputs=[*loop.outputs, unit(size)[law.valve]], asked=True) if law.path else loop
-    loop = replace(loop, off=law.off, told=heard)
+    loop = replace(loop, off=law.off, told=heard, longest=law.longest)
+    plain = not (law.delay or law.path or law.watched or root or any(errors) or any(map(any, law.first)))
+    need(
+        plain or not law.longest, "samples that follow no clock must be of a linear law from rest, its pressure at once"
+    )
     if not law.watched:
         return loop
     return replace(loop, outputs=[*loop.outputs, unit(size)[-1]], stepped=True, pulse=pulse_of(law))
@@ -137,7 +144,7 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
 
 def read_held(value: Any) -> Held:
     """Read step, delay, lag and diffusion, the law's matrices, the implicit step, the noise and the pump."""
-    optional = ("root", "noise", "diffusion", "first", "jitter", "pump", "applied")
+    optional = ("root", "noise", "diffusion", "first", "jitter", "pump", "applied", "longest")
     more = [k for k in optional if type(value) is dict and k in value]
     parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
     given = keys(value, "loop", *parts, *more)
@@ -157,7 +164,9 @@ def read_held(value: Any) -> Held:
         row(given["applied"], "applied", n)
     jitter = read_jitter(given["jitter"]) if "jitter" in more else [Fraction(0)] * 3
     pump = read_pump(given["pump"]) if "pump" in more else {}
-    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first, jitter, pump)
+    longest = number(given["longest"], "longest") if "longest" in more else Fraction(0)
+    need("longest" not in more or longest > step, "the longest interval must be longer than step")
+    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first, jitter, pump, longest)
     need(not (law.watched and time), "jitter and the rate of a pump must not be told of a loop through rock")
     need(law.size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
     return law

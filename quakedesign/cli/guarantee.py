@@ -59,6 +59,9 @@ class Surroundings:
         The same of the delay alone.
     averaging_time
         Over which the law is told means of slip and slip rate, up to each sample; the delay counts from its end.
+    longest_step
+        By no clock: the next sample comes any time from T_s to this after the last, each time anew, as a computer that
+        sleeps for T_s does; the law is not told.
     saturation
         Largest pressure of the pump, such as '20 MPa', and largest withdrawal unless that is given: a proof is one that
         these limits are never reached.
@@ -81,6 +84,7 @@ class Surroundings:
     jitter: ExactSeconds = "0"
     delay_jitter: ExactSeconds = "0"
     averaging_time: ExactSeconds = "0"
+    longest_step: ExactSeconds = "0"
     saturation: ExactPascals | None = None
     withdrawal: ExactPascals | None = None
     rate_limit: ExactPascalsPerSecond | None = None

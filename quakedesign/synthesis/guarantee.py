@@ -122,7 +122,8 @@ def answer(
         return Answer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None))
     wanted = Wanted(gains=gains, objective=objective, scheme=scheme, measured=measured, around=around)
     given = method_of(law).sampled(fault, task, law, period, wanted)
-    slow = "" if gains else too_slow(task, rational(fault.effective_normal_stress), period, late)
+    longest = max(period, around.get("longest_step", period))
+    slow = "" if gains else too_slow(task, rational(fault.effective_normal_stress), longest, late)
     if not slow or given.proved:
         return given
     return replace(given, found=NoGuarantee(reason=slow, small_gain=None))
@@ -139,6 +140,7 @@ _UNITS = {
     "jitter": "s",
     "delay_jitter": "s",
     "averaging_time": "s",
+    "longest_step": "s",
 }
 _SLOWLY = ("delay", "lag", "diffusion", "slip_noise", "pump")
 Quantity = str | float | Fraction
@@ -194,7 +196,7 @@ def guarantee(
     **around : str, float or Fraction
         ``delay``, ``lag`` and ``diffusion`` (L²/D) [s], ``slip_noise`` [m] and ``rate_noise`` [m/s] as bounds, and
         ``initial_slip`` [m] and ``initial_slip_rate`` [m/s] as bounds of the start, ``jitter``, ``delay_jitter``
-        and ``averaging_time`` [s]; 0 unless given.
+        and ``averaging_time`` [s], and ``longest_step`` [s] where samples follow no clock; 0 unless given.
 
     Returns
     -------

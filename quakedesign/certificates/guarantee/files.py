@@ -14,6 +14,7 @@ from quakedesign.certificates.guarantee.claims import Claims
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
 from quakedesign.certificates.guarantee.held import Held
 from quakedesign.certificates.guarantee.pump import Pump
+from quakedesign.certificates.guarantee.reach import MOST_FACETS, MOST_PIECES, Reach, require_fit
 from quakedesign.certificates.guarantee.slow_gain import SlowGain
 from quakedesign.certificates.guarantee.statement import Guarantee
 from quakedesign.certificates.guarantee.task import Friction, Task
@@ -50,7 +51,7 @@ _SLIDING_REFERENCE = ("rate", "distance", "ramp")
 _NOISE = ("slip", "rate")
 _LIMITS, _JITTER = ("least", "largest"), ("measured", "delay")
 _LAW = ("states", "measured", "output", "feedback")
-_MORE = {"root", "noise", "diffusion", "first", "jitter", "pump", "applied"}
+_MORE = {"root", "noise", "diffusion", "first", "jitter", "pump", "applied", "longest"}
 _FAULT = re.compile(r"\w[\w .+-]{0,59}")
 _MOST_COEFFICIENTS = 13
 _MOST_STATES = 20
@@ -117,8 +118,9 @@ def _exactly(value: Any, names: Iterable[str]) -> dict[str, str]:
 def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
     task = claim.task
     change = {} if task.change is None else {"change": str(task.change)}
-    slow, start = None, {}
+    slow, start, reach = None, {}, None
     if isinstance(claim, Guarantee):
+        reach = claim.reach
         slow, errors = claim.slow_gain, dict(zip(_NOISE, texts(claim.held.start), strict=True))
         start = {"start": errors} if any(claim.held.start) else {}
     return {
@@ -138,6 +140,7 @@ def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         "loop": _loop(claim),
         **start,
         **({} if slow is None else {"slow_gain": {"parts": slow.parts, "growth": str(slow.growth)}}),
+        **({} if reach is None else {"reach": _reach_document(reach)}),
     }
 
 
@@ -186,6 +189,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         jitter |= {"mean": claim.held.averaging} if claim.held.averaging else {}
         own |= {"jitter": {name: str(v) for name, v in jitter.items()}} if any(jitter.values()) else {}
         own |= {"pump": _pump_document(claim.held)} if claim.held.pump else {}
+        own |= {"longest": str(claim.held.longest_step)} if claim.held.longest_step else {}
     return {
         **times,
         "states": list(law.states),
@@ -197,7 +201,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
 
 
 def _read_tracking(raw: Any) -> Guarantee | ContinuousPeaks:
-    more = {"slow_gain", "start"} & set(raw) if isinstance(raw, dict) else set[str]()
+    more = {"slow_gain", "start", "reach"} & set(raw) if isinstance(raw, dict) else set[str]()
     headed(raw, {"fault", "reference", "disturbance", "loop", "claims"} | more, GUARANTEE)
     task, claims, loop = _task(raw), _claims(Claims, raw), raw["loop"]
     if isinstance(loop, dict) and "rates" in loop:
@@ -206,7 +210,13 @@ def _read_tracking(raw: Any) -> Guarantee | ContinuousPeaks:
     else:
         slow_gain = _slow_gain(raw["slow_gain"], task) if "slow_gain" in more else None
         held = _held(loop, _start(raw["start"]) if "start" in more else {})
-        claim = Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
+        reach = _reach(raw["reach"]) if "reach" in more else None
+        free = bool(held.longest_step)
+        need(free == (reach is not None), "samples that follow no clock need a reach, and no others have one")
+        need(not free or slow_gain is None, "samples that follow no clock have no slow gain")
+        claim = Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
+        if reach is not None:
+            require_fit(claim.loop, reach)
     loop = claim.loop
     told = "asked" in loop.outputs or claims.least_asked is None
     need(told, "without a lag and rock the claims must not tell the valve's pressure from the fault's")
@@ -316,6 +326,8 @@ def _held(raw: Any, start: dict[str, Fraction]) -> Held:
     times |= {f"{name}_noise": v for name, v in noise.items()} | start
     times |= _jitter(raw["jitter"]) if "jitter" in given else {}
     times |= _pump(raw["pump"]) if "pump" in given else {}
+    times |= {"longest_step": read_rational(raw["longest"])} if "longest" in given else {}
+    need(times.get("longest_step", 1) > 0, "the longest step must be positive where it is given")
     return Held(law=law, diffusion=diffusion, **times)
 
 
@@ -327,6 +339,32 @@ def _jitter(raw: Any) -> dict[str, Fraction]:
     need(measured + delay > 0 or bool(over), "jitter must be there where it is given")
     need(min(over, default=1) > 0, "a mean must be over some time where it is given")
     return {"jitter": measured, "delay_jitter": delay, "averaging": over[0] if over else _ZERO}
+
+
+def _reach_document(reach: Reach) -> dict[str, Any]:
+    return {
+        "inputs": texts(reach.inputs),
+        "facets": [texts(row) for row in reach.facets],
+        "at_samples": [[list(basis) for basis in line] for line in reach.at_samples],
+        "between": [[list(basis) for basis in line] for line in reach.between],
+    }
+
+
+def _reach(raw: Any) -> Reach:
+    with_keys(raw, {"inputs", "facets", "at_samples", "between"})
+    return Reach(
+        inputs=read_row(raw["inputs"], "inputs", _MOST_STATES),
+        facets=tuple(read_row(row, "a facet", _MOST_STATES) for row in listed(raw["facets"], "facets", MOST_FACETS)),
+        at_samples=_bases(raw["at_samples"]),
+        between=_bases(raw["between"]),
+    )
+
+
+def _bases(raw: Any) -> tuple[tuple[tuple[int, ...], ...], ...]:
+    lines = [listed(line, "bases", MOST_PIECES + 1) for line in listed(raw, "bases", MOST_FACETS)]
+    found = tuple(tuple(tuple(listed(basis, "a basis", _MOST_STATES)) for basis in line) for line in lines)
+    need(all(type(i) is int for line in found for basis in line for i in basis), "numbers of facets must be integers")
+    return found
 
 
 def _pump_document(held: Held) -> dict[str, str]:

@@ -28,6 +28,7 @@ class Around(TypedDict, total=False):
     delay_jitter: Fraction
     averaging: Fraction
     pump: Pump | None
+    longest_step: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,11 +54,14 @@ class Held:
         Limits at the valve, which the loop must never reach.
     ramp : Fraction
         Time in which the pump goes from one pressure to the next, at most [s].
+    longest_step : Fraction
+        Where samples follow no clock: each comes `step` to this after the last [s]; 0 where they do.
 
     Raises
     ------
     ParameterError
-        For a negative bound, or noise of a slip rate that the law does not measure.
+        For a negative bound, noise of a slip rate that the law does not measure, or samples that follow no clock with
+        anything but noise around the law.
     """
 
     law: LinearLaw
@@ -74,6 +78,7 @@ class Held:
     averaging: Fraction = Fraction(0)
     pump: Pump | None = None
     ramp: Fraction = Fraction(0)
+    longest_step: Fraction = Fraction(0)
 
     def __post_init__(self) -> None:
         if min(self.start) < 0:
@@ -95,6 +100,28 @@ class Held:
             raise ParameterError(
                 "noise of the slip rate needs a law that measures it. Received "
                 f"{float(self.rate_noise):.4g} m/s and a law of the slip alone. Leave it out."
+            )
+        if self.longest_step:
+            self._require_no_clock()
+
+    def _require_no_clock(self) -> None:
+        """Refuse intervals that are no range, and what asks for a schedule or a start at rest."""
+        if self.longest_step <= self.step:
+            raise ParameterError(
+                "the longest step must be longer than the step, the shortest one. Received "
+                f"{float(self.longest_step):.4g} s and {float(self.step):.4g} s. Exchange them, or leave it out."
+            )
+        first = (v for row in self.law.first for v in row)
+        times = (self.ramp, self.jitter, self.delay_jitter, self.averaging)
+        if (
+            any((*self.path.values(), *self.start, *times, *first))
+            or self.law.root is not None
+            or (self.pump and self.pump.rate)
+        ):
+            raise ParameterError(
+                "samples that follow no clock are known from rest, of a linear law whose pressure acts at once. "
+                "Received a longest step beside a delay, a lag, rock, a start, jitter, means, the rate of a pump or an "
+                "implicit step. Leave one of them out."
             )
 
     @property
@@ -129,6 +156,11 @@ class Held:
         if not (self.off or self.delay_jitter or (self.pump and self.pump.rate)):
             return None
         return Instants(measured=self.off, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
+
+    @property
+    def slack(self) -> Fraction:
+        """By how much an interval from sample to sample may be longer than the shortest [s]; 0 with a clock."""
+        return max(self.longest_step - self.step, Fraction(0))
 
     @property
     def longest_ramp(self) -> Fraction:

@@ -229,9 +229,9 @@ def bounds_from(
     return Bounds(
         slip_error=Fraction(peaks["slip_error"]),
         slip_rate_error=Fraction(peaks["slip_rate_error"]),
-        push=Fraction(peaks["push"] + peaks.get("left_out", _ZERO) + _unshifted(task)),
+        push=Fraction(peaks["push"] + peaks.get("left_out", _ZERO) + unshifted(task)),
         small_gain=Fraction(small_gain),
-        asked=Fraction(peaks["asked"] + _unshifted(task)) if "asked" in peaks else None,
+        asked=Fraction(peaks["asked"] + unshifted(task)) if "asked" in peaks else None,
         stepped=Fraction(peaks["stepped"]) if "stepped" in peaks else None,
     )
 
@@ -297,7 +297,7 @@ def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
     return [row[size] for row in rows]
 
 
-def _unshifted(task: Task) -> Fraction:
+def unshifted(task: Task) -> Fraction:
     """What b·(p − p*) is more than the push of the loop, p* being shifted in the class ``rate`` [m/s²]."""
     if task.change is None:
         return _ZERO

@@ -10,6 +10,7 @@ from quakedesign.certificates.guarantee import sector
 from quakedesign.certificates.guarantee.claims import MARGIN, Claims, above
 from quakedesign.certificates.guarantee.held import Held
 from quakedesign.certificates.guarantee.inputs import Gains
+from quakedesign.certificates.guarantee.reach import Reach, reached_bounds
 from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
 from quakedesign.certificates.guarantee.small_gain import Bounds, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.certificates.guarantee.task import Task
@@ -41,6 +42,8 @@ class Guarantee:
     claims : Claims
     slow_gain : SlowGain, optional
         How the proof uses that the input gain is slow; None for one that lets it jump.
+    reach : Reach, optional
+        Of samples that follow no clock, the set that the loop never leaves; None for others.
     covers, lasts : str
         For what it holds, and for how long, in short.
     """
@@ -49,6 +52,7 @@ class Guarantee:
     held: Held
     claims: Claims
     slow_gain: SlowGain | None = None
+    reach: Reach | None = None
     covers: ClassVar[str] = (
         "every friction law of the box and every disturbance up to the stated size, for a plant continued to negative "
         "slip rates"
@@ -95,7 +99,7 @@ class Guarantee:
     def bounds(self) -> Bounds | NoGuarantee:
         """What the theorem gives, computed anew."""
         if self.slow_gain is None:
-            return _bounds(self.task, self.held, self.loop)
+            return _bounds(self.task, self.held, self.loop, self.reach)
         gains = _slow_gains(self.task, self.held, self.slow_gain)
         if isinstance(gains, NoGuarantee):
             return gains
@@ -116,6 +120,9 @@ class Guarantee:
         """What is guaranteed, for people."""
         held = self.held
         when = f"held over {_seconds(held.step)}"
+        if held.longest_step:
+            shortest, longest = UpperBound(held.step), LowerBound(held.longest_step)
+            when = f"held over anything from {shortest:.6g} s to {longest:.6g} s, by no clock"
         when += f", {_seconds(held.delay)} late" if held.delay else ""
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
         when += f", through rock of L^2/D = {_seconds(held.diffusion)} from well to fault" if held.diffusion else ""
@@ -151,14 +158,23 @@ def sentence_of(task: Task, claims: Claims, when: str, start: str = "from rest")
     )
 
 
-def guarantee(task: Task, held: Held, slow_gain: SlowGain | None = None) -> Guarantee | NoGuarantee:
+def guarantee(
+    task: Task, held: Held, slow_gain: SlowGain | None = None, reach: Reach | None = None
+) -> Guarantee | NoGuarantee:
     """Tightest rounded claims about a loop, or why there are none; of a pump of some rate, with a ramp that will do.
+
+    Samples that follow no clock need a reach, and have no slow gain.
 
     Raises
     ------
     ParameterError
         For a loop without a steady state, or a slow gain and friction of the slip rate.
     """
+    if reach is not None:
+        bounds = _bounds(task, held, held.loop(task), reach)
+        return (
+            bounds if isinstance(bounds, NoGuarantee) else _of_claims(task, held, _rounded(task, bounds), reach=reach)
+        )
     if held.pump is None or held.pump.rate is None or held.ramp:
         return _proved(task, held, slow_gain)
     found, longest = _proved(task, replace(held, ramp=_FIRST * held.step), slow_gain), held.longest_ramp
@@ -174,20 +190,29 @@ def guarantee(task: Task, held: Held, slow_gain: SlowGain | None = None) -> Guar
 
 def _proved(task: Task, held: Held, slow_gain: SlowGain | None) -> Guarantee | NoGuarantee:
     claims = _claims(task, held) if slow_gain is None else _slow_claims(task, held, slow_gain)
-    if isinstance(claims, NoGuarantee):
-        return claims
+    return claims if isinstance(claims, NoGuarantee) else _of_claims(task, held, claims, slow_gain)
+
+
+def _of_claims(
+    task: Task, held: Held, claims: Claims, slow_gain: SlowGain | None = None, reach: Reach | None = None
+) -> Guarantee | NoGuarantee:
+    """What is claimed, or what speaks against it."""
     if not _root_within(task, held, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
         return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
     if reason := claims.opens(task) or _beyond_the_pump(held, claims):
         slow = held.pump is not None and bool(held.pump.too_slow(claims.largest_step, held.ramp))
         return NoGuarantee(reason=reason, small_gain=None, needs=claims.largest_step if slow else None)
-    return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain)
+    return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
 
 
 def _claims(task: Task, held: Held) -> Claims | NoGuarantee:
     bounds = _bounds(task, held, held.loop(task))
-    return bounds if isinstance(bounds, NoGuarantee) else Claims.of(task, bounds).rounded()
+    return bounds if isinstance(bounds, NoGuarantee) else _rounded(task, bounds)
+
+
+def _rounded(task: Task, bounds: Bounds) -> Claims:
+    return Claims.of(task, bounds).rounded()
 
 
 def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
@@ -199,7 +224,7 @@ def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuar
         bounds = _slow_bounds(task, held, slow_gain, gains, slip_error)
         if isinstance(bounds, NoGuarantee):
             return bounds
-        claims = Claims.of(task, bounds).rounded()
+        claims = _rounded(task, bounds)
         if claims.slip_error <= slip_error:
             return claims
         slip_error = above(claims.slip_error * MARGIN)
@@ -236,7 +261,11 @@ def _beyond_the_pump(held: Held, claims: Claims) -> str:
     return held.pump.exceeded(*claims.pressures[-1]) or held.pump.too_slow(claims.largest_step, held.ramp)
 
 
-def _bounds(task: Task, held: Held, loop: PeriodicLoop) -> Bounds | NoGuarantee:
+def _bounds(task: Task, held: Held, loop: PeriodicLoop, reach: Reach | None = None) -> Bounds | NoGuarantee:
+    if reach is not None:
+        return reached_bounds(task, held, reach)
+    if held.longest_step:
+        return NoGuarantee(reason="samples that follow no clock need a set that the loop never leaves", small_gain=None)
     try:
         return certified_bounds(task, loop, held.law.root, held.noise, held.off)
     except ParameterError:

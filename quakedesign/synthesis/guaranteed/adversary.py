@@ -50,7 +50,8 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     friction holds it wherever the loop would, along the reference at its largest rate and at a twentieth of that, and
     courses that switch after random times are tried as well. Noise is at its ends too. An implicit step ends where its
     equation says, inside its lines or not. A box of starts is left from its corners. With jitter each event is as early
-    or as late as it may be; pressures rise at once, as a pump of any rate may do, and means are of their middle alone.
+    or as late as it may be, by no clock each interval as short or as long; pressures rise at once, as a pump of any
+    rate may do, and means are of their middle alone.
     """
     slip, rate = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     return WorstFound(slip_error=slip, slip_rate_error=rate)
@@ -73,7 +74,7 @@ def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
 class _Event:
     """A jump and the time after it, `soon` where it may be left to the next one, `late` where that is the same again.
 
-    `samples` where the law is told something.
+    `samples` where the law is told something. Of a time that may pass as if it were none there may be any part, `free`.
     """
 
     jump: Matrix
@@ -81,6 +82,7 @@ class _Event:
     samples: bool
     soon: bool = False
     late: bool = False
+    free: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,12 +120,15 @@ def _on_time(held: Held) -> tuple[Held, Fraction, Fraction]:
         off = min(off, part / 2, (held.step - part) / 2)
         late = min(late, _NEARLY * (part - off), _NEARLY * (held.step - part - off))
         delay += late
-    plain = replace(held, delay=delay, pump=None, **_ON_TIME)
+    plain = replace(held, delay=delay, pump=None, longest_step=Fraction(0), **_ON_TIME)
     return plain, off, 2 * late if alone or part else Fraction(0)
 
 
-def _events(loop: PeriodicLoop, off: Fraction, early: Fraction) -> list[_Event]:
-    """Those of one period from the earliest sample on: samples off by some time, pressures up to some time early."""
+def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, more: Fraction = Fraction(0)) -> list[_Event]:
+    """Those of one period from the earliest sample on: samples off by some time, pressures up to some time early.
+
+    By no clock each period may have up to some time more.
+    """
     sample, *others = loop.segments
     waits = sample.duration - early - off if others else sample.duration - 2 * off
     found = [_Event(sample.jump, 2 * off, samples=True, soon=True)] if off else []
@@ -131,7 +136,8 @@ def _events(loop: PeriodicLoop, off: Fraction, early: Fraction) -> list[_Event]:
     for arrival in others:
         found += [_Event(arrival.jump, early, samples=False, soon=True)] if early else []
         found.append(_Event(arrival.jump, arrival.duration - off, samples=False, late=bool(early)))
-    return found
+    still = tuple(tuple(Fraction(i == j) for j in range(len(loop.flow))) for i in range(len(loop.flow)))
+    return [*found, *([_Event(still, more, samples=False, free=True)] if more else [])]
 
 
 @dataclass(slots=True)
@@ -210,8 +216,9 @@ class _Search:
         push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
         ends = product(task.beta, task.slip_chord, task.rate_chord)
         vertices = [_at(task, flow, push, *map(float, v)) for v in ends]
-        events = _events(loop, off, early) if loop.segments else [_flowing(flow)]
-        self.parts = [_pieces(vertices, inputs, event) for event in events]
+        more = claim.held.slack if isinstance(claim, Guarantee) else Fraction(0)
+        events = _events(loop, off, early, more) if loop.segments else [_flowing(flow)]
+        self.parts = [_pieces(vertices, inputs, event, none=more > 0) for event in events]
         self.punctual = bool(held and (held.law.first or any(held.start)))  # at first
         if periods is None:
             periods = _periods_to_forget(self.parts, len(loop.states))
@@ -221,11 +228,11 @@ class _Search:
         self.rest_limit = None
         if self.back is not None and isinstance(claim, Guarantee):
             self.rest_limit = _Limit.of(claim, held or claim.held, self.size, self.back)
-        self.allowed = np.ones((courses, len(vertices)), dtype=bool)
+        self.allowed = np.ones((courses, len(self.parts[0].steps)), dtype=bool)
         slow = isinstance(claim, Guarantee) and claim.slow_gain is not None
         if (slow or self.limit is not None) and beta[0] < beta[1]:  # β is slow; it stays at either end
             half = len(vertices) // 2
-            self.allowed[::2, :half] = self.allowed[1::2, half:] = False
+            self.allowed[::2, :half] = self.allowed[1::2, half : len(vertices)] = False
         self.aim = np.zeros((courses, self.size))
         self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
         self.steps = periods * len(self.parts) * _PIECES
@@ -429,10 +436,14 @@ def _flowing(flow: np.ndarray) -> _Event:
     return _Event(still, Fraction(1 / max(abs(np.linalg.eigvals(flow)))), samples=True)
 
 
-def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, event: _Event) -> _Pieces:
-    length = float(event.duration) / _PIECES
-    steps, added = zip(*(moved(flow, inputs, length) for flow in vertices), strict=True)
-    return _Pieces(event, _widened(event.jump, len(inputs)), np.array(steps), np.array(added), length)
+def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, event: _Event, *, none: bool = False) -> _Pieces:
+    """Pieces of an event; with `none` there is one vertex more, at which no time passes where that is free."""
+    length, size = float(event.duration) / _PIECES, len(inputs)
+    found = [moved(flow, inputs, length) for flow in vertices]
+    if none:
+        found.append((np.eye(size), np.zeros(inputs.shape)) if event.free else found[0])
+    steps, added = zip(*found, strict=True)
+    return _Pieces(event, _widened(event.jump, size), np.array(steps), np.array(added), length)
 
 
 def _periods_to_forget(parts: list[_Pieces], size: int) -> int:

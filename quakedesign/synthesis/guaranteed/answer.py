@@ -18,7 +18,17 @@ from quakedesign.synthesis.guaranteed.compensated import Compensation
 from quakedesign.synthesis.guaranteed.families import MEASURED
 from quakedesign.synthesis.guaranteed.poles import own_poles
 
-_TOLD = ("step", "slip_noise", "rate_noise", "initial_slip", "initial_slip_rate", "jitter", "delay_jitter", "averaging")
+_TOLD = (
+    "step",
+    "slip_noise",
+    "rate_noise",
+    "initial_slip",
+    "initial_slip_rate",
+    "jitter",
+    "delay_jitter",
+    "averaging",
+    "longest_step",
+)
 _GROWS = 1 + 1e-6  # a factor per sample; eigenvalues that are 1 twice are rounded by less
 
 
@@ -96,7 +106,7 @@ class Answer:
         if limit is None or not isinstance(self.found, Guarantee):
             return []
         held = self.found.held
-        step = f"{float(held.step):.6g} s"
+        step = f"{float(max(held.step, held.longest_step)):.6g} s"
         step += " with that noise" if held.noise else ""
         both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
         rate = f"{limit.slip_rate_error:.3g} m/s"
@@ -125,7 +135,8 @@ class Answer:
             return None
         held = self.found.held
         rate_noise = None if held.law.of_slip_alone else held.rate_noise
-        return smallest_peak(self.found.task, held.step, held.delay, slip_noise=held.slip_noise, rate_noise=rate_noise)
+        step = max(held.step, held.longest_step)
+        return smallest_peak(self.found.task, step, held.delay, slip_noise=held.slip_noise, rate_noise=rate_noise)
 
     @property
     def leaves_with_stick(self) -> bool:

@@ -19,10 +19,12 @@ from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated, slowl
 from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of, require_surroundings, why_no_law
 from quakedesign.synthesis.guaranteed.poles import own_poles
 from quakedesign.synthesis.guaranteed.slowly import best_guarantee
+from quakedesign.synthesis.guaranteed.unclocked import unclocked_estimate
 
 OBJECTIVES = ("tracking", "peak")
 _EVALUATIONS = 150
 _FEW = 50  # evaluations near a law that has a guarantee at another time
+_FEWER = 80  # evaluations where samples follow no clock
 _CREEPING = 0.1  # what the slip error over a period counts beside the slip-rate error, so that the loop does not creep
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
 _MOST_GROWTH = 50.0  # logarithm; no law of samples answers that, and predictions far beyond it overflow
@@ -58,7 +60,7 @@ def first_held(
         return none, x
     held = laws.held(x)
     # through a layer a guarantee needs a slow input gain; elsewhere one with any gain is much sooner found
-    return best_guarantee(task, held) if held.diffusion else guarantee(task, held), x
+    return best_guarantee(task, held) if held.diffusion or held.longest_step else guarantee(task, held), x
 
 
 def design_held(
@@ -141,7 +143,8 @@ class _Laws:
         if reason := why_no_law(step, measured, around):
             return NoGuarantee(reason=reason, small_gain=None)
         require_known(measured, MEASURED, "measured")
-        family = family_of(task, step, measured, around)
+        middle = (step + (around.get("longest_step") or step)) / 2  # for which a law predicts that is told no time
+        family = family_of(task, middle, measured, around)
         template = Held(law=family.law(np.array(family.starts[0])), step=step, **around)
         return cls(task, family, template, (task, step, measured, tuple(sorted(around.items()))))
 
@@ -152,6 +155,7 @@ class _Laws:
     def seen(self, x: np.ndarray) -> Estimate | None:
         """What is estimated of a law; None where there is none of these numbers."""
         judged = slowly_estimated if self.template.diffusion and not self.task.friction.rate_slope else estimated
+        judged = unclocked_estimate if self.template.longest_step else judged
         try:
             return judged(self.task, self.held(x)) if self.family.admits(x) else None
         except LinAlgError:  # of a Riccati equation
@@ -168,6 +172,7 @@ class _Laws:
         Through a layer every evaluation takes a tenth of a second.
         """
         far = _FAR * _FAILED if self.template.diffusion else inf
+        settings = self._effort | settings
 
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _peak_cost(self.seen(x), self.family.period))
@@ -180,7 +185,12 @@ class _Laws:
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _drift_cost(self.seen(x), limit))
 
-        return _search_once(("drift", limit, *self.question), cost, start)
+        return _search_once(("drift", limit, *self.question), cost, start, **self._effort)
+
+    @property
+    def _effort(self) -> dict[str, Any]:
+        """Evaluations of a search, where one takes a twentieth of a second."""
+        return {"evaluations": _FEWER} if self.template.longest_step else {}
 
     def quiet(self, x: np.ndarray, cost: float) -> float:
         """The cost of a law; that of none where the law, left to itself while the fault sticks, settles too slowly."""

@@ -65,6 +65,8 @@ def require_surroundings(around: Around) -> None:
 
 def why_no_law(step: Fraction, measured: str, around: Around) -> str:
     """Why there are no laws for a loop; empty if there are."""
+    if around.get("longest_step") and measured == MEASURED[1]:
+        return "samples that follow no clock are designed for with slip and slip rate measured"
     if not around.get("diffusion"):
         return ""
     if SHORTEST * around["diffusion"] < step:

@@ -9,13 +9,19 @@ from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, Slo
 from quakedesign.loop import PeriodicLoop
 from quakedesign.synthesis.guaranteed.poles import spectral_radius
 from quakedesign.synthesis.guaranteed.rounding import short
+from quakedesign.synthesis.guaranteed.unclocked import unclocked_guarantee
 
 _PARTS = 8
 _SHARE = 0.5  # of the slowest decay, for what is past to grow by
 
 
 def best_guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
-    """Guarantee with an input gain that is slow, where the friction's is and it helps, else with any."""
+    """Guarantee with an input gain that is slow, where the friction's is and it helps, else with any.
+
+    Where samples follow no clock that is one with a set that the loop never leaves.
+    """
+    if held.longest_step:
+        return unclocked_guarantee(task, held)
     slow = slow_gain(task, held)
     found = guarantee(task, held) if slow is None else guarantee(task, held, slow)
     if slow is None or isinstance(found, Guarantee):
@@ -30,7 +36,7 @@ def tightened(found: Guarantee) -> Guarantee: ...
 def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee: ...
 def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee:
     """A guarantee with a slow input gain in place of one with any, where there is one."""
-    if isinstance(found, NoGuarantee) or found.slow_gain is not None:
+    if isinstance(found, NoGuarantee) or found.slow_gain is not None or found.reach is not None:
         return found
     better = best_guarantee(found.task, found.held)
     return better if isinstance(better, Guarantee) else found

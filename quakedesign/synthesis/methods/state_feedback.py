@@ -100,7 +100,7 @@ class StateFeedback(Method[ExtendedLQR]):
             return attacked(fault, best_guarantee(task, Held(law=summed, step=step, **wanted.around)))
         told: Any = {"measured": wanted.measured, **wanted.around}
         found = design_held(task, step, objective=wanted.objective, **told)
-        if isinstance(found, Guarantee):
+        if isinstance(found, Guarantee) or wanted.around.get("longest_step"):
             return attacked(fault, found)
         longest = longest_step(task, step, most=step, **told)
         return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest, wanted.objective))

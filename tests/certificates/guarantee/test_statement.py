@@ -130,7 +130,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     )
     quiet = Held(law=alone, step=F(1))
     around = ("delay", "lag", "diffusion", "slip_noise", "rate_noise", "initial_slip", "initial_slip_rate")
-    around += ("jitter", "delay_jitter", "averaging")
+    around += ("jitter", "delay_jitter", "averaging", "longest_step")
     assert (quiet.noise, quiet.around) == ({}, dict.fromkeys(around, 0) | {"pump": None})
     said = Guarantee(task=TASK, held=quiet, claims=CLAIMS).sentence()
     assert "held over 1 s, with the slip alone measured, for every" in said

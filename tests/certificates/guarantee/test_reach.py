@@ -1,0 +1,235 @@
+"""Samples by no clock: both checkers on one file, and on what is worse, smaller or of another kind."""
+
+import copy
+import json
+from dataclasses import replace
+from fractions import Fraction as F
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from standalone_guarantee import checker
+
+from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.guarantee import NoGuarantee, guarantee
+from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.guarantee.reach import reduced
+from quakedesign.errors import CertificateError, ParameterError
+
+FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"
+REFUSED = checker.Refused
+
+
+@cache
+def text():
+    return FILE.read_text()
+
+
+@cache
+def claim():
+    return parse_guarantee(text())
+
+
+def changed(place, new):
+    raw = json.loads(text())
+    holder = raw
+    for key in place[:-1]:
+        holder = holder[key]
+    holder[place[-1]] = new(holder[place[-1]]) if callable(new) else new
+    return raw
+
+
+def package(raw):
+    try:
+        return str(parse_guarantee(json.dumps(raw)).check())
+    except CertificateError:
+        return "invalid"
+
+
+def standalone(raw):
+    try:
+        checker.verify(copy.deepcopy(raw))
+    except REFUSED as refused:
+        return str(refused)
+    return "proved"
+
+
+def without(place):
+    raw = json.loads(text())
+    holder = raw
+    for key in place[:-1]:
+        holder = holder[key]
+    del holder[place[-1]]
+    return raw
+
+
+def times(factor):
+    return lambda value: str(F(value) * F(factor))
+
+
+def scaled(rows, factor):
+    return [[str(F(v) * F(factor)) for v in row] for row in rows]
+
+
+def test_both_prove_the_file_and_say_so():
+    assert claim().check() is Verdict.PROVED
+    assert "held over anything from 0.001 s to 0.002 s, by no clock," in claim().sentence()
+    lines = checker.verify(json.loads(text()))
+    assert "every 1/1000 s to 1/500 s, each time anew," in lines[2]
+    assert guarantee_text(claim()) == text()
+
+
+def test_both_find_the_same_bounds():
+    known = claim()
+    ours, raw = known.bounds(), json.loads(text())
+    task = checker.read_task(raw)
+    loop = checker.read_loop(raw["loop"], task, [F(0)] * 2)
+    peaks, small = checker.bounds_within(task, loop, checker.read_reach(raw["reach"], loop))
+    theirs = (*peaks, small)
+    for one, other in zip((ours.slip_error, ours.slip_rate_error, ours.push, ours.small_gain), theirs, strict=True):
+        assert float(one) == pytest.approx(float(other), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure"])
+def test_one_percent_less_is_refused_by_both(name):
+    raw = changed(("claims", name), times("99/100"))
+    assert name in standalone(raw)
+    assert package(raw) == "undecided"
+
+
+WORSE = [
+    (("disturbance", "amplitude"), times("51/50")),
+    (("fault", "friction", "largest"), times("51/50")),
+    (("fault", "friction", "weakening"), times("21/20")),
+    (("fault", "friction", "least"), times("49/50")),
+    (("reference", "operation_time"), times("1/20")),
+    (("loop", "step"), times("9/10")),
+    (("loop", "longest"), times("21/20")),
+    (("loop", "feedback", 0), times("6/5")),
+    (("loop", "feedback", 1), times("11/10")),
+    (("loop", "output", 1), times("11/10")),
+    (("loop", "measured", 0, 1), times("11/10")),
+    (("loop", "measured", 1, 1), times("6/5")),
+    (("loop", "update", 1, 0), times("6/5")),
+    (("reach", "inputs", 0), times("99/100")),
+    (("reach", "inputs", 0), times("101/100")),
+    (("reach", "inputs", 1), times("99/100")),
+    (("reach", "facets"), lambda rows: scaled(rows, "99/100")),  # a larger set, whose outputs are
+    (("reach", "facets"), lambda rows: scaled(rows, "101/100")),  # a smaller one, which is left
+    (("reach", "facets", 5), lambda row: scaled([row], "11/10")[0]),
+    (("reach", "between"), lambda lines: [[line[0]] * len(line) for line in lines]),
+    (("reach", "at_samples"), lambda lines: [[line[0]] * len(line) for line in lines]),
+    (("reach", "at_samples", 3, 2), lambda basis: [basis[0]] * len(basis)),  # not independent
+    (("reach", "at_samples"), lambda lines: [line[::2] for line in lines]),  # pieces that bend too much
+]
+
+
+@pytest.mark.parametrize(("place", "new"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else "")
+def test_worse_data_and_other_sets_are_refused_by_both(place, new):
+    raw = changed(place, new)
+    assert "must" in standalone(raw)
+    assert package(raw) in ("undecided", "invalid")  # where a sample keeps more, the sizes are others too
+
+
+SIZES = [
+    (("loop", "longest"), "1/1000"),
+    (("loop", "longest"), "0"),
+    (("loop", "longest"), "-1/500"),
+    (("loop", "delay"), "1/1000"),
+    (("loop", "lag"), "1/1000"),
+    (("loop", "diffusion"), "1"),
+    (("loop", "jitter"), {"measured": "1/10000", "delay": "0"}),
+    (("loop", "pump"), {"rate": "10000000", "ramp": "1/10000"}),
+    (("loop", "first"), [["0", "1"], ["0", "0"]]),
+    (("start",), {"slip": "1/1000000", "rate": "0"}),
+    (("slow_gain",), {"parts": 2, "growth": "1"}),
+    (("reach",), None),
+    (("reach", "more"), "1"),
+    (("reach", "inputs"), ["1"]),
+    (("reach", "inputs"), ["1", "1", "1"]),
+    (("reach", "inputs", 0), "-1"),
+    (("reach", "inputs", 0), 1),
+    (("reach", "facets"), []),
+    (("reach", "facets"), lambda rows: rows[:2]),
+    (("reach", "facets"), lambda rows: rows[:-1]),
+    (("reach", "facets"), lambda rows: [row[:2] for row in rows]),
+    (("reach", "facets", 0), lambda row: [*row, "1"]),
+    (("reach", "facets", 0, 0), 1),
+    (("reach", "at_samples"), {}),
+    (("reach", "at_samples"), lambda lines: lines[:-1]),
+    (("reach", "at_samples"), lambda lines: [line[:1] for line in lines]),
+    (("reach", "at_samples"), lambda lines: [line * 5 for line in lines]),
+    (("reach", "at_samples", 0), lambda line: line[:-1]),
+    (("reach", "at_samples", 0), "x"),
+    (("reach", "at_samples", 0, 0), lambda basis: basis[:2]),
+    (("reach", "at_samples", 0, 0), lambda basis: [*basis, 0]),
+    (("reach", "at_samples", 0, 0), {}),
+    (("reach", "at_samples", 0, 0, 0), True),
+    (("reach", "at_samples", 0, 0, 0), -1),
+    (("reach", "at_samples", 0, 0, 0), 400),
+    (("reach", "at_samples", 0, 0, 0), 0.0),
+    (("reach", "at_samples", 0, 0, 0), "0"),
+    (("reach", "between"), lambda lines: lines[:2]),
+    (("reach", "between"), lambda lines: [*lines, lines[0]]),
+]
+
+
+@pytest.mark.parametrize(("place", "new"), SIZES, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else "")
+def test_other_sizes_kinds_and_surroundings_are_invalid_for_both(place, new):
+    raw = changed(place, new) if new is not None else without(place)
+    assert standalone(raw) != "proved"
+    assert package(raw) == "invalid"
+
+
+def test_a_set_is_for_samples_by_no_clock_alone():
+    raw = without(("loop", "longest"))
+    assert "no others have one" in standalone(raw)
+    assert package(raw) == "invalid"
+    known = claim()
+    assert isinstance(guarantee(known.task, known.held), NoGuarantee)
+
+
+@pytest.mark.parametrize("more", [{"delay": F(1, 1000)}, {"longest_step": F(1, 1000)}, {"initial_slip": F(1)}])
+def test_a_loop_by_no_clock_has_nothing_else_around(more):
+    with pytest.raises(ParameterError, match="longest"):
+        replace(claim().held, **more)
+
+
+def test_a_sample_keeps_what_its_reduced_map_sees():
+    jump = ((F(1), F(0), F(2)), (F(2), F(0), F(4)), (F(0), F(0), F(1)))
+    seen, kept = (np.array(part.tolist(), dtype=float) for part in reduced(jump))
+    assert (kept @ seen == np.array(jump, dtype=float)).all()
+    assert (seen.shape, kept.shape) == ((2, 3), (3, 2))
+    rows, columns = checker.reduced([list(row) for row in jump])
+    assert (np.array(rows, dtype=float) == seen).all()
+    assert (np.array(columns, dtype=float) == kept).all()
+
+
+def test_states_at_samples_stay_in_the_set_and_come_near_its_sides():
+    """By matrix exponentials of floats, pushes that follow one side at a time."""
+    known = claim()
+    loop, reach = known.loop, known.reach
+    facets, inputs = (np.array(v, dtype=float) for v in (reach.facets, reach.inputs))
+    seen = np.array([[float(F(int(v.p), int(v.q))) for v in row] for row in reduced(loop.segments[0].jump)[0].tolist()])
+    jump, flow = np.array(loop.segments[0].jump, dtype=float), np.array(loop.flow, dtype=float)
+    entries = np.array(list(loop.inputs.values()), dtype=float) * inputs[:, None]
+    random, largest = np.random.default_rng(4), np.zeros(len(facets))
+    lengths = np.linspace(float(known.held.step), float(known.held.longest_step), 5)
+    part = [expm(flow * length / 8) for length in lengths]
+    for row in (facets @ seen)[::4]:
+        order, states = random.integers(5, size=40), np.zeros(len(flow))
+        order[::3] = 4
+        rows = [row]
+        for i in order[::-1]:
+            for _ in range(8):
+                rows.append(rows[-1] @ part[i])
+            rows[-1] = rows[-1] @ jump if i != order[0] else rows[-1]
+        for step, i in enumerate(order):
+            states = jump @ states
+            for k in range(8):
+                costate = rows[len(rows) - 2 - 8 * step - k]
+                states = part[i] @ states + np.sign(entries @ costate) @ entries * lengths[i] / 8
+            largest = np.maximum(largest, np.abs(facets @ seen @ states))
+    assert 0.7 < largest.max() < 1.005  # sums of eight parts
