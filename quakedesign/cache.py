@@ -109,20 +109,25 @@ def search_once(search: Callable[[], Any], *question: Any) -> Any:
     return found
 
 
-class _Statement(pickle.Pickler):
+class Statement(pickle.Pickler):
     """A value by its fields alone: what was computed of it on the way and is kept beside them says nothing more."""
 
+    def field(self, value: Any, name: str) -> Any:
+        """What is written of a field."""
+        return getattr(value, name)
+
     def reducer_override(self, value: Any) -> Any:
+        """How a value is written that is told by its fields or its items."""
         if isinstance(value, MappingProxyType):
             return dict, (tuple(value.items()),)
         if not is_dataclass(value) or isinstance(value, type):
             return NotImplemented
-        return type(value), tuple(getattr(value, field.name) for field in fields(value))
+        return type(value), tuple(self.field(value, field.name) for field in fields(value))
 
 
 def _stated(question: tuple[Any, ...]) -> bytes:
     content = io.BytesIO()
-    _Statement(content).dump(question)
+    Statement(content).dump(question)
     return content.getvalue()
 
 

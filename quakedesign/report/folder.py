@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -128,10 +129,10 @@ def write_folder(
     """
     prepare(out, force=force)
     found = study_results(study, formats) if study else results(comparison)
-    drawn = study.figures() if study else comparison.figures()
+    shown = study or comparison
     with whole_folder(out) as partial:
         _write_certificates(partial, comparison)
-        inside = _write_figures(partial, drawn, formats, tell)
+        inside = _write_figures(partial, shown, formats, tell)
         page = page_html(comparison, inside, reproduction(comparison.fault, command))
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "fault.toml").write_text(fault_toml(comparison.fault), encoding="utf-8")
@@ -156,15 +157,15 @@ def _write_certificates(folder: Path, comparison: Comparison) -> None:
 
 
 def _write_figures(
-    folder: Path, drawn: dict[str, Any], formats: Sequence[str], tell: Callable[[str, float], None]
+    folder: Path, shown: "Comparison | PaperStudy", formats: Sequence[str], tell: Callable[[str, float], None]
 ) -> dict[str, Markup]:
     """Write every figure in every format; return what the page holds of it, drawn with its SVG file at once."""
     (folder / "figures").mkdir()
+    draw = cache(shown.figures)
+    tell("figures", 0.0)
     inside = {}
-    for i, (name, drawing) in enumerate(drawn.items()):
-        tell(f"figure {name}", i / len(drawn))
-        vector, inside[name] = drawn_once(drawing, name, CAPTIONS[name])
+    for name, (vector, inside[name]) in drawn_once(draw, CAPTIONS, shown).items():
         for kind in formats:
-            data = vector if kind == "svg" else figure_bytes(drawing, kind, name)
+            data = vector if kind == "svg" else figure_bytes(draw()[name], kind, name)
             (folder / "figures" / f"{name}.{kind}").write_bytes(data)
     return inside

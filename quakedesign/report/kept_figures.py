@@ -1,9 +1,10 @@
-"""Figures kept on the user's disk, see `quakedesign.cache`: their contents say how they look before they are drawn."""
+"""Figures kept on the user's disk, see `quakedesign.cache`: found by all that they could show before one is drawn."""
 
 import io
 import json
 import os
 import pickle
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from markupsafe import Markup
@@ -12,54 +13,55 @@ from quakedesign import cache
 from quakedesign.report.figure_files import figure_bytes
 from quakedesign.report.vector import inline_svg
 
+Drawn = tuple[bytes, Markup]
 
-def drawn_once(drawing: Any, name: str, told: str) -> tuple[bytes, Markup]:
-    """SVG file of a figure, and the element for a page; from the cache if the same figure was drawn before.
+
+def drawn_once(draw: Callable[[], Mapping[str, Any]], told: Mapping[str, str], shown: Any) -> dict[str, Drawn]:
+    """SVG files of figures by name, and their elements for a page; from the cache if the same were drawn before.
 
     Parameters
     ----------
-    drawing : matplotlib.figure.Figure
-        Not drawn yet.
-    name : str
-        Unique in its page.
-    told : str
-        For readers who do not see it.
+    draw : callable
+        Gives figures of matplotlib by name, not drawn yet, that depend on what they show alone.
+    told : mapping of str to str
+        For readers who do not see a figure, by its name.
+    shown : Any
+        All that is shown, but for how long it took.
     """
-    asked = _stated(drawing, name, told) if cache.in_use() else None
-    if asked is not None and (kept := cache.recall("figure", asked)) is not None:
-        vector, inside = json.loads(kept)
-        return vector.encode(), Markup(inside)
-    vector = figure_bytes(drawing, "svg", name).decode()
-    inside = inline_svg(vector, drawing, name, told)
+    asked = _stated(told, shown) if cache.in_use() else None
+    if asked is not None and (kept := cache.recall("figures", asked)) is not None:
+        return {name: (vector.encode(), Markup(inside)) for name, (vector, inside) in json.loads(kept).items()}
+    drawn = {}
+    for name, drawing in draw().items():
+        vector = figure_bytes(drawing, "svg", name)
+        drawn[name] = vector, inline_svg(vector.decode(), drawing, name, told[name])
     if asked is not None:
-        cache.keep("figure", json.dumps([vector, inside]).encode(), asked)
-    return vector.encode(), inside
+        texts = {name: [vector.decode(), inside] for name, (vector, inside) in drawn.items()}
+        cache.keep("figures", json.dumps(texts).encode(), asked)
+    return drawn
 
 
-def _stated(drawing: Any, name: str, told: str) -> bytes | None:
-    """All that a drawing depends on: its contents, the settings and the fonts; None if they cannot be told."""
+def _stated(told: Mapping[str, str], shown: Any) -> bytes | None:
+    """All that drawings depend on: contents, settings and fonts; None if they cannot be told."""
     import matplotlib as mpl
     from matplotlib.font_manager import fontManager
 
     content = io.BytesIO()
+    statement = _Untimed(content)
+    statement.fast = True  # what is equal is written the same, be it one value or two
     try:
         fonts = [(font.fname, (file := os.stat(font.fname)).st_size, file.st_mtime_ns) for font in fontManager.ttflist]
-        _statement(content).dump((name, told, dict(mpl.rcParams), fonts, drawing))
-    except (pickle.PicklingError, AttributeError, TypeError, OSError):
+        statement.dump((dict(told), shown, dict(mpl.rcParams), fonts))
+    except (pickle.PicklingError, AttributeError, TypeError, OSError, RecursionError):
         return None
     return content.getvalue()
 
 
-def _statement(content: io.BytesIO) -> pickle.Pickler:
-    from matplotlib.transforms import TransformNode
+class _Untimed(cache.Statement):
+    """A value by its fields, without how long it took and how it was computed."""
 
-    class Statement(pickle.Pickler):
-        """Transforms name those that follow them by their place in memory, which says nothing."""
-
-        def reducer_override(self, value: Any) -> Any:
-            if not isinstance(value, TransformNode):
-                return NotImplemented
-            state: Any = value.__getstate__()
-            return type(value), (), state | {"_parents": list(state["_parents"].values())}
-
-    return Statement(content)
+    def field(self, value: Any, name: str) -> Any:
+        given = super().field(value, name)
+        if name == "provenance":
+            return {k: v for k, v in given.items() if not (k.startswith("backend") or k.endswith("_seconds"))}
+        return None if name == "seconds" else given

@@ -1,12 +1,16 @@
-"""Figures kept on a disk: the same bytes as drawn, for the same contents, settings and words alone."""
+"""Figures kept on a disk: the same bytes as drawn, for the same that is shown, settings and words alone."""
+
+from dataclasses import replace
 
 import matplotlib as mpl
 import pytest
 from matplotlib.figure import Figure
 
 from quakedesign import cache
+from quakedesign.fault import load_fault
 from quakedesign.report import kept_figures
 from quakedesign.report.kept_figures import drawn_once
+from quakedesign.simulation import simulate
 
 
 @pytest.fixture
@@ -23,55 +27,80 @@ def drawn(tmp_path, monkeypatch):
     return names
 
 
-def figure(last=3.0, label="slip [m]", width=2.0):
-    made = Figure(layout="constrained")
-    upper, lower = made.subplots(2, 1, sharex=True)
-    upper.plot([0.0, 1.0, 2.0], [1.0, 2.0, last], linewidth=width, label=label)
-    upper.legend()
-    lower.semilogy([0.0, 1.0], [1e-6, 1e-3], "--")
-    lower.set_xlabel("time [s]")
-    return made
+def figures(shown, names=("one",)):
+    """Of a value, how they are drawn."""
+
+    def draw():
+        made = {name: Figure(layout="constrained") for name in names}
+        for drawing in made.values():
+            upper, lower = drawing.subplots(2, 1, sharex=True)
+            upper.plot([0.0, 1.0, 2.0], [1.0, 2.0, 3.0], label=str(shown))
+            upper.legend()
+            lower.semilogy([0.0, 1.0], [1e-6, 1e-3], "--")
+        return made
+
+    return draw
+
+
+def once(shown=3.0, told="told", name="one"):
+    return drawn_once(figures(shown, (name,)), {name: told}, shown)
 
 
 def test_the_same_figure_is_drawn_once_and_has_the_bytes_of_its_drawing(drawn, monkeypatch):
-    first, second = (drawn_once(figure(), "one", "told") for _ in range(2))
+    first, second = once(), once()
     assert first == second
     assert drawn == ["one"]
     monkeypatch.setenv(cache.PLACE, "off")
-    assert drawn_once(figure(), "one", "told") == first
+    assert once() == first
     assert drawn == ["one", "one"]
 
 
-CHANGES = [{"last": 3.0 + 1e-9}, {"label": "slip [mm]"}, {"width": 2.5}]
+CHANGES = [{"shown": 3.0 + 1e-9}, {"told": "said"}, {"name": "two"}]
 
 
 @pytest.mark.parametrize("changed", CHANGES, ids=[next(iter(change)) for change in CHANGES])
-def test_another_figure_is_drawn(drawn, changed):
-    for made in (figure(), figure(**changed)):
-        drawn_once(made, "one", "told")
+def test_what_shows_something_else_is_drawn(drawn, changed):
+    once()
+    once(**changed)
     assert len(drawn) == 2
 
 
-def test_other_names_words_and_settings_are_drawn(drawn):
-    for name, told in (("one", "told"), ("two", "told"), ("one", "said")):
-        drawn_once(figure(), name, told)
+def test_how_long_it_took_and_how_it_was_computed_is_not_shown(drawn):
+    run = simulate(load_fault("lab-fault"), duration=0.01, samples=5)
+    for seconds, backend, step in ((1.0, "compiled", 1), (2.0, "virtual-machine", 1), (2.0, "compiled", 2)):
+        told = {"backend": backend, "backend_reason": backend, "stepping_seconds": seconds, "step": step}
+        once((replace(run, provenance=told, metrics=replace(run.metrics, seconds=seconds)),))
+    assert len(drawn) == 2
+
+
+def test_values_that_are_one_and_equal_ones_are_the_same(drawn):
+    one = [1.5]
+    once((one, one))
+    once(([1.5], [1.5]))
+    assert len(drawn) == 1
+
+
+def test_other_settings_are_drawn(drawn):
+    once()
     with mpl.rc_context({"path.simplify": False}):
-        drawn_once(figure(), "one", "told")
-    assert drawn == ["one", "two", "one", "one"]
+        once()
+    assert len(drawn) == 2
 
 
 def test_other_fonts_are_drawn(drawn, monkeypatch):
     from matplotlib.font_manager import fontManager
 
-    drawn_once(figure(), "one", "told")
+    once()
     monkeypatch.setattr(fontManager, "ttflist", fontManager.ttflist[1:])
-    drawn_once(figure(), "one", "told")
+    once()
     assert len(drawn) == 2
 
 
 def test_what_cannot_be_told_is_drawn_each_time(drawn):
     for _ in range(2):
-        made = figure()
-        made.told = lambda: "no text says what this is"
-        drawn_once(made, "one", "told")
-    assert len(drawn) == 2
+        once(lambda: "no text says what this is")
+    endless = []
+    endless.append(endless)
+    for _ in range(2):
+        once(endless)
+    assert len(drawn) == 4
