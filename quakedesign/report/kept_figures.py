@@ -52,7 +52,7 @@ def _stated(told: Mapping[str, str], shown: Any) -> bytes | None:
     try:
         fonts = [(font.fname, (file := os.stat(font.fname)).st_size, file.st_mtime_ns) for font in fontManager.ttflist]
         statement.dump((dict(told), shown, dict(mpl.rcParams), fonts))
-    except (pickle.PicklingError, AttributeError, TypeError, OSError, RecursionError):
+    except (pickle.PicklingError, AttributeError, TypeError, OSError, ValueError, RecursionError):
         return None
     return content.getvalue()
 

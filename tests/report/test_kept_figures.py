@@ -34,7 +34,7 @@ def figures(shown, names=("one",)):
         made = {name: Figure(layout="constrained") for name in names}
         for drawing in made.values():
             upper, lower = drawing.subplots(2, 1, sharex=True)
-            upper.plot([0.0, 1.0, 2.0], [1.0, 2.0, 3.0], label=str(shown))
+            upper.plot([0.0, 1.0, 2.0], [1.0, 2.0, 3.0], label=str(shown)[:9])
             upper.legend()
             lower.semilogy([0.0, 1.0], [1e-6, 1e-3], "--")
         return made
