@@ -10,8 +10,10 @@ from quakedesign.certificates import Loop, certificate_text
 from quakedesign.certificates.claim import root_enclosure
 from quakedesign.controllers import Subject
 from quakedesign.errors import CertificateError
+from quakedesign.sos.solve.conic import handing_back
 from quakedesign.synthesis.analysis.margins import necessary_limit
-from quakedesign.synthesis.analysis.parametric_program import CLEAR, Sweep, prove
+from quakedesign.synthesis.analysis.parametric_path import Path
+from quakedesign.synthesis.analysis.parametric_program import CLEAR, Frame, Sweep, prove
 from quakedesign.workers import Crew
 
 Place = tuple[int, int]
@@ -67,10 +69,14 @@ class Screener:
     def __init__(self, sheet: Sheet) -> None:
         self.sheet = sheet
         self._sweeps: list[Sweep] = []
+        self._paths: dict[tuple[Sweep, tuple[Fraction, ...]], Path] = {}
+        self._followed: dict[Sweep, Path] = {}
+        self._answered = 0
 
     def row(self, places: Sequence[Place]) -> tuple[list[tuple[Place, Fraction | None, int]], int]:
         """Limit and number of levels found at every point, beginning each at the level of its neighbour; and solves."""
         found, start, before = [], len(self.sheet.levels), self._solves()
+        self._followed.clear()
         for place in places:
             limit, start = self._reached(place, max(start, 1))
             found.append((place, limit, start))
@@ -92,10 +98,28 @@ class Screener:
     def _found(self, place: Place, level: int) -> bool:
         loop = self.sheet.at(place, level)
         sweep = self._sweep(loop)
-        answer = None if sweep is None else sweep.solve(loop, accuracy=_FAST)
-        if sweep is not None and answer is not None and abs(answer.margin) < CLEAR:
-            answer = sweep.solve(loop)
-        return answer is not None and answer.found
+        if sweep is None:
+            return False
+        answer = None if handing_back() else self._follow(sweep, loop)
+        return _solved(sweep, loop) if answer is None else answer
+
+    def _follow(self, sweep: Sweep, loop: Loop) -> bool | None:
+        """Answer from the neighbours in the row, in the units of the first of them; None where that gives none."""
+        path = self._followed.get(sweep) or self._path(sweep, sweep.frame(loop))
+        answer = path.found(loop)
+        if answer is None:
+            self._followed.pop(sweep, None)
+        else:
+            self._followed[sweep] = path
+            self._answered += 1
+        return answer
+
+    def _path(self, sweep: Sweep, frame: Frame) -> Path:
+        """Path without neighbours."""
+        known = sweep, frame.scale
+        if known not in self._paths:
+            self._paths[known] = Path(sweep, frame)
+        return self._paths[known].begin(frame)
 
     def proof(self, place: Place, level: int) -> tuple[Place, int, str | None, int]:
         """Text of a certificate of a point at a level, or None; and solves."""
@@ -118,7 +142,14 @@ class Screener:
         return known
 
     def _solves(self) -> int:
-        return sum(s.solves for s in self._sweeps)
+        return self._answered + sum(s.solves for s in self._sweeps)
+
+
+def _solved(sweep: Sweep, loop: Loop) -> bool:
+    answer = sweep.solve(loop, accuracy=_FAST)
+    if answer is not None and abs(answer.margin) < CLEAR:
+        answer = sweep.solve(loop)
+    return answer is not None and answer.found
 
 
 class Screeners:

@@ -37,7 +37,7 @@ class Cones:
     def __init__(self, rows: Sequence[Row], loop: Loop, monomials: Sequence[Term], scale: Sequence[Fraction]) -> None:
         import cvxpy as cp
 
-        shapes = [shape_of(_template(row, loop, scale)) for row in rows]
+        shapes = self.shapes = [shape_of(_template(row, loop, scale)) for row in rows]
         starts = np.cumsum([0, *(len(s.keys) for s in shapes)])
         placed = list(zip(rows, shapes, starts, strict=False))
         self.columns = np.array([start + shape.index[e] for row, shape, start in placed for _, e, _, _ in row.parts])
@@ -49,12 +49,19 @@ class Cones:
         summed = sparse.csr_array((ones, (places % count, each)), shape=(count, len(places)))
         self._numbers = cp.Parameter(len(places), name="numbers")
         self._moments, level = cp.Variable(size, name="moments"), cp.Variable(name="level")
-        margin = np.concatenate([shape.vector(row.margin) for row, shape, _ in placed])
-        self._unit = margin @ self._moments == 1
+        self.margin = np.concatenate([shape.vector(row.margin) for row, shape, _ in placed])
+        self.means = np.array(means(monomials, loop.states))
+        self._unit = self.margin @ self._moments == 1
         sums = summed @ cp.multiply(self._numbers, chosen @ self._moments)
-        self._link = sums - level * np.array(means(monomials, loop.states)) == 0
+        self._link = sums - level * self.means == 0
         constraints = [self._unit, self._link, *in_cones(shapes, self._moments)]
         self.compiled = Compiled(cp.Problem(cp.Minimize(level), constraints))
+
+    def table(self, parts: Any) -> Any:
+        """What every moment (row) is multiplied by in ΣL(N) and in every ΣL(P_j) (columns)."""
+        count = len(self.means)
+        values = np.bincount(self.columns * count + self.parts, parts, minlength=len(self.margin) * count)
+        return np.column_stack([self.margin, values.reshape(-1, count)])
 
     def solve(self, parts: Any, accuracy: float) -> tuple[float, Any, Any] | None:
         """Margin, a_j and L for the values of all parts, in the order of the rows; None if the solver fails twice."""

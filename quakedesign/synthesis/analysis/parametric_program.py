@@ -165,6 +165,16 @@ class Sweep:
             fallen=max(sum(e) for row in self.rows if row.rate for e in row.margin),
         )
 
+    def cones(self, frame: Frame) -> Cones:
+        """The programme in the units of a frame."""
+        return self._in_units(frame.scale).cones
+
+    def parts_at(self, loop: Loop, frame: Frame) -> Any:
+        """Values of all parts at a point, as `Cones` takes them."""
+        features = self._features(values_of(loop))
+        numbers = self._in_units(frame.scale)
+        return numbers.weights(frame.pace) * features[numbers.products]
+
     def _in_units(self, scale: tuple[Fraction, ...]) -> "_Numbers":
         if scale not in self._numbers:
             free = self._numbers and not any(row.equalities or row.inequalities for row in self.rows)
@@ -221,9 +231,13 @@ class _Numbers:
             raise CertificateError(_TOO_FAR)
         return float(np.abs(merged).max(initial=0.0)) or 1.0
 
+    def weights(self, pace: float) -> Any:
+        """What the products are multiplied by in every part."""
+        return np.where(self.rate, self.coefficients / pace, self.coefficients)
+
     def solve(self, features: Any, pace: float, accuracy: float) -> tuple[float, list[float], Any, float] | None:
         """Margin, decision, derivative of the margin in every product, and seconds; None if the solver fails."""
-        weights = np.where(self.rate, self.coefficients / pace, self.coefficients)
+        weights = self.weights(pace)
         solution = self.cones.solve(weights * features[self.products], accuracy)
         if solution is None:
             return None
