@@ -13,7 +13,9 @@ from quakedesign.bounds import LowerBound
 from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.guarantee.pump import Pump
+from quakedesign.certificates.impossibility import longest_diffusion
 from quakedesign.certificates.slow_sliding import SlidingGuarantee, SlidingTask, sliding_task
+from quakedesign.certificates.slow_sliding.push import SlidingPush
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.fault.defaults import AGEINGS
@@ -27,6 +29,7 @@ from quakedesign.synthesis.guaranteed.slow_sliding import (
     proved_sliding,
     two_digits,
 )
+from quakedesign.synthesis.linear.plant.sliding_model import sliding_model
 
 _TRIFLE = Fraction(1)  # stress [Pa] that is tried where a law is estimated to stand none: another law may stand more
 _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of an estimate that may be too large
@@ -162,9 +165,23 @@ def answer_sliding(
     if isinstance(answer.found, NoGuarantee) and not remedy and stress:
         pumped: dict[str, Any] = {} if pump is None else {"pump": pump}
         remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, **around, **pumped))
-    if isinstance(answer.found, NoGuarantee) and remedy:
-        return replace(answer, found=replace(answer.found, reason=f"{answer.found.reason}; {remedy}"))
+    if isinstance(answer.found, NoGuarantee):
+        why = (stress and _beyond(fault, stress, around)) or answer.found.reason
+        return replace(answer, found=replace(answer.found, reason="; ".join(filter(None, (why, remedy)))))
     return answer
+
+
+def _beyond(fault: Fault, stress: Fraction, around: Around) -> str:
+    """Why no controller holds the fault under a stress [Pa] through its rock; empty where that is not proved."""
+    most = rational(fault.effective_normal_stress)
+    push = SlidingPush(model=sliding_model(fault), amplitude=stress)
+    far = longest_diffusion(push, most, Fraction(0))
+    if far is None or around.get("diffusion", 0) <= far:
+        return ""
+    return (
+        f"no controller whatever whose pressure is within {LowerBound(most).quantity('Pa')} of what the reference "
+        f"needs holds the nominal fault, linearised, through rock of L^2/D above {far.quantity('s')}"
+    )
 
 
 def _under_less(answer: SlidingAnswer) -> str:

@@ -9,6 +9,8 @@ from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.certificates.slow_sliding import WHOLE, SlidingClaims, SlidingGuarantee, sliding_task
 from quakedesign.fault import Fault, Reference, friction_law
+from quakedesign.studies.fault_limits import limits
+from quakedesign.synthesis.guaranteed.sliding_answer import _beyond
 from quakedesign.synthesis.guaranteed.sliding_reach import farthest, suitable, what_would_do
 from quakedesign.synthesis.guaranteed.slow_sliding import LOG_RATES, searched_sliding
 
@@ -74,6 +76,15 @@ def test_where_no_law_is_found_near_the_fault_nothing_is_promised():
     reach = farthest(replace(TASK, stress=Fraction(10**9)), STEP, {"lag": Fraction(600)}, stressed=False)
     assert (reach.share, reach.held) == (0, None)
     assert what_would_do(FAULT, TASK, reach, {}, proved, spread=Fraction(0)).startswith("none was found with a well")
+
+
+def test_a_well_that_no_controller_reaches_the_fault_through_is_said_to_be_one():
+    """From the same L²/D on as `limits` says with T_s = 33 s, but for what T_s makes of it."""
+    found = limits(FAULT, stress=1e4, prove=False).largest_diffusion_time.impossible_beyond
+    assert _beyond(FAULT, Fraction(10**4), {"diffusion": found * Fraction(999, 1000)}) == ""
+    assert _beyond(FAULT, Fraction(10**4), {"lag": found * 2}) == ""
+    said = _beyond(FAULT, Fraction(10**4), {"diffusion": found * Fraction(21, 20)})
+    assert said.startswith("no controller whatever whose pressure is within 40 MPa of what the reference needs")
 
 
 @pytest.mark.parametrize(("step", "suits"), [(20, 20), (60, 60), (15, 33), (120, 33)])
