@@ -51,7 +51,8 @@ def _stated(told: Mapping[str, str], shown: Any) -> bytes | None:
     statement.fast = True  # what is equal is written the same, be it one value or two
     try:
         fonts = [(font.fname, (file := os.stat(font.fname)).st_size, file.st_mtime_ns) for font in fontManager.ttflist]
-        statement.dump((dict(told), shown, dict(mpl.rcParams), fonts))
+        settings = {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}  # which would be loaded
+        statement.dump((dict(told), shown, settings, fonts))
     except (pickle.PicklingError, AttributeError, TypeError, OSError, ValueError, RecursionError):
         return None
     return content.getvalue()

@@ -1,5 +1,7 @@
 """Figures kept on a disk: the same bytes as drawn, for the same that is shown, settings and words alone."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import matplotlib as mpl
@@ -104,3 +106,10 @@ def test_what_cannot_be_told_is_drawn_each_time(drawn):
     for _ in range(2):
         once(endless)
     assert len(drawn) == 4
+
+
+def test_what_draws_is_not_loaded_for_what_is_kept():
+    code = "import sys; from quakedesign.report.kept_figures import _stated; _stated({}, 1); print(*sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "matplotlib.font_manager" in found
+    assert not {"matplotlib.figure", "matplotlib.pyplot"} & set(found)
