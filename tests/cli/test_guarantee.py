@@ -18,7 +18,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.fault.sources import source_text as load_text
 from quakedesign.synthesis import answer
-from quakedesign.synthesis.guaranteed import Answer
+from quakedesign.synthesis.guaranteed import Answer, design
 from quakedesign.synthesis.guaranteed.families import family_of
 from quakedesign.synthesis.methods.state_feedback import StateFeedback
 
@@ -369,3 +369,24 @@ def test_a_well_is_told_by_its_distance_and_the_diffusivity_of_the_rock():
     for wrong in ({"well": "0", "diffusivity": "1"}, {"well": "40", "diffusivity": "-1"}):
         with pytest.raises(ParameterError, match="must be positive"):
             DesignOptions(**wrong).told()
+
+
+def test_samples_by_no_clock_are_in_the_answer_and_in_the_file(call, tmp_path, monkeypatch):
+    monkeypatch.setattr(design, "_FEWER", 8)
+    path, asked = tmp_path / "loop.json", ("lab-fault", "--step", "1 ms", "--longest-step", "3/2000")
+    code, out, _ = call(*asked, "--objective", "peak", "--out", str(path))
+    said = " ".join(out.split())
+    assert (code, "held over anything from 0.001 s to 0.0015 s, by no clock" in said) == (0, True)
+    assert "no controller held over T_s = 0.0015 s keeps the slip-rate error below" in said
+    loop = json.loads(path.read_text())["loop"]
+    assert (loop["step"], loop["longest"]) == ("1/1000", "3/2000")
+    assert check_files([path], "lab-fault")[str(path)][0] == "proved"
+    for more in (("--controller", "cta"), ("--delay", "1/2000"), ("--jitter", "1/10000"), ("--rate-limit", "1 MPa/s")):
+        code, _, err = call(*asked, *more)
+        assert (code, "samples that follow no clock are known from rest" in err) == (2, True)
+
+
+def test_no_law_is_designed_for_intervals_that_no_controller_could_wait_for(call):
+    code, out, _ = call("lab-fault", "--step", "1 ms", "--longest-step", "2 s", "--json")
+    assert (code, json.loads(out)["verdict"]) == (1, "undecided")
+    assert "no controller whatever" in json.loads(out)["reason"]
