@@ -59,6 +59,8 @@ class Sampling:
     delay, lag, diffusion : Fraction
         From measurement to valve, time constant of the pump and L²/D of the rock [s] for which it is meant: between law
         and fault in every run, and in `loop_transfer`, unless told.
+    longest : Fraction
+        By no clock: each sample comes T_s to this after the last [s], in `simulate`; 0 where a clock tells.
     """
 
     step: Fraction
@@ -67,6 +69,7 @@ class Sampling:
     delay: Fraction = Fraction(0)
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
+    longest: Fraction = Fraction(0)
 
     @property
     def path(self) -> dict[str, Any]:

@@ -26,7 +26,7 @@ class SampledController(Controller):
     law : LinearLaw
     step : Fraction
         T_s [s] for which it is meant.
-    delay, lag, diffusion : Fraction
+    delay, lag, diffusion, longest : Fraction
         As of `Sampling` [s].
     rest_limit : RestLimit, optional
         Of its pressure; its states are then told what is applied, and those of the limit follow them.
@@ -44,6 +44,7 @@ class SampledController(Controller):
     delay: Fraction = Fraction(0)
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
+    longest: Fraction = Fraction(0)
     rest_limit: RestLimit | None = None
 
     def __post_init__(self) -> None:
@@ -57,7 +58,7 @@ class SampledController(Controller):
     @property
     def sampling(self) -> Sampling:
         """By the scheme ``explicit``, once every T_s."""
-        return Sampling(step=self.step, delay=self.delay, lag=self.lag, diffusion=self.diffusion)
+        return Sampling(step=self.step, delay=self.delay, lag=self.lag, diffusion=self.diffusion, longest=self.longest)
 
     @property
     def of_slip(self) -> LinearLaw | None:

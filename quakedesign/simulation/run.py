@@ -13,6 +13,7 @@ from quakedesign.errors import ParameterError, require_known
 from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, simulation_scheme
 from quakedesign.loop.sensing import Sensor
+from quakedesign.loop.steps.no_clock import NoClock
 from quakedesign.loop.steps.sampled import MOST_SUBSTEPS
 from quakedesign.simulation import kept_runs
 from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
@@ -69,6 +70,23 @@ def own_path(
         return actuator, substeps
     meant = Actuator.meant_for(sampling)
     return meant, max(substeps, min(meant.substeps(float(sampling.step)), MOST_SUBSTEPS))
+
+
+def by_no_clock(
+    controller: Controller | None, scheme: str | Scheme, step: float | None, numbers: dict[str, Any]
+) -> tuple[float | None, dict[str, Any]]:
+    """Step [s] and numbers of a run; of a law whose samples follow no clock a part of the shortest interval, and those.
+
+    A scheme that is no name has its own intervals, or a clock.
+    """
+    sampling = controller.sampling if controller else None
+    clock = getattr(scheme, "clock", None)
+    if sampling is None or step is None or not (sampling.longest or clock):
+        return step, numbers
+    if isinstance(scheme, str):
+        clock = NoClock.of(sampling.step, sampling.longest)
+        numbers = numbers | {"clock": clock}
+    return (step / clock.shortest if clock else step), numbers
 
 
 def loop_class(plant: str) -> type[ClosedLoop]:

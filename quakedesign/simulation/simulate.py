@@ -17,7 +17,7 @@ from quakedesign.simulation.loading import Load
 from quakedesign.simulation.memoryless_earthquake import natural_peak
 from quakedesign.simulation.outcome import OutcomeCriterion
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import loop_class, own_path, run, run_adaptive, sampled_scheme
+from quakedesign.simulation.run import by_no_clock, loop_class, own_path, run, run_adaptive, sampled_scheme
 from quakedesign.simulation.setting import Setting
 from quakedesign.simulation.sliding_conditions import PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
@@ -136,6 +136,7 @@ def simulate(
             f"{fault.friction.name}. Give a load, a variation or a measurement."
         )
     scheme, step, own = own_way(controller, scheme, step, "continuous")
+    step, own = by_no_clock(controller, scheme, step, own)
     setting = Setting.of(fault, step, duration, samples, settled_from)
     if variation:
         variation.require_within(fault)

@@ -191,7 +191,7 @@ class Held:
                 "what is proved of a sliding mode tells its implicit root, not its gains. Received one. Take the "
                 "controller of its design, or its gains, scale, weight and authority in the scheme compensated."
             )
-        return loops.SampledController(law=self.law, step=self.step, **self.path)
+        return loops.SampledController(law=self.law, step=self.step, **self.path, longest=self.longest_step)
 
     def loop(self, task: Task, model: Model | None = None) -> PeriodicLoop:
         """Nominal error loop on a task, of its model or another one."""

@@ -1,7 +1,7 @@
 """What the sampled schemes share: the law once per T_s, its pressure held while the plant moves on."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -15,6 +15,7 @@ from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.control_step import SIGNALS, ControlStep, Decided, control_step
 from quakedesign.loop.steps.discrete_law import Law, Values
+from quakedesign.loop.steps.no_clock import NoClock
 
 MOST_SUBSTEPS = 100
 
@@ -30,6 +31,7 @@ class Sample:
     own: list[Any]
     kept: list[Any]
     noise: list[Any]
+    clock: list[Any]
     flow: list[Any]
 
 
@@ -38,7 +40,7 @@ class Sampled(Scheme, Decided):
     """A controller that measures every T_s and holds its pressure in between (zero-order hold).
 
     The entries of the memory are: the law's numbers, those of actuator and measurement, the scheme's own memory, the
-    pressure that was held last, and the memories of the actuator and of the noise generator.
+    pressure that was held last, and the memories of the actuator, of the noise generator and of what no clock tells.
 
     Attributes
     ----------
@@ -49,6 +51,8 @@ class Sampled(Scheme, Decided):
         A sensor is told the true slip alone, once per sample of its own period.
     authority : float or None
         Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
+    clock : NoClock or None
+        When samples are taken, in steps; None: at every step, by a clock.
 
     Raises
     ------
@@ -59,6 +63,7 @@ class Sampled(Scheme, Decided):
     actuator: Actuator = DIRECT
     measurement: Sensor = EXACT
     authority: float | None = None
+    clock: NoClock | None = None
 
     def __post_init__(self) -> None:
         whole = isinstance(self.substeps, int) and not isinstance(self.substeps, bool)
@@ -66,6 +71,10 @@ class Sampled(Scheme, Decided):
             raise ParameterError(f"substeps must be a whole number, 1 to {MOST_SUBSTEPS}. Received {self.substeps!r}.")
         if self.authority is not None and not 0 < self.authority < float("inf"):
             raise ParameterError(f"authority must be positive and finite. Received {self.authority!r} m²/kg.")
+        if self.clock and self.actuator.part:
+            raise ParameterError(
+                "by no clock a pressure acts at a sample. Received a delay that is no whole number of steps. Change it."
+            )
 
     @property
     def starts(self) -> tuple[float, ...]:
@@ -108,6 +117,7 @@ class Sampled(Scheme, Decided):
         said: dict[str, Any] = {"substeps": self.substeps}
         said |= {"actuator": ", ".join(map(repr, self.actuator.stages))} if self.actuator.stages else {}
         said |= {"authority": self.authority} if self.authority else {}
+        said |= {"clock": repr(self.clock)} if self.clock else {}
         return said | ({"measurement": repr(self.measurement)} if self.measurement.noisy else {})
 
     def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
@@ -120,7 +130,7 @@ class Sampled(Scheme, Decided):
             times = math.ceil(share * self.substeps)
             motion = self._motion(step, begin, share, times)
             moving = loop.advance_often(method, motion, given, moving, share * step / times, times)
-        rest = ca.vertcat(*sample.own, sample.held, *sample.kept, *sample.noise)
+        rest = ca.vertcat(*sample.own, sample.held, *sample.kept, *sample.noise, *sample.clock)
         first = 2 + len(sample.integrals)
         count = state.shape[0] - first - rest.shape[0] - len(sample.flow)
         constants = state[first : first + count]
@@ -155,6 +165,7 @@ class Sampled(Scheme, Decided):
             "held": (0.0,),
             "kept": tuple(v for stage in sampled for v in stage.start),
             "noise": self.measurement.start,
+            "clock": self.clock.start if self.clock else (),
             "flow": self.actuator.flow_start,
         }
 
@@ -168,22 +179,41 @@ class Sampled(Scheme, Decided):
         entries = iter(ca.vertsplit(state[2 + count :]))
         part = {name: [next(entries) for _ in values] for name, values in self._parts(loop).items()}
         seen, noise = self.measurement.measure(part["deviation"], part["noise"], state[:2])
-        known = self._known(loop, counter, step, seen)
+        ahead = self.clock.shortest if self.clock else 1
+        known = self._known(loop, counter, step, seen, ahead)
         known |= {discrete_law.authority: part["authority"][0], discrete_law.held: part["held"][0]}
         signals = ca.vertcat(*(known[symbol] for symbol in SIGNALS))
         before = state[2 : 2 + count]
         given = signals, before, ca.vertcat(*part["law"]), ca.vertcat(*part["own"])
         pressure, after, own, push = self.control_step(loop).function(*given)
-        held, excess, kept = self.actuator.hold(part["sampled"], part["kept"], pressure, step)
+        held, excess, kept = self.actuator.hold(part["sampled"], part["kept"], pressure, ahead * step)
         winds = excess * push > 0
         integrals = [ca.if_else(winds, before[i], after[i]) for i in range(count)]
         memory = [own[i] for i in range(self.own_size)]
-        return Sample(part["held"][0], held, integrals, part["flowing"], memory, kept, noise, part["flow"])
+        found = Sample(part["held"][0], held, integrals, part["flowing"], memory, kept, noise, [], part["flow"])
+        return self._if_now(found, ca.vertsplit(before) if count else [], part) if self.clock else found
+
+    def _if_now(self, sample: Sample, integrals: list[Any], part: dict[str, list[Any]]) -> Sample:
+        """The sample, or what there was before where none is taken now."""
+        now, clock = self.clock.after(part["clock"]) if self.clock else (True, [])
+
+        def chosen(new: list[Any], old: list[Any]) -> list[Any]:
+            return [ca.if_else(now, a, b) for a, b in zip(new, old, strict=True)]
+
+        return replace(
+            sample,
+            held=ca.if_else(now, sample.held, sample.before),
+            integrals=chosen(sample.integrals, integrals),
+            own=chosen(sample.own, part["own"]),
+            kept=chosen(sample.kept, part["kept"]),
+            noise=chosen(sample.noise, part["noise"]),
+            clock=clock,
+        )
 
     @staticmethod
-    def _known(loop: Stepped, counter: Any, step: float, seen: Any) -> Values:
-        """Values of the signals of one sample."""
-        now, later = loop.reference(counter * step), loop.reference((counter + 1) * step)
+    def _known(loop: Stepped, counter: Any, step: float, seen: Any, ahead: int) -> Values:
+        """Values of the signals of one sample, the next expected so many steps ahead."""
+        now, later = loop.reference(counter * step), loop.reference((counter + ahead) * step)
         return {
             discrete_law.slip: seen[0],
             discrete_law.rate: seen[1],
@@ -192,5 +222,5 @@ class Sampled(Scheme, Decided):
             discrete_law.acceleration: now[2],
             discrete_law.next_reference: later[0],
             discrete_law.next_reference_rate: later[1],
-            discrete_law.step: ca.SX(step),
+            discrete_law.step: ca.SX(ahead * step),
         }

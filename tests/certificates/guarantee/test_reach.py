@@ -9,13 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flint import ctx
 from scipy.linalg import expm
+from scipy.optimize import linprog
 from standalone_guarantee import checker
 
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import NoGuarantee, guarantee
+from quakedesign.certificates.guarantee.ball_matrices import matrix
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
-from quakedesign.certificates.guarantee.reach import reduced
+from quakedesign.certificates.guarantee.inputs import channels_of
+from quakedesign.certificates.guarantee.reach import _Between, reduced
 from quakedesign.errors import CertificateError, ParameterError
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"
@@ -82,14 +86,59 @@ def test_both_prove_the_file_and_say_so():
 
 
 def test_both_find_the_same_bounds():
-    known = claim()
-    ours, raw = known.bounds(), json.loads(text())
+    ours, theirs = both_bounds(json.loads(text()))
+    assert ours == pytest.approx(theirs, rel=1e-12)
+
+
+def edited(**parts):
+    """The stored file with parts of it replaced, by their names with two underscores between the keys."""
+    raw = json.loads(text())
+    for name, new in parts.items():
+        first, last = name.split("__")
+        raw[first][last] = new
+    return raw
+
+
+NOISY = edited(
+    loop__noise={"slip": "1/1000000000000", "rate": "1/1000000000"},
+    reach__inputs=[*json.loads(text())["reach"]["inputs"], "1/1000000000000", "1/1000000000"],
+)
+
+
+def both_bounds(raw):
+    ours = parse_guarantee(json.dumps(raw)).bounds()
     task = checker.read_task(raw)
     loop = checker.read_loop(raw["loop"], task, [F(0)] * 2)
     peaks, small = checker.bounds_within(task, loop, checker.read_reach(raw["reach"], loop))
-    theirs = (*peaks, small)
-    for one, other in zip((ours.slip_error, ours.slip_rate_error, ours.push, ours.small_gain), theirs, strict=True):
-        assert float(one) == pytest.approx(float(other), rel=1e-12)
+    return [float(v) for v in (ours.slip_error, ours.slip_rate_error, ours.push, ours.small_gain)], [
+        float(v) for v in (*peaks, small)
+    ]
+
+
+def test_noise_counts_in_both_at_the_samples_and_after_them():
+    ours, theirs = both_bounds(NOISY)
+    quiet, _ = both_bounds(json.loads(text()))
+    assert ours == pytest.approx(theirs, rel=1e-12)
+    assert all(a > b * (1 + 1e-9) for a, b in zip(ours[:3], quiet, strict=False))
+    more = edited(
+        loop__noise={"slip": "1/900000000000", "rate": "1/1000000000"}, reach__inputs=NOISY["reach"]["inputs"]
+    )
+    assert "within the bounds for which the set is" in standalone(more)
+    assert package(more) == "undecided"
+
+
+def test_a_disturbance_of_bounded_rate_shifts_the_pressure_and_drifts_as_it_couples():
+    slow = {"amplitude": "1/1000", "change": "1/1000000", "growths": json.loads(text())["disturbance"]["growths"]}
+    raw = json.loads(text())
+    ours, theirs = both_bounds(raw | {"disturbance": slow})
+    assert ours == pytest.approx(theirs, rel=1e-12)
+    assert ours[2] > 1e-3
+    coupled = raw | {"disturbance": slow | {"amplitude": "1/20"}}
+    assert "within the bounds for which the set is" in standalone(coupled)
+    assert package(coupled) == "undecided"
+    without_shift = dict(slow) | {"amplitude": "1/1000"}
+    del without_shift["change"]
+    assert both_bounds(raw | {"disturbance": without_shift})[0][2] == pytest.approx(ours[2] - 1e-3, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", ["slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure"])
@@ -233,3 +282,53 @@ def test_states_at_samples_stay_in_the_set_and_come_near_its_sides():
                 states = part[i] @ states + np.sign(entries @ costate) @ entries * lengths[i] / 8
             largest = np.maximum(largest, np.abs(facets @ seen @ states))
     assert 0.7 < largest.max() < 1.005  # sums of eight parts
+
+
+def rows_of(raw, count):
+    """Bounds of the first facets' rows, in the package and in the standalone checker."""
+    known, task = parse_guarantee(json.dumps(raw)), checker.read_task(raw)
+    loop, (soonest, latest) = (
+        checker.read_loop(raw["loop"], task, [F(0)] * 2),
+        (known.held.step, known.held.longest_step),
+    )
+    read = checker.read_reach(raw["reach"], loop)
+    theirs = checker.Between(loop, read)
+    pieces = len(known.reach.at_samples[0]) - 1
+    ends = [soonest * i / 4 for i in range(4)] + [soonest + (latest - soonest) * i / pieces for i in range(pieces + 1)]
+    found = []
+    with ctx.workprec(128):
+        channels = channels_of(known.task, None, soonest, known.held.noise)
+        ours = _Between.of(known.loop, channels, known.reach)
+        for facet, bases in list(zip(known.reach.facets, known.reach.at_samples, strict=True))[:count]:
+            row = matrix((facet,)) * ours.seen
+            other = theirs.largest(checker.fixed([list(facet)]) * theirs.seen, ends, bases)
+            found.append((float(ours._largest(row, ends, bases)), float(other)))
+    return found
+
+
+@pytest.mark.parametrize("raw", [json.loads(text()), NOISY], ids=["quiet", "noisy"])
+def test_both_bound_every_side_alike(raw):
+    for ours, theirs in rows_of(raw, 12):
+        assert ours == pytest.approx(theirs, rel=1e-12)
+
+
+def test_bounds_of_sides_lie_a_little_above_what_linear_programmes_and_fine_sums_give():
+    known = claim()
+    loop, facets = known.loop, np.array(known.reach.facets, dtype=float)
+    seen, kept = (
+        np.array([[float(F(int(v.p), int(v.q))) for v in row] for row in part.tolist()])
+        for part in reduced(loop.segments[0].jump)
+    )
+    flow, scale = np.array(loop.flow, dtype=float), np.abs(np.linalg.inv(facets[:3])).sum(axis=1)
+    inputs = np.array(list(loop.inputs.values()), dtype=float) * np.array(known.reach.inputs, dtype=float)[:, None]
+    step, both = expm(flow * 2e-5), np.vstack([facets, -facets]) * scale
+    for facet, (bound, _) in zip(facets, rows_of(json.loads(text()), 3), strict=False):
+        row, area, highest = facet @ seen, 0.0, 0.0
+        for i in range(101):
+            if i >= 50 and i % 5 == 0:
+                best = linprog(-(row @ kept) * scale, both, np.ones(len(both)), bounds=(None, None))
+                highest = max(highest, area - best.fun)
+            following = row @ step
+            area += (np.abs(inputs @ row) + np.abs(inputs @ following)).sum() * 1e-5
+            row = following
+        assert highest <= bound <= highest + 0.006
