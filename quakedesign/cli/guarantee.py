@@ -117,7 +117,7 @@ def guarantee(
     gains: Gains = (),
     scheme: str | None = None,
     step: ExactSeconds | None = None,
-    measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
+    measured: Literal["slip-and-rate", "slip", "differentiator"] = "slip-and-rate",
     around: Surroundings = _ALONE,
     disturbance_class: DisturbanceClass = "amplitude",
     stress: ExactPascals | None = None,
@@ -149,7 +149,8 @@ def guarantee(
     step
         T_s, such as '184 ms' or 7/50 (s); the fault's unless given.
     measured
-        What the designed e-LQR is told: slip-and-rate, or slip, from which it estimates the slip rate.
+        What the e-LQR is told: slip-and-rate; or slip, from which a designed one estimates the slip rate; or slip with
+        the differentiator, implicit and of n_d = 2 with any n_f, of which the least λ_d is told.
     disturbance_class
         amplitude: any disturbance as large as the fault's; rate: one that starts at 0 and is no faster either.
     stress

@@ -83,7 +83,7 @@ class Told:
     Attributes
     ----------
     measured : str
-        One of `MEASURED`.
+        ``slip-and-rate`` or ``slip``.
     slip_noise, rate_noise : Fraction
         Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
 
@@ -98,7 +98,7 @@ class Told:
     rate_noise: Fraction = Fraction(0)
 
     def __post_init__(self) -> None:
-        require_known(self.measured, MEASURED, "measured")
+        require_known(self.measured, MEASURED[:2], "measured")
         noise = f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s"
         if min(self.slip_noise, self.rate_noise) < 0:
             raise ParameterError(f"a bound of noise must be 0 or more. Received {noise}. Check their signs.")

@@ -99,7 +99,7 @@ def answer(
     step : Fraction, optional
         T_s [s]; the fault's unless given.
     measured : str
-        ``slip-and-rate``, or ``slip`` for a designed e-LQR with an observer.
+        ``slip-and-rate``, ``slip`` for a designed e-LQR with an observer, or ``differentiator``.
     disturbance_class : str
         ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
     **around : Fraction
@@ -181,7 +181,7 @@ def guarantee(
     step : str, float or Fraction, optional
         T_s [s]; the fault's unless given.
     measured : str
-        ``slip-and-rate``, or ``slip`` for a designed e-LQR with an observer.
+        ``slip-and-rate``, ``slip`` for a designed e-LQR with an observer, or ``differentiator``.
     disturbance_class : str
         ``amplitude`` or ``rate``.
     saturation, withdrawal : str, float or Fraction, optional

@@ -16,7 +16,7 @@ from quakedesign.synthesis.guaranteed import MEASURED
 CHOICES = {
     "simulate": (control_laws(), schemes(), integrators(), FEED_FORWARDS, presets()),
     "campaign": (control_laws(), schemes(), FEED_FORWARDS, BOXES),
-    "design": (designable(), schemes(), MEASURED, BOXES),
+    "design": (designable(), schemes(), MEASURED[:2], BOXES),
     "export": (control_laws(), FEED_FORWARDS),
     "guarantee": (designable(), MEASURED, BOXES),
     "fault": (presets(), BOXES),

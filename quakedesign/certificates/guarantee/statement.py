@@ -92,6 +92,15 @@ class Guarantee:
         return RestLimit(width=width, per_slip=above(per_slip), resolution=resolution)
 
     @property
+    def slip_acceleration(self) -> UpperBound:
+        """What |e1″| never exceeds [m/s²], from |p − p*| as the claims of the pressure follow from it."""
+        task, claims, (low, high) = self.task, self.claims, self.task.rest_pressure
+        away = max(claims.largest_pressure - high, low - claims.least_pressure)
+        slip, rate = (max(map(abs, chord)) for chord in (task.slip_chord, task.rate_chord))
+        moved = slip * claims.slip_error + rate * claims.slip_rate_error + task.beta[1] * task.authority * away
+        return UpperBound(moved + task.amplitude + task.reference_force)
+
+    @property
     def controller(self) -> "SampledController":
         """The law for `simulate`, as that of `Held`, with its limit against windup."""
         return replace(self.held.controller, rest_limit=self.rest_limit)

@@ -1,4 +1,7 @@
-"""How far the estimates of a differentiator are off, measured against adverse signals."""
+"""How far the estimates of a differentiator are off, measured against adverse signals.
+
+What is proved of the implicit one, from rest, is in `quakedesign.loop.sensing.differences`.
+"""
 
 from dataclasses import replace
 from functools import lru_cache

@@ -8,7 +8,8 @@ through the law on x1'' itself. With A the largest |x1''| of the loop with exact
 is self-consistent. For signed powers up to 1 the difference is largest astride the origin, at e = −ε/2. The left-hand
 side grows with λ_d as ε does for a linear law, so that the sampling period decides, and more slowly for a sliding mode,
 so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and there is none where the
-pressure is held: x1'' jumps at every sample.
+pressure is held: x1'' jumps at every sample. The implicit discretisation needs none from rest, and what it then tells
+a linear law is proved (`quakedesign.loop.sensing.differences`).
 
 The condition is what the differentiator asks for: no proof that the loop with estimates is stable, and loops may do
 without it. It leaves out what lies between slip and differentiator; a mean of N readings lags by (N − 1)T/2 more.

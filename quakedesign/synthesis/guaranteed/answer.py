@@ -12,10 +12,11 @@ from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.fault import Fault
 from quakedesign.loop import LinearLaw, RestLimit
+from quakedesign.loop.sensing.differences import least_bound
 from quakedesign.sos.exact.strict import texts
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
-from quakedesign.synthesis.guaranteed.families import MEASURED
+from quakedesign.synthesis.guaranteed.families import MEASURED, measured_by
 from quakedesign.synthesis.guaranteed.poles import own_poles
 
 _TOLD = (
@@ -73,7 +74,7 @@ class Answer:
                 said.append(
                     f"{name}: slip error {seen.slip_error:.3g} m, slip-rate error {seen.slip_rate_error:.3g} m/s"
                 )
-        said += self.task_lines()
+        said += [*self._told(), *self.task_lines()]
         if self.leaves_with_stick:
             said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
         return said if self.compensation is None else [*said, self.compensation.sentence()]
@@ -89,6 +90,23 @@ class Answer:
         held = self.found.held
         growth = float(np.max(np.abs(own_poles(held.law)), initial=0.0))
         return float(held.step) / log(growth) if growth > _GROWS else None
+
+    @property
+    def differentiator_bound(self) -> UpperBound | None:
+        """λ_d [m/s³] from which on the differentiator tells what is proved; None for a law without one."""
+        if not isinstance(self.found, Guarantee) or measured_by(self.found.held.law) != MEASURED[2]:
+            return None
+        return UpperBound(least_bound(self.found.slip_acceleration, self.found.held.slip_noise, self.found.held.step))
+
+    def _told(self) -> list[str]:
+        """For people; nothing of a law without a differentiator."""
+        bound = self.differentiator_bound
+        if bound is None:
+            return []
+        return [
+            "told by the implicit differentiator of the slip error, n_d = 2 with any n_f, from rest: with lambda_d of "
+            f"{bound:.3g} m/s^3 or more it is (3x - 4x_1 + x_2)/(2 T_s) of the last three readings, for ever"
+        ]
 
     def _at_rest(self) -> list[str]:
         """For people; nothing of a law that does not grow."""
@@ -170,7 +188,8 @@ class Answer:
             "grows_at_rest": self.grows_at_rest,
             "rest_limit": _rest_limit(self.found.rest_limit),
             "limit": _limit(self.limit),
-            "measured": MEASURED[held.law.of_slip_alone],
+            "measured": measured_by(held.law),
+            "differentiator_bound": None if self.differentiator_bound is None else self.differentiator_bound.exact,
             **{name: str(getattr(held, name)) for name in _TOLD},
             "pump": None if held.pump is None else held.pump.to_dict(),
             "law": _law(held.law),

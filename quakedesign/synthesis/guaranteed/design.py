@@ -91,7 +91,7 @@ def design_held(
         What ``tracking`` may spend of the smallest certified slip-rate error [-]; 1.6 unless given, of an observer,
         whose smallest is larger, 1.4.
     measured : str
-        ``slip-and-rate`` or ``slip``.
+        One of `MEASURED`; the differentiator is the implicit one of order 2, from rest.
     **around : Fraction
         Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s], as in `Held`; 0 unless given.
 

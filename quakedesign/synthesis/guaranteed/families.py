@@ -1,7 +1,7 @@
 """Laws of a few numbers without units for one model, T_s and delay, among which searches choose."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import log10
 from typing import Any
@@ -22,11 +22,14 @@ from quakedesign.loop import (
     observer_through_path,
     slip_observer,
 )
+from quakedesign.loop.sensing.differences import ORDER, names_before, told_by_differences
 from quakedesign.synthesis.guaranteed.path_design import BEHIND_LAG, THROUGH_ROCK, PathFeedback, path_modes
 from quakedesign.synthesis.guaranteed.rounding import rounded, short
 
-MEASURED = ("slip-and-rate", "slip")
+MEASURED = ("slip-and-rate", "slip", "differentiator")
 _STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
+_NOT_BY_DIFFERENCES = ("diffusion", "lag", "initial_slip", "initial_slip_rate", "jitter", "averaging")
+_GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same where the slip rate is told late
 _OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains, and decades above what noise allows
 _DECADES = 4.0  # of process noise over that of the measurement, at most, at the start
 _FEWEST_MODES = 2  # of a layer, of a law that knows its path
@@ -48,6 +51,11 @@ class Family:
     period: Fraction
 
 
+def measured_by(law: LinearLaw) -> str:
+    """Which of `MEASURED` a law is for."""
+    return MEASURED[2] if law.states[-ORDER:] == names_before() else MEASURED[law.of_slip_alone]
+
+
 def require_surroundings(around: Around) -> None:
     """Refuse rock and noise below zero.
 
@@ -65,8 +73,10 @@ def require_surroundings(around: Around) -> None:
 
 def why_no_law(step: Fraction, measured: str, around: Around) -> str:
     """Why there are no laws for a loop; empty if there are."""
-    if around.get("longest_step") and measured == MEASURED[1]:
+    if around.get("longest_step") and measured != MEASURED[0]:
         return "samples that follow no clock are designed for with slip and slip rate measured"
+    if measured == MEASURED[2] and any(around.get(name) for name in _NOT_BY_DIFFERENCES):
+        return "what a differentiator tells is known from rest, on time, for a well at the fault"
     if not around.get("diffusion"):
         return ""
     if SHORTEST * around["diffusion"] < step:
@@ -76,7 +86,7 @@ def why_no_law(step: Fraction, measured: str, around: Around) -> str:
 
 
 def family_of(task: Task, step: Fraction, measured: str, around: Around) -> Family:
-    """Feedback with an estimate of the disturbance, from slip and slip rate or from the slip alone.
+    """Feedback with an estimate of the disturbance, from slip and slip rate, from the slip alone or a differentiator.
 
     Through a lag or a layer it is a feedback of the pressures on their way as well, which the law simulates.
 
@@ -90,6 +100,9 @@ def family_of(task: Task, step: Fraction, measured: str, around: Around) -> Fami
     around : Around
         Near the bound of whose noise of the slip an observer's search begins; `why_no_law` must have no reason.
     """
+    if measured == MEASURED[2]:
+        told = family_of(task, step, MEASURED[0], around)
+        return replace(told, law=lambda x: told_by_differences(told.law(x), step), starts=(*_GENTLE, *told.starts))
     delay = around.get("delay", Fraction(0))
     observed, noise = measured == "slip", around.get("slip_noise", Fraction(0))
     if around.get("diffusion") or (around.get("lag") and path_modes(step, around, observed=observed) >= 0):

@@ -11,7 +11,7 @@ from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.synthesis.guaranteed.design import MOST_DELAY, design_held, first_held
-from quakedesign.synthesis.guaranteed.families import MEASURED
+from quakedesign.synthesis.guaranteed.families import MEASURED, measured_by
 from quakedesign.synthesis.guaranteed.slowly import tightened
 
 Search = Callable[[Fraction, np.ndarray | None], tuple[Guarantee | NoGuarantee, np.ndarray | None]]
@@ -61,7 +61,7 @@ def _fastest_pole(task: Task) -> float:
 def design_at(task: Task, longest: Guarantee, objective: str) -> Guarantee:
     """Design for an objective at T_s and all else of a guarantee, which stays where there is none."""
     held = longest.held
-    measured = MEASURED[held.law.of_slip_alone]
+    measured = measured_by(held.law)
     found = design_held(task, held.step, objective=objective, measured=measured, **held.around)
     return found if isinstance(found, Guarantee) else tightened(longest)
 

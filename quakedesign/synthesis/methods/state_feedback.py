@@ -19,6 +19,7 @@ from quakedesign.controllers.feed_forward import NONE
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.loop import summed_integrals
+from quakedesign.loop.sensing.differences import told_by_differences
 from quakedesign.rationals import rational
 from quakedesign.synthesis.guaranteed import (
     CLASSES,
@@ -31,6 +32,7 @@ from quakedesign.synthesis.guaranteed import (
     design_held,
     sampled_design,
 )
+from quakedesign.synthesis.guaranteed.families import why_no_law
 from quakedesign.synthesis.guaranteed.longest_times import design_at, longest_step
 from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
@@ -91,12 +93,16 @@ class StateFeedback(Method[ExtendedLQR]):
 
     def sampled(self, fault: Fault, task: Task, law: type[ExtendedLQR], step: Fraction, wanted: Wanted) -> Answer:
         """Integrals of given gains are summed; without gains, a law with an estimate of the disturbance."""
-        if wanted.gains:
+        differs = wanted.measured == MEASURED[2]
+        if wanted.gains and not differs:
             wanted.require_all_measured()
         if wanted.scheme not in (None, "explicit"):
             raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {wanted.scheme!r}. Leave it out.")
         if wanted.gains:
             summed = summed_integrals(_four(wanted.gains), step)
+            if differs and (reason := why_no_law(step, wanted.measured, wanted.around)):
+                return Answer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
+            summed = told_by_differences(summed, step) if differs else summed
             return attacked(fault, best_guarantee(task, Held(law=summed, step=step, **wanted.around)))
         told: Any = {"measured": wanted.measured, **wanted.around}
         found = design_held(task, step, objective=wanted.objective, **told)

@@ -185,4 +185,5 @@ def test_another_objective_is_designed_for_what_a_guarantee_measures(monkeypatch
     assert design_at(claim.task, claim, "tracking") is claim
     around = {"delay": 0, "lag": 0, "diffusion": 0, "slip_noise": NOISE, "rate_noise": 0}
     around |= {"initial_slip": 0, "initial_slip_rate": 0, "pump": None, "jitter": 0, "delay_jitter": 0, "averaging": 0}
+    around |= {"longest_step": 0}
     assert told == [((claim.task, STEP), {"objective": "tracking", "measured": "slip", **around})]
