@@ -10,6 +10,16 @@ from typing import Any
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, constant, degree, product
 
+Structure = tuple[
+    int,
+    frozenset[Exponents],
+    int,
+    tuple[tuple[int, ...], ...],
+    tuple[tuple[tuple[Exponents, Fraction], ...], ...],
+    tuple[tuple[tuple[Exponents, Fraction], ...], ...],
+]
+"""Number of variables, monomials of the target, degree, products, inequalities and equalities of a statement."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Statement:
@@ -60,6 +70,26 @@ class Statement:
     def target(self) -> dict[Exponents, Fraction]:
         """multiplier · polynomial."""
         return product(len(self.variables), (self.multiplier, self.polynomial))
+
+    @cached_property
+    def structure(self) -> Structure:
+        """All but the numbers of the target, which the blocks do not follow from."""
+        inequalities, equalities = (tuple(tuple(p.items()) for p in g) for g in (self.inequalities, self.equalities))
+        return len(self.variables), frozenset(self.target), self.degree, self.products, inequalities, equalities
+
+    @classmethod
+    def of(cls, structure: Structure) -> "Statement":
+        """Statement of a structure, every monomial of its target once."""
+        size, support, largest, products, inequalities, equalities = structure
+        return cls(
+            variables=tuple(f"x{i}" for i in range(size)),
+            polynomial=dict.fromkeys(support, Fraction(1)),
+            inequalities=tuple(map(dict, inequalities)),
+            equalities=tuple(map(dict, equalities)),
+            products=products,
+            degree=largest,
+            multiplier=constant(size),
+        )
 
     def weight(self, chosen: tuple[int, ...]) -> dict[Exponents, Fraction]:
         """Π_{i∈S} g_i."""

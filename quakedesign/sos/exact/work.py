@@ -51,13 +51,20 @@ def spend(steps: int, bits: int = 0) -> None:
         raise WorkError(f"the check takes more than {STEPS} steps of exact arithmetic. Shorten terms or digits.")
 
 
+def counted() -> bool:
+    """Whether work is counted at present."""
+    return _left.get() is not None
+
+
 def length(number: Fraction) -> int:
     """Bits of the longer one of numerator and denominator."""
     return max(number.numerator.bit_length(), number.denominator.bit_length())
 
 
 def longest(numbers: Iterable[Fraction]) -> int:
-    """Bits of the longest of numbers over their common denominator, counting what it takes to find that."""
+    """Bits of the longest of numbers over their common denominator, counting what it takes to find that; else 0."""
+    if not counted():
+        return 0
     top, common = 0, 1
     for number in numbers:
         spend(1, common.bit_length() + number.denominator.bit_length())
@@ -73,5 +80,5 @@ def expanded(terms: int) -> None:
     ------
     WorkError
     """
-    if _left.get() is not None and terms > TERMS:
+    if counted() and terms > TERMS:
         raise WorkError(f"an expanded polynomial has more than {TERMS} terms. Split it.")

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from math import comb
 from typing import Any
 
@@ -13,7 +14,7 @@ from quakedesign.rationals import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree
 from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds, identity_holds
 from quakedesign.sos.exact.reduction import full_bases, parity_classes, reduced_bases
-from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.statement import Statement, Structure
 from quakedesign.sos.solve.faces import Block, at_kernels, at_real_zeros, at_zeros, modulo
 from quakedesign.sos.solve.moment import MomentProgram, Solution
 from quakedesign.sos.solve.points import local_minima, negative_point, polished_zeros, rational_zeros
@@ -199,6 +200,12 @@ def initial_blocks(statement: Statement) -> list[Block]:
     PolynomialError
         When they are more than a solver has the memory for.
     """
+    return list(_blocks_of(statement.structure))
+
+
+@lru_cache(256)
+def _blocks_of(structure: Structure) -> tuple[Block, ...]:
+    statement = Statement.of(structure)
     blocks = []
     graded = statement.graded
     for chosen, weight, basis in zip(statement.products, statement.weights, reduced_bases(statement), strict=True):
@@ -212,7 +219,7 @@ def initial_blocks(statement: Statement) -> list[Block]:
             "Gram matrices must be small enough for a solver: one of at most 140 x 140, say. "
             f"Received {len(sizes)} of up to {max(sizes)} x {max(sizes)}. Lower the degree."
         )
-    return blocks
+    return tuple(blocks)
 
 
 def block_sizes(statement: Statement) -> dict[str, list[int]]:

@@ -12,13 +12,14 @@ multiplier of its own among the unknowns.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from threading import Lock
 from typing import Any
 
 import numpy as np
 
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, product
-from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.statement import Statement, Structure
 from quakedesign.sos.solve.conic import Compiled, in_cones
 from quakedesign.sos.solve.decide import initial_blocks
 from quakedesign.sos.solve.faces import modulo
@@ -86,17 +87,11 @@ class Proposal:
 
 def joint_program(demands: Sequence[Demand]) -> "JointProgram":
     """The programme of the structure that demands have, kept from the last time that it was asked for."""
-    key = len(demands[0].parts), *(_structure(d.template) for d in demands)
+    key = len(demands[0].parts), *(d.template.structure for d in demands)
     program = _known.pop(key, None) or JointProgram(demands)
     if len(_known) >= _KEPT:
         _known.pop(next(iter(_known)), None)
     return _known.setdefault(key, program)
-
-
-def _structure(template: Statement) -> tuple[Any, ...]:
-    """What two templates with one cone share."""
-    conditions = (tuple(tuple(p.items()) for p in group) for group in (template.inequalities, template.equalities))
-    return frozenset(template.target), template.degree, template.products, *conditions
 
 
 class JointProgram:
@@ -192,7 +187,13 @@ class _Stated:
 
 
 def shape_of(template: Statement) -> MomentProgram:
-    """Monomials, blocks and relations of a cone, modulo the equalities."""
+    """Monomials, blocks and relations of a cone, modulo the equalities; to be read alone, as others share it."""
+    return _shape_of(template.structure)
+
+
+@lru_cache(256)
+def _shape_of(structure: Structure) -> MomentProgram:
+    template = Statement.of(structure)
     multiples = [r for _, _, r in relations(template)]
     blocks = modulo(initial_blocks(template), multiples)
     rows = [{e: float(c) for e, c in r.items()} for r in multiples]
