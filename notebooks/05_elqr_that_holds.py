@@ -36,7 +36,7 @@ import quakedesign as qd
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import task_of
-from quakedesign.report.linear import verdict_lines
+from quakedesign.report.elqr_sentences import verdict_lines
 from quakedesign.simulation import natural_earthquake
 from quakedesign.synthesis.guaranteed import design_held, worst_found
 from quakedesign.synthesis.linear.analysis.printed_theorem import both_tests

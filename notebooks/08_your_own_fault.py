@@ -37,7 +37,7 @@ import quakedesign as qd
 from quakedesign.fault import friction_law
 from quakedesign.identification import save_fault
 from quakedesign.report.identification import identification_figure
-from quakedesign.report.limits import limits_lines
+from quakedesign.report.impossibility_table import limits_lines
 from quakedesign.simulation import Tide, velocity_step
 from quakedesign.studies.state_runs import natural_run
 

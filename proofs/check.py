@@ -27,19 +27,19 @@ IMPORTS = {
     "guarantee_task": ("guarantee_reading",),
     "guarantee_numbers": ("guarantee_reading",),
     "guarantee_root": ("guarantee_reading", "guarantee_numbers"),
-    "guarantee_pulse": ("guarantee_reading", "guarantee_numbers"),
+    "guarantee_near_events": ("guarantee_reading", "guarantee_numbers"),
     "guarantee_loop": (
         *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
-        *("guarantee_root", "guarantee_pulse"),
+        *("guarantee_root", "guarantee_near_events"),
     ),
-    "guarantee_flows": ("guarantee_reading", "guarantee_numbers", "guarantee_loop", "guarantee_pulse"),
+    "guarantee_impulse_sums": ("guarantee_reading", "guarantee_numbers", "guarantee_loop", "guarantee_near_events"),
     "guarantee_gains": (
         *("guarantee_reading", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_flows", "guarantee_pulse"),
+        *("guarantee_loop", "guarantee_impulse_sums", "guarantee_near_events"),
     ),
     "guarantee_start": (
         *("guarantee_reading", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_flows", "guarantee_gains"),
+        *("guarantee_loop", "guarantee_impulse_sums", "guarantee_gains"),
     ),
     "guarantee_layer": ("guarantee_reading", "guarantee_loop", "guarantee_gains", "guarantee_start"),
     "guarantee_slow": (
@@ -52,7 +52,7 @@ IMPORTS = {
     ),
     "guarantee_reach": (
         *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_flows", "guarantee_bounds"),
+        *("guarantee_loop", "guarantee_impulse_sums", "guarantee_bounds"),
     ),
     "guarantee": (
         *("guarantee_reading", "guarantee_task", "guarantee_root"),

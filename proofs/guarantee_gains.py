@@ -6,10 +6,10 @@ from fractions import Fraction
 from functools import lru_cache
 from math import ceil
 
-from guarantee_flows import MAX_WORK, Flow, cut, integral, majorant, past
+from guarantee_impulse_sums import MAX_WORK, Flow, cut, integral, majorant, past
 from guarantee_loop import Fade, Loop
+from guarantee_near_events import Near, Pulse
 from guarantee_numbers import BITS, Fixed, column, exponential, fixed, unit
-from guarantee_pulse import Near, Pulse
 from guarantee_reading import Refused, Row
 
 STRETCHES, PARTS = 128, 6  # of time without samples, each of 2^PARTS pieces

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
+from guarantee_near_events import Pulse
 from guarantee_numbers import unit, zeros
-from guarantee_pulse import Pulse
 from guarantee_reading import Row, keys, matrix, need, number, numbers, row
 from guarantee_root import Root, read_root
 from guarantee_task import Task

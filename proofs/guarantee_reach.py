@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from guarantee_bounds import inputs
-from guarantee_flows import majorant
+from guarantee_impulse_sums import majorant
 from guarantee_loop import Loop
 from guarantee_numbers import BITS, Fixed, column, exponential, fixed, unit
 from guarantee_reading import Row, keys, matrix, need, row

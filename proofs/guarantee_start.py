@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from fractions import Fraction
 
-from guarantee_flows import DOUBLINGS, MAX_WORK, SHARE, Flow, cut, seen_alone, slowest
 from guarantee_gains import in_even_units
+from guarantee_impulse_sums import DOUBLINGS, MAX_WORK, SHARE, Flow, cut, seen_alone, slowest
 from guarantee_loop import Loop
 from guarantee_numbers import BITS, Fixed, fixed
 from guarantee_reading import Refused, Row, need

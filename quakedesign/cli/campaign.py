@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.cli.hardware import ActuatorOptions, SensorOptions, surroundings
+from quakedesign.cli.option_values import Metres, MetresPerSecond, Whole
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, LawOptions, Output, RunOptions, Scheduler
 from quakedesign.cli.shared import app, console, progress
 from quakedesign.cli.state import SpreadOptions
-from quakedesign.cli.units import Metres, MetresPerSecond, Whole
 from quakedesign.errors import ParameterError
 from quakedesign.interruption import remedy
 

@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Formats, Output, Shaking
-from quakedesign.cli.shared import app, command_line, console, print_lines, progress
-from quakedesign.cli.units import (
+from quakedesign.cli.option_values import (
     ExactMetres,
     ExactMetresPerSecond,
     ExactPascals,
@@ -16,6 +14,8 @@ from quakedesign.cli.units import (
     ExactSquareMetresPerSecond,
     rock,
 )
+from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Formats, Output, Shaking
+from quakedesign.cli.shared import app, command_line, console, print_lines, progress
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 if TYPE_CHECKING:

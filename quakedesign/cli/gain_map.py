@@ -5,9 +5,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from quakedesign.cli.option_values import Gains, Whole
 from quakedesign.cli.options import PLAIN, Force, Formats, Output, Scheduler
 from quakedesign.cli.shared import app, progress
-from quakedesign.cli.units import Gains, Whole
 from quakedesign.errors import ParameterError
 
 Numbers = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]

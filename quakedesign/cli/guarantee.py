@@ -8,9 +8,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Scheduler, Shaking
-from quakedesign.cli.shared import app, given, new_file, progress
-from quakedesign.cli.units import (
+from quakedesign.cli.option_values import (
     ExactMetres,
     ExactMetresPerSecond,
     ExactPascals,
@@ -21,6 +19,8 @@ from quakedesign.cli.units import (
     Whole,
     rock,
 )
+from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Scheduler, Shaking
+from quakedesign.cli.shared import app, given, new_file, progress
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.output import require_room
 from quakedesign.rationals import rational

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Group, Parameter
 
-from quakedesign.cli.units import Hertz, Metres, MetresPerSecond, Whole, in_unit, quantity, whole
+from quakedesign.cli.option_values import Hertz, Metres, MetresPerSecond, Whole, in_unit, quantity, whole
 from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators import Actuator, Stage, stages
 from quakedesign.loop.actuators.base import Option

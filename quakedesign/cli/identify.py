@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from quakedesign.cli.option_values import Pascals, Whole, in_unit
 from quakedesign.cli.options import PLAIN, FaultName, Force, Output
 from quakedesign.cli.shared import app, new_file, require_different
-from quakedesign.cli.units import Pascals, Whole, in_unit
 
 
 @app.command

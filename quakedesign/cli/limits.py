@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Literal
 
-from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
-from quakedesign.cli.shared import app
-from quakedesign.cli.units import (
+from quakedesign.cli.option_values import (
     ExactMetres,
     ExactMetresPerSecond,
     ExactSeconds,
@@ -13,6 +11,8 @@ from quakedesign.cli.units import (
     Pascals,
     rock,
 )
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
+from quakedesign.cli.shared import app
 from quakedesign.rationals import rational
 
 
@@ -75,7 +75,7 @@ def limits(
 
         prepare(out, force=force)
     from quakedesign.report.figure_files import file_names
-    from quakedesign.report.limits import limits_lines, write_limits
+    from quakedesign.report.impossibility_table import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits
 
     answer = all_limits(

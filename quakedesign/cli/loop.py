@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.cli.hardware import ActuatorOptions, EstimateOptions, SensorOptions, surroundings
+from quakedesign.cli.option_values import Gains, Seconds, Texts, Whole
 from quakedesign.cli.options import (
     PLAIN,
     FaultName,
@@ -17,7 +18,6 @@ from quakedesign.cli.options import (
 )
 from quakedesign.cli.shared import app, console, given, new_file, print_lines, progress
 from quakedesign.cli.state import NO_STATE, StateOptions, require_no_state_options, show_state_run
-from quakedesign.cli.units import Gains, Seconds, Texts, Whole
 from quakedesign.errors import ParameterError
 
 _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()

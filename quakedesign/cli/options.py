@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from quakedesign.cli.option_values import Gains, Metres, MetresPerSecond, Push, Seconds, Whole
 from quakedesign.cli.shared import hush, print_json, print_lines
-from quakedesign.cli.units import Gains, Metres, MetresPerSecond, Push, Seconds, Whole
 from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:

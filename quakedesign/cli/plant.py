@@ -4,9 +4,9 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from quakedesign.cli.option_values import Gains
 from quakedesign.cli.options import PLAIN, Box, FaultName, Output
 from quakedesign.cli.shared import app, console, print_json, progress
-from quakedesign.cli.units import Gains
 
 
 @app.command

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from quakedesign.cli.option_values import ExactSeconds, Gains
 from quakedesign.cli.options import PLAIN, Box, Force, Output
 from quakedesign.cli.shared import app, new_file, refuse
-from quakedesign.cli.units import ExactSeconds, Gains
 from quakedesign.errors import ParameterError
 
 
@@ -99,7 +99,7 @@ def _certify_on_fault(
     """Verdict on an e-LQR."""
     from quakedesign.controllers.elqr import ExtendedLQR
     from quakedesign.fault import load_fault
-    from quakedesign.report.linear import verdict_lines
+    from quakedesign.report.elqr_sentences import verdict_lines
     from quakedesign.synthesis.linear.analysis.verdict import judge
 
     began = perf_counter()

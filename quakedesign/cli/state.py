@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
+from quakedesign.cli.option_values import Pascals, Seconds
 from quakedesign.cli.shared import given, refuse
-from quakedesign.cli.units import Pascals, Seconds
 from quakedesign.errors import ParameterError
 
 if TYPE_CHECKING:

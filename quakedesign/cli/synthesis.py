@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from quakedesign.cli.option_values import Seconds, Whole
 from quakedesign.cli.options import PLAIN, Force, Output, Scheduler
 from quakedesign.cli.shared import app, console, given, new_file, refuse
-from quakedesign.cli.units import Seconds, Whole
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 
 if TYPE_CHECKING:

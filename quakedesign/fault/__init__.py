@@ -6,6 +6,8 @@ from quakedesign.faces import face
 
 if TYPE_CHECKING:
     from quakedesign.fault.disturbance import Disturbance as Disturbance
+    from quakedesign.fault.file_reading import load_fault as load_fault
+    from quakedesign.fault.file_reading import parse_fault as parse_fault
     from quakedesign.fault.friction import FrictionLaw as FrictionLaw
     from quakedesign.fault.friction import friction_law as friction_law
     from quakedesign.fault.friction import friction_laws as friction_laws
@@ -15,8 +17,6 @@ if TYPE_CHECKING:
     from quakedesign.fault.reference import SlidingReference as SlidingReference
     from quakedesign.fault.scales import Scales as Scales
     from quakedesign.fault.scaling import scaled_fault as scaled_fault
-    from quakedesign.fault.scenario import load_fault as load_fault
-    from quakedesign.fault.scenario import parse_fault as parse_fault
     from quakedesign.fault.sources import presets as presets
     from quakedesign.fault.template import fault_toml as fault_toml
     from quakedesign.fault.uncertainty import BOXES as BOXES

@@ -8,10 +8,10 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from quakedesign.fault.disturbance import Disturbance
+from quakedesign.fault.file_reading import DISTURBANCE, OPTIONAL, PLANT, TASK, WIDTHS
 from quakedesign.fault.friction import FrictionLaw, friction_law, friction_laws
 from quakedesign.fault.parameters import Fault
 from quakedesign.fault.reference import Reference
-from quakedesign.fault.scenario import DISTURBANCE, OPTIONAL, PLANT, TASK, WIDTHS
 from quakedesign.fault.uncertainty import BOXES, UncertaintyBox
 from quakedesign.fault.units import units_of
 

@@ -16,9 +16,9 @@ from quakedesign.report.headlines import (
     limit_lines,
     sentences,
 )
+from quakedesign.report.html_text import unit_html
 from quakedesign.report.mathml import mathml
 from quakedesign.report.outcomes import run_sentences
-from quakedesign.report.units import unit_html
 from quakedesign.studies.equations import law_latex
 
 if TYPE_CHECKING:

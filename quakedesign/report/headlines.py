@@ -10,7 +10,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.certificates.premises import Domain, Variant
 from quakedesign.fault import Fault
-from quakedesign.report.linear import held_sentences, peaks_sentence
+from quakedesign.report.elqr_sentences import held_sentences, peaks_sentence
 from quakedesign.report.outcomes import run_sentences
 from quakedesign.simulation import Trajectory
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, Entry

@@ -12,12 +12,12 @@ from quakedesign.report.account import ASKED, Account, accounts
 from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.grade import GRADES
 from quakedesign.report.headlines import FEEDFORWARD_COLUMNS, scheme_sentence
+from quakedesign.report.html_text import typeset
 from quakedesign.report.mathml import mathml
 from quakedesign.report.parameter_table import HEADINGS, parameter_rows
 from quakedesign.report.reproduction import Reproduction
 from quakedesign.report.state_runs import cycle_sentence, left_out_lines
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
-from quakedesign.report.units import typeset
 from quakedesign.studies.equations import coordinates, plant_latex
 from quakedesign.studies.facts import fault_sentences
 from quakedesign.studies.state_runs import StateRun

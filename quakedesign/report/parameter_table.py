@@ -7,9 +7,9 @@ from typing import Any
 from markupsafe import Markup
 
 from quakedesign.fault import Fault
-from quakedesign.fault.scenario import DISTURBANCE, PLANT, TASK, WIDTHS
+from quakedesign.fault.file_reading import DISTURBANCE, PLANT, TASK, WIDTHS
+from quakedesign.report.html_text import unit_html
 from quakedesign.report.mathml import mathml
-from quakedesign.report.units import unit_html
 
 _DERIVED = {
     "mass": ("m", "kg"),

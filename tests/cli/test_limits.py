@@ -9,7 +9,7 @@ from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.cli import main
 from quakedesign.fault import fault_toml, load_fault
-from quakedesign.studies import fault_limits
+from quakedesign.studies import impossible_and_proved
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
 
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
@@ -18,9 +18,10 @@ KEYS = ("peak_slip_rate_error", "largest_step", "largest_delay", "largest_diffus
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
-    monkeypatch.setattr("quakedesign.studies.fault_limits.natural_peak", lambda _fault: 0.05)
+    monkeypatch.setattr("quakedesign.studies.impossible_and_proved.natural_peak", lambda _fault: 0.05)
     monkeypatch.setattr(
-        "quakedesign.studies.fault_limits.design_held", lambda *_, **__: NoGuarantee(reason="none", small_gain=None)
+        "quakedesign.studies.impossible_and_proved.design_held",
+        lambda *_, **__: NoGuarantee(reason="none", small_gain=None),
     )
 
 
@@ -68,7 +69,7 @@ def test_a_disturbance_may_be_a_shear_stress(capsys):
 def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(capsys, monkeypatch, tmp_path):
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     answer = SlidingAnswer(found=known, task=known.task, held=known.held)
-    monkeypatch.setattr(fault_limits, "answer_sliding", lambda fault, **asked: answer)
+    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0
     said = capsys.readouterr().out
     assert said.splitlines()[1] == "(box paper, any shear stress of at most 25 kPa, T_s = 300 s)"
@@ -108,7 +109,7 @@ def test_where_no_design_stands_a_stress_the_reason_is_told(capsys, monkeypatch)
     """A sampling time that suits no law would else look like a missing option."""
     none = NoGuarantee(reason="T_s near 0.51 s suits", small_gain=None)
     answer = SlidingAnswer(found=none, task=None, held=None)
-    monkeypatch.setattr(fault_limits, "answer_sliding", lambda fault, **asked: answer)
+    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch") == 2
     assert "no design was found that stands any: T_s near 0.51 s suits. Give --stress" in capsys.readouterr().err
 
@@ -120,7 +121,7 @@ def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, m
     file.write_text(fault_toml(patch))
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     answer = SlidingAnswer(found=known, task=known.task, held=known.held)
-    monkeypatch.setattr(fault_limits, "answer_sliding", lambda fault, **asked: answer)
+    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run(str(file)) == 0
     assert "errors of this fault swing while they grow, or do not grow" in " ".join(capsys.readouterr().out.split())
 
@@ -133,7 +134,7 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
         asked.append(around)
         return SlidingAnswer(found=known, task=known.task, held=known.held)
 
-    monkeypatch.setattr(fault_limits, "answer_sliding", answered)
+    monkeypatch.setattr(impossible_and_proved, "answer_sliding", answered)
     patch = ("crustal-patch", "--stress", "25 kPa")
     assert run(*patch, "--well", "40 m", "--diffusivity", "2 m^2/s", "--lag", "5 s") == 0
     told = " ".join(capsys.readouterr().out.split())

@@ -10,8 +10,8 @@ import quakedesign as qd
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premise import Premise
+from quakedesign.report.elqr_sentences import held_sentences, peaks_sentence, verdict_lines
 from quakedesign.report.headlines import domain_sentence, sentences
-from quakedesign.report.linear import held_sentences, peaks_sentence, verdict_lines
 from quakedesign.report.terminal import _line
 from quakedesign.studies.comparison import Entry
 from quakedesign.synthesis.linear.analysis.verdict import judge

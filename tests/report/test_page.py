@@ -23,11 +23,11 @@ from quakedesign.report.account import ASKED
 from quakedesign.report.captions import CAPTIONS
 from quakedesign.report.drawing import figure
 from quakedesign.report.figure_files import FORMATS, figure_bytes
+from quakedesign.report.html_text import typeset, unit_html
 from quakedesign.report.mathml import mathml
 from quakedesign.report.paper_figures import PAPER
 from quakedesign.report.parameter_table import parameter_rows
 from quakedesign.report.reproduction import reproduction
-from quakedesign.report.units import typeset, unit_html
 from quakedesign.report.vector import inline_svg
 from quakedesign.studies.equations import law_latex, plant_latex
 

@@ -9,7 +9,7 @@ from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.certificates.slow_sliding import WHOLE, SlidingClaims, SlidingGuarantee, sliding_task
 from quakedesign.fault import Fault, Reference, friction_law
-from quakedesign.studies.fault_limits import limits
+from quakedesign.studies.impossible_and_proved import limits
 from quakedesign.synthesis.guaranteed.sliding_answer import _beyond
 from quakedesign.synthesis.guaranteed.sliding_reach import farthest, suitable, what_would_do
 from quakedesign.synthesis.guaranteed.slow_sliding import LOG_RATES, searched_sliding

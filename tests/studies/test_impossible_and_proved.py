@@ -14,7 +14,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
 from quakedesign.loop import summed_integrals
 from quakedesign.rationals import rational
-from quakedesign.report.limits import limits_figure, limits_lines
+from quakedesign.report.impossibility_table import limits_figure, limits_lines
 from quakedesign.studies import limits as study
 from quakedesign.studies.facts import beyond_control
 from quakedesign.synthesis.guaranteed import reached
@@ -32,7 +32,7 @@ CLAIMS = Claims(
 
 @pytest.fixture(autouse=True)
 def _natural_peak(monkeypatch):
-    monkeypatch.setattr("quakedesign.studies.fault_limits.natural_peak", lambda fault: 0.25)
+    monkeypatch.setattr("quakedesign.studies.impossible_and_proved.natural_peak", lambda fault: 0.25)
 
 
 @pytest.fixture
@@ -51,14 +51,14 @@ def designs(monkeypatch):
             return NoGuarantee(reason="too long", small_gain=None)
         return Guarantee(task=task, held=Held(law=LAW, step=step, delay=delay), claims=CLAIMS)
 
-    monkeypatch.setattr("quakedesign.studies.fault_limits.design_held", designed)
+    monkeypatch.setattr("quakedesign.studies.impossible_and_proved.design_held", designed)
 
     def late(task, step, **told):
         tellings.append(told)
         found = reached(lambda delay: designed(task, step, objective="peak", delay=delay), step / 2, most=7 * step)
         return found[-1] if found else None
 
-    monkeypatch.setattr("quakedesign.studies.fault_limits.longest_delay", late)
+    monkeypatch.setattr("quakedesign.studies.impossible_and_proved.longest_delay", late)
     return asked, longest, tellings
 
 

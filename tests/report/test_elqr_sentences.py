@@ -11,7 +11,7 @@ from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Bounds, Claims, ContinuousPeaks, NoGuarantee, task_of
 from quakedesign.fault import load_fault
 from quakedesign.loop import exact_integrals
-from quakedesign.report.linear import held_sentences, margin_lines, peaks_sentence
+from quakedesign.report.elqr_sentences import held_sentences, margin_lines, peaks_sentence
 from quakedesign.synthesis.linear.sampled.held import HeldLoop
 from quakedesign.synthesis.linear.sampled.varying_parameters import LargestVaryingStep, VaryingVerdict
 

@@ -8,8 +8,8 @@ from itertools import pairwise
 from math import ceil
 
 from guarantee_loop import Fade, Loop
+from guarantee_near_events import Near, Pulse, near_of, with_next
 from guarantee_numbers import BITS, Fixed, column, exponentials, fixed, sums_of_product
-from guarantee_pulse import Near, Pulse, near_of, with_next
 from guarantee_reading import Refused, Row, need
 
 DOUBLINGS = 12  # at most 4096 periods are summed
