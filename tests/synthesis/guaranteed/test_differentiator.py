@@ -68,6 +68,16 @@ def test_no_course_leaves_what_is_proved_nor_what_the_differentiator_can_follow(
     assert np.abs(np.diff(slips, 3, axis=0)).max() + 8 * float(row[1]) <= most
 
 
+def test_the_acceleration_is_what_all_claims_allow_at_once():
+    claim = designed(("peak", NOISE))
+    held, claims, task = attacker.numbers(claim), claim.claims, claim.task
+    low, high = map(float, task.rest_pressure)
+    away = max(float(claims.largest_pressure) - high, low - float(claims.least_pressure))
+    most = [max(map(abs, ends)) for ends in (held.s, held.w, held.beta)]
+    parts = most[0] * float(claims.slip_error), most[1] * float(claims.slip_rate_error), most[2] * held.b * away
+    assert float(claim.slip_acceleration) == pytest.approx(sum(parts) + held.force, rel=1e-12)
+
+
 def test_the_answer_tells_the_least_bound_of_the_differentiator():
     claim = designed(("peak", NOISE))
     found = Answer(fault=REAL, found=claim)
