@@ -24,6 +24,7 @@ from quakedesign.synthesis.guaranteed.unclocked import unclocked_estimate
 OBJECTIVES = ("tracking", "peak")
 _EVALUATIONS = 150
 _FEW = 50  # evaluations near a law that has a guarantee at another time
+_NARROW = 1.25  # room of those: more of it costs what is proved of the slip error too
 _FEWER = 80  # evaluations where samples follow no clock
 _CREEPING = 0.1  # what the slip error over a period counts beside the slip-rate error, so that the loop does not creep
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
@@ -89,7 +90,7 @@ def design_held(
     objective : str
     room : float, optional
         What ``tracking`` may spend of the smallest certified slip-rate error [-]; 1.6 unless given, of an observer,
-        whose smallest is larger, 1.4.
+        whose smallest is larger, 1.4, by no clock 1.25.
     measured : str
         One of `MEASURED`; the differentiator is the implicit one of order 2, from rest.
     **around : Fraction
@@ -120,7 +121,7 @@ def design_held(
         return none  # a proof of that takes a minute
     seen = laws.seen(x)
     if objective == "tracking" and seen is not None and isinstance(seen.bounds, Bounds):
-        limit = (room or laws.family.room) * float(seen.bounds.slip_rate_error)
+        limit = (room or laws.room) * float(seen.bounds.slip_rate_error)
         _, x = min((laws.least_drift(start, limit) for start in (x, starts[1])), key=lambda reached: reached[0])
     return best_guarantee(task, laws.held(x))
 
@@ -186,6 +187,11 @@ class _Laws:
             return self.quiet(x, _drift_cost(self.seen(x), limit))
 
         return _search_once(("drift", limit, *self.question), cost, start, **self._effort)
+
+    @property
+    def room(self) -> float:
+        """What ``tracking`` may spend of the smallest certified slip-rate error, see `design_held`."""
+        return _NARROW if self.template.longest_step else self.family.room
 
     @property
     def _effort(self) -> dict[str, Any]:
