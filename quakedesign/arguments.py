@@ -209,7 +209,8 @@ def _test(hint: Any) -> Callable[[Any], bool]:
         return lambda _: True
     if origin in (Union, types.UnionType):
         tests = [_test(part) for part in inner]
-        return lambda value: any(test(value) for test in tests)
+        plain = {part for part in inner if isinstance(part, type) and get_origin(part) is None}
+        return lambda value: type(value) in plain or any(test(value) for test in tests)
     if origin is Literal:
         return lambda value: value in inner
     if origin is type:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 EVENTS = ("diverged", "opening", "reverse_slip", "stick")
@@ -66,7 +66,7 @@ class Metrics:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures by name, as JSON can hold them."""
-        return asdict(self)
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @staticmethod
     def unit(name: str) -> str:

@@ -92,12 +92,12 @@ class Recorder:
         """Memory of the scheme at the start, by name."""
         return self.scheme.memory(self.loop, self.step)
 
-    @property
+    @cached_property
     def state_size(self) -> int:
         """Number of states of plant and law, and of entries of the scheme's memory."""
         return 2 + len(self.loop.integrals) + len(self.memory)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of the vector."""
         return 2 + self.state_size + len(self.watching) + len(self.loop.factors)
