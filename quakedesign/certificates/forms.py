@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
 from itertools import accumulate, combinations, count, pairwise, product
-from math import factorial, lcm, prod
+from math import factorial, gcd, lcm, prod
 from operator import add, itemgetter, lshift
 from typing import NamedTuple
 
@@ -72,6 +72,19 @@ def _triangle(
     return tuple(sums), tuple((_taking(places), shifts) for places, shifts in parts)
 
 
+@lru_cache(maxsize=5000)
+def _halved(
+    variables: int, degree: int, coefficients: tuple[int, ...], edge: Edge
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Coefficients on both halves; one form stands in the problems of many vertices, which are halved alike."""
+    sums, halves = _triangle(variables, degree, edge)
+    values = list(coefficients)
+    for before, after in sums:
+        values += map(add, before(values), after(values))
+    first, second = (tuple(map(lshift, ends(values), shifts)) for ends, shifts in halves)
+    return first, second
+
+
 @dataclass(frozen=True, slots=True)
 class Form:
     """A form on one simplex: integer Bernstein coefficients times a scale.
@@ -97,18 +110,15 @@ class Form:
             ways = Fraction(prod(factorial(k) for k in e), factorial(degree))
             values.append(polynomial.get(e, Fraction(0)) * prod(s**k for s, k in zip(sizes, e, strict=True)) * ways)
         common = lcm(*(v.denominator for v in values))
-        whole = tuple(int(v * common) for v in values)
-        return cls(variables, degree, whole, fmpq(1, common))
+        shared = gcd(*(v.numerator for v in values)) or 1
+        whole = tuple(int(v * common) // shared for v in values)
+        return cls(variables, degree, whole, fmpq(shared, common))
 
     def bisected(self, edge: Edge) -> "tuple[Form, Form]":
         """Forms on the two halves; the first keeps the first end of the edge."""
-        sums, halves = _triangle(self.variables, self.degree, edge)
-        values = list(self.coefficients)
-        for before, after in sums:
-            values += map(add, before(values), after(values))
         scale = self.scale / (1 << self.degree)
-        coefficients = (tuple(map(lshift, ends(values), shifts)) for ends, shifts in halves)
-        first, second = (Form(self.variables, self.degree, c, scale) for c in coefficients)
+        parts = _halved(self.variables, self.degree, self.coefficients, edge)
+        first, second = (Form(self.variables, self.degree, c, scale) for c in parts)
         return first, second
 
     def least(self) -> fmpq:

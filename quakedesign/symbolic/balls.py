@@ -276,10 +276,15 @@ def _halves(operations: _Operations, box: dict[Any, Any], values: list[Any]) -> 
         if low == high:
             continue
         middle = (low + high) / 2
-        ends = ((low, middle), (middle, high))
-        parts = [(box | {symbol: part}, operations.moved(values, symbol, ball(*part))) for part in ends]
-        worst = max(_upper(found[-1]) for _, found in parts)
-        if least is None or worst < least:
+        parts, worst = [], None
+        for part in ((low, middle), (middle, high)):
+            found = operations.moved(values, symbol, ball(*part))
+            upper = _upper(found[-1])
+            if least is not None and upper >= least:  # the other half cannot make it better
+                break
+            parts.append((box | {symbol: part}, found))
+            worst = upper if worst is None else max(worst, upper)
+        else:
             best, least = parts, worst
     return best or [(box, values)]
 
