@@ -14,7 +14,7 @@ from guarantee_numbers import BITS, Fixed, column, exponential, fixed, unit
 from guarantee_reading import Row, keys, matrix, need, row
 from guarantee_task import Task
 
-MAX_FACETS, MAX_PIECES = 400, 32
+MAX_FACETS, MAX_PIECES, MAX_ENTRIES, MAX_BASES, TOO_LARGE = 400, 32, 6, 4000, 10**20
 SOONEST = 4  # pieces of the shortest interval
 Basis = tuple[int, ...]
 
@@ -37,8 +37,12 @@ def read_reach(value: Any, loop: Loop) -> Reach:
     bounds = row(given["inputs"], "inputs", len(loop.inputs))
     need(min(bounds) >= 0, "bounds of the inputs must be >= 0")
     lines = matrix(facets, "facets", len(facets), size)
+    need(size <= MAX_ENTRIES, f"facets must have at most {MAX_ENTRIES} entries")
+    ordinary = all(max(abs(v.numerator), v.denominator) < TOO_LARGE for line in lines for v in line)
+    need(ordinary, "numbers of facets must have at most 20 digits")
     counts = [("at_samples", len(lines)), ("between", len(loop.outputs))]
     at_samples, between = (read_bases(given[name], name, count, size, len(lines)) for name, count in counts)
+    need(sum(map(len, [*at_samples, *between])) <= MAX_BASES, f"there must be at most {MAX_BASES} bases")
     return Reach(bounds, lines, at_samples, between)
 
 

@@ -42,6 +42,7 @@ _BITS, _ZERO = 128, Fraction(0)
 SOONEST = 4  # pieces of the shortest interval, for integrals
 MOST_FACETS = 400
 MOST_PIECES = 32
+MOST_SIZE, MOST_BASES, LARGEST = 6, 4000, 10**20  # entries of a facet, bases in all, numbers of an entry
 Basis = tuple[int, ...]
 Row = tuple[Fraction, ...]
 
@@ -77,6 +78,9 @@ class Reach:
         bases = [basis for lines in (self.at_samples, self.between) for line in lines for basis in line]
         fits = (
             0 < size <= count <= MOST_FACETS
+            and size <= MOST_SIZE
+            and len(bases) <= MOST_BASES
+            and all(max(abs(v.numerator), v.denominator) < LARGEST for row in self.facets for v in row)
             and {len(row) for row in self.facets} == {size}
             and len(self.at_samples) == count
             and all(_even(lines) for lines in (self.at_samples, self.between))
@@ -85,9 +89,9 @@ class Reach:
         )
         if not fits:
             raise ParameterError(
-                f"a reach needs at most {MOST_FACETS} facets of one size, so many of them at the ends of 1 to "
-                f"{MOST_PIECES} pieces for every facet and output, and inputs of 0 or more. Received others. Complete "
-                "it."
+                f"a reach needs at most {MOST_FACETS} facets of one size, at most {MOST_SIZE}, in numbers below 1e20, "
+                f"so many of them at the ends of 1 to {MOST_PIECES} pieces for every facet and output, at most "
+                f"{MOST_BASES} times in all, and inputs of 0 or more. Received others. Complete it."
             )
 
 

@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 from standalone_guarantee import checker
 
 from quakedesign.certificates.claim import Verdict
-from quakedesign.certificates.guarantee import NoGuarantee, guarantee
+from quakedesign.certificates.guarantee import NoGuarantee, guarantee, reach
 from quakedesign.certificates.guarantee.ball_matrices import matrix
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
 from quakedesign.certificates.guarantee.inputs import channels_of
@@ -206,6 +206,9 @@ SIZES = [
     (("reach", "facets"), lambda rows: [row[:2] for row in rows]),
     (("reach", "facets", 0), lambda row: [*row, "1"]),
     (("reach", "facets", 0, 0), 1),
+    (("reach", "facets", 0, 0), f"{10**20 + 1}/{10**15}"),
+    (("reach", "facets", 0, 0), f"1/{10**20}"),
+    (("reach", "at_samples"), lambda lines: [line[:1] * 25 for line in lines]),  # 4000 bases, and those of outputs
     (("reach", "at_samples"), {}),
     (("reach", "at_samples"), lambda lines: lines[:-1]),
     (("reach", "at_samples"), lambda lines: [line[:1] for line in lines]),
@@ -230,6 +233,13 @@ def test_other_sizes_kinds_and_surroundings_are_invalid_for_both(place, new):
     raw = changed(place, new) if new is not None else without(place)
     assert standalone(raw) != "proved"
     assert package(raw) == "invalid"
+
+
+def test_a_set_has_no_more_than_six_dimensions(monkeypatch):
+    for module in (reach, checker):
+        monkeypatch.setattr(module, "MOST_SIZE" if module is reach else "MAX_ENTRIES", 2)
+    assert "at most 2 entries" in standalone(json.loads(text()))
+    assert package(json.loads(text())) == "invalid"
 
 
 def test_a_set_is_for_samples_by_no_clock_alone():
