@@ -1,9 +1,12 @@
 """What searches have found before is decided anew, answers what the presets ask, and is what they find."""
 
+from dataclasses import replace
+from fractions import Fraction
+
 import pytest
 
-from quakedesign import load_fault, published
-from quakedesign.certificates import Verdict, load_certificate
+from quakedesign import cache, load_fault, published
+from quakedesign.certificates import Verdict, certificate_text, load_certificate
 from quakedesign.controllers import control_law
 from quakedesign.synthesis import assess
 from quakedesign.synthesis.lyapunov import kept, search
@@ -85,3 +88,24 @@ def test_another_degree_or_number_is_another_question():
     loop = load_certificate(PROOFS[0]).loop
     assert kept.place(loop, 5) != kept.place(loop, 7)
     assert kept.place(loop, 5) != kept.place(load_certificate(PROOFS[1]).loop, 5)
+
+
+def test_what_was_searched_for_on_this_machine_is_decided_anew(monkeypatch, tmp_path):
+    monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
+    known = load_certificate(next(path for path in PROOFS if path.stem.startswith("cta")))
+    searches = []
+
+    def searched(loop, degree, subject):
+        searches.append(loop)
+        return known
+
+    monkeypatch.setattr(kept, "FOLDER", tmp_path)
+    answered = kept.kept(searched)
+    assert [answered(known.loop, 5, None) for _ in range(2)] == [known, known]
+    assert len(searches) == 1
+    other = replace(known.loop, uncertain={**known.loop.uncertain, "d": (Fraction(-1, 9), Fraction(1, 9))})
+    text = certificate_text(known).replace('"law": "cta"', '"law": "dia"')
+    for planted in (certificate_text(known), text, "{"):
+        monkeypatch.setattr(kept, "search_once", lambda *_, planted=planted: planted)
+        answered(other, 5, None)
+    assert searches[1:] == [other] * 3

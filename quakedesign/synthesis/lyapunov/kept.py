@@ -1,7 +1,8 @@
 """Searches that every comparison of the presets asks for again, with what they have found: it is decided anew.
 
 The folder `found` has a certificate for each such question, or ``null`` where nothing was found, by a digest of the
-question. A certificate counts after its exact check only, so that a wrong file costs time and proves nothing.
+question; what else was searched for on this machine is in `quakedesign.cache`. A certificate counts after its exact
+check only, so that a wrong file costs time and proves nothing.
 """
 
 from collections.abc import Callable
@@ -10,10 +11,12 @@ from functools import wraps
 from hashlib import sha256
 from pathlib import Path
 
-from quakedesign.certificates import Certificate, Loop, Verdict, certificate_text, decided_once, load_certificate
+from quakedesign.cache import in_use, search_once
+from quakedesign.certificates import Certificate, Loop, Verdict, certificate_text, decided_once, parse_certificate
 from quakedesign.controllers import Subject
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.output import write_whole
+from quakedesign.sos.solve.conic import handing_back
 
 FOLDER = Path(__file__).parent / "found"
 _NOTHING = "null\n"
@@ -26,13 +29,24 @@ def kept(search: Search) -> Search:
 
     @wraps(search)
     def known(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
-        path = place(loop, degree)
-        if not path.exists():
+        path, found = place(loop, degree), list[Certificate | None]()
+
+        def searched() -> str:
+            found.append(search(loop, degree, subject))
+            return _NOTHING if found[0] is None else certificate_text(found[0])
+
+        if path.exists():
+            text = path.read_text(encoding="utf-8")
+        elif handing_back() or not in_use():
             return search(loop, degree, subject)
-        if path.read_text(encoding="utf-8") == _NOTHING:
+        else:
+            text = search_once(searched, "lyapunov", loop, degree)
+        if found:
+            return found[0]
+        if text == _NOTHING:
             return None
         try:
-            certificate = load_certificate(path)
+            certificate = parse_certificate(text)
             if certificate.loop == loop and decided_once(certificate, subject) is Verdict.PROVED:
                 return certificate
         except (CertificateError, WorkError):
