@@ -235,6 +235,27 @@ def test_other_sizes_kinds_and_surroundings_are_invalid_for_both(place, new):
     assert package(raw) == "invalid"
 
 
+@pytest.mark.parametrize(
+    ("name", "longest", "said"),
+    [
+        ("lab-fault", "0", "the longest interval must be longer than step"),
+        ("cta_real-fault", "1/5", "must be of a linear law from rest"),
+    ],
+)
+def test_other_files_have_no_longest_interval(name, longest, said):
+    raw = json.loads((FILE.parent / f"guarantee_{name}.json").read_text())
+    raw["loop"]["longest"] = longest
+    assert said in standalone(raw)
+    assert package(raw) == "invalid"
+
+
+def test_a_law_with_an_implicit_step_needs_a_clock():
+    held = parse_guarantee((FILE.parent / "guarantee_cta_real-fault.json").read_text()).held
+    plain = replace(held, law=replace(held.law, first=()))
+    with pytest.raises(ParameterError, match="or an implicit step"):
+        replace(plain, longest_step=2 * held.step)
+
+
 def test_a_set_has_no_more_than_six_dimensions(monkeypatch):
     for module in (reach, checker):
         monkeypatch.setattr(module, "MOST_SIZE" if module is reach else "MAX_ENTRIES", 2)
