@@ -249,6 +249,13 @@ def test_other_files_have_no_longest_interval(name, longest, said):
     assert package(raw) == "invalid"
 
 
+def test_what_is_wrong_with_a_set_is_said():
+    alike = changed(("reach", "at_samples", 3, 2), lambda basis: [basis[0]] * len(basis))
+    assert "must be independent" in standalone(alike)
+    assert "must be independent" in parse_guarantee(json.dumps(alike)).bounds().reason
+    assert "bounds of the inputs must be" in standalone(changed(("reach", "inputs", 0), "-1"))
+
+
 def test_a_law_with_an_implicit_step_needs_a_clock():
     held = parse_guarantee((FILE.parent / "guarantee_cta_real-fault.json").read_text()).held
     plain = replace(held, law=replace(held.law, first=()))
