@@ -254,6 +254,7 @@ def test_what_is_wrong_with_a_set_is_said():
     assert "must be independent" in standalone(alike)
     assert "must be independent" in parse_guarantee(json.dumps(alike)).bounds().reason
     assert "bounds of the inputs must be" in standalone(changed(("reach", "inputs", 0), "-1"))
+    assert "name facets by their numbers" in standalone(changed(("reach", "at_samples", 0, 0, 0), -1))
 
 
 def test_a_law_with_an_implicit_step_needs_a_clock():
