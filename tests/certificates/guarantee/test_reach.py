@@ -254,6 +254,12 @@ def test_what_is_wrong_with_a_set_is_said():
     assert "must be independent" in standalone(alike)
     assert "must be independent" in parse_guarantee(json.dumps(alike)).bounds().reason
     assert "bounds of the inputs must be" in standalone(changed(("reach", "inputs", 0), "-1"))
+    for new, said in (
+        (lambda lines: [line * 5 for line in lines], "must have 1 to 32 pieces"),
+        (lambda lines: [lines[0][:-1], *lines[1:]], "must have the same pieces in every row"),
+        (lambda lines: [[basis[:2] for basis in line] for line in lines], "must name 3 facets each time"),
+    ):
+        assert said in standalone(changed(("reach", "at_samples"), new))
     assert "name facets by their numbers" in standalone(changed(("reach", "at_samples", 0, 0, 0), -1))
 
 
