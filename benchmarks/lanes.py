@@ -26,6 +26,7 @@ STEPS = 4000
 LOOPS = (("cta", "compensated"), ("dia", "compensated"), ("cta", "continuous"), ("elqr", "compensated"))
 SETS = {"SSE2": (), "AVX2": ("-mavx2",), "AVX-512": ("-mavx512f", "-mprefer-vector-width=512")}
 ONE_BY_ONE = """
+__attribute__((visibility("default")))
 int advance_samples(double* vectors, long long samples, long long steps) {{
   double first[{size}], second[{size}], work[{work}];
   casadi_int integers[{integers}];
