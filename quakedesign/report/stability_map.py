@@ -76,7 +76,7 @@ def _region(axis: Any, plane: Plane, size: float, stiffness: np.ndarray, high: f
         axis.plot(across, critical, color="black", label="critical stiffness")
     for limit in plane.limits:
         axis.axvline(limit / size, color="black", linestyle="--", label="damping limit")
-    axis.set(xlim=(across.min(), across.max()), ylim=(stiffness.min(), stiffness.max()))
+    axis.set(xlim=(np.min(across), np.max(across)), ylim=(np.min(stiffness), np.max(stiffness)))
 
 
 def _critical(regions: StabilityRegions, fault: Fault) -> str:

@@ -215,7 +215,7 @@ class _Answers:
     def phase_margin(self) -> float | None:
         """Least angle [deg] between L and −1 where |L| is 1."""
         sizes = np.log(np.abs(self.at(self.places)))
-        spans = [(self.places[i], self.places[i + 1]) for i in np.flatnonzero(np.diff(np.sign(sizes)))]
+        spans = [(self.places[i], self.places[i + 1]) for i in np.flatnonzero(np.diff(np.sign(sizes))).tolist()]
         crossings = [brentq(lambda x: math.log(abs(self.at(x))), *span, xtol=1e-13) for span in spans]
         return min((abs(float(np.degrees(np.angle(-self.at(x))))) for x in crossings), default=None)
 

@@ -83,7 +83,7 @@ class StateTrajectory(Recording):
     def _at_arrest(self, values: "np.ndarray") -> "np.ndarray":
         """Values where the slip rate falls through `onset_rate` after every onset, by straight lines."""
         below = self.slip_rate <= self.onset_rate
-        falls = np.flatnonzero(~below[:-1] & below[1:])
+        falls = np.flatnonzero(~below[:-1] & below[1:]).tolist()
         ends = [next((i for i in falls if self.time[i + 1] > onset), None) for onset in self.onsets]
         at = np.array([i for i in ends if i is not None], dtype=int)
         fast, slow = self.slip_rate[at], self.slip_rate[at + 1]

@@ -18,7 +18,7 @@ class Arrays:
 
     def __call__(self, x: Any) -> float:
         """Value at a point."""
-        return float(self.coefficients @ np.multiply.reduce(np.asarray(x) ** self.exponents, axis=1))
+        return float(self.coefficients @ np.prod(np.asarray(x) ** self.exponents, axis=1))
 
     def at(self, points: Any) -> Any:
         """Values at points, one a row."""
@@ -26,7 +26,7 @@ class Arrays:
 
     def gradient(self, x: Any) -> Any:
         """Gradient at a point."""
-        return (self._slopes * np.multiply.reduce(np.asarray(x) ** self._lower, axis=2)).sum(axis=1)
+        return (self._slopes * np.prod(np.asarray(x) ** self._lower, axis=2)).sum(axis=1)
 
     def hessian(self, x: Any) -> Any:
         """Matrix of second derivatives at a point."""

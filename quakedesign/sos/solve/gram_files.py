@@ -7,6 +7,7 @@ from io import BytesIO
 from numbers import Real
 from pathlib import Path
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 from quakedesign.errors import ParameterError, PolynomialError
 from quakedesign.input import read_bytes
@@ -113,7 +114,9 @@ def _matlab(content: bytes) -> dict[str, Any]:
     """The same keys from MATLAB's names: Z and p as matrices, one monomial or term a row, or as text."""
     from scipy.io import loadmat
 
-    raw = loadmat(BytesIO(content), squeeze_me=False, chars_as_strings=True)
+    with catch_warnings():
+        simplefilter("ignore", DeprecationWarning)  # of the kind of sparse matrices, which are made dense
+        raw = loadmat(BytesIO(content), squeeze_me=False, chars_as_strings=True)
     found = {key: raw[name] for name, key in _IN_MATLAB.items() if name in raw}
     if set(found) != _KEYS:
         return found

@@ -73,7 +73,7 @@ def _first_root(row: Any) -> float:
         return _NEAR
     roots = np.roots(row[used[0] :][::-1])
     real = roots.real[(np.abs(roots.imag) < 1e-7 * (1 + np.abs(roots))) & (roots.real > 0)]
-    return float(real.min(initial=np.inf))
+    return float(np.min(real, initial=np.inf))
 
 
 def lowest_crossing(claim: Attraction) -> Point | None:

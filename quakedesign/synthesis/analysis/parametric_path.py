@@ -300,7 +300,7 @@ class _Rows:
             full[..., lower, upper] = triangles[:, start:stop].reshape(rows, count, -1) / factors
             found.append(np.linalg.eigvalsh(full))
             start = stop
-        return min(float(e.min()) for e in found), max(float(e.max()) for e in found)
+        return min(float(np.min(e)) for e in found), max(float(np.max(e)) for e in found)
 
 
 def _longest(kind: _Rows, triangles: Any) -> float:

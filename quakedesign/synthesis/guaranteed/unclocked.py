@@ -130,10 +130,10 @@ class _Floats:
             ahead = unit @ white
             points = _farthest(ahead, points, maps, pushes)
             if turn % _TURN == _TURN - 1:
-                before, size = size, np.abs(points).max(axis=0)
-                if size.max() > _FAR:
+                before, size = size, np.max(np.abs(points), axis=0)
+                if np.max(size) > _FAR:
                     return None
-                if np.abs(size / before - 1).max() <= _STILL:
+                if np.max(np.abs(size / before - 1)) <= _STILL:
                     break
                 white = np.linalg.inv(np.linalg.cholesky(points.T @ points / directions))
         return np.asarray(points * scale)

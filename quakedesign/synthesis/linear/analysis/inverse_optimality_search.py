@@ -150,7 +150,7 @@ def _pairs(slopes: Any, g: Sequence[float], X: Any, z: Any) -> Iterator[tuple[Fr
     X, z = X[coarse], z[:, coarse]
     best: tuple[float, int, int, float] = (np.inf, 0, 0, 0.0)
     linear, first, second = slopes @ z, z[0], z[1]
-    for share in np.linspace(0.02, 0.98, 49):
+    for share in np.linspace(0.02, 0.98, 49).tolist():
         mixed = share * linear[:, None] + (1 - share) * linear[None, :]
         one = share * first[:, None] + (1 - share) * first[None, :]
         two = share * second[:, None] + (1 - share) * second[None, :]

@@ -109,7 +109,7 @@ def modal_scaling(polytope: Polytope, entries: Sequence[Sequence[float]]) -> Mod
     """
     modes, moduli = _modes(np.mean(polytope.floats(), axis=0))
     pace, poles = float(moduli.max()), moduli / moduli.max()
-    modes = modes / np.linalg.norm(np.linalg.solve(modes, np.asarray(entries, dtype=float).T), axis=1).max()
+    modes = modes / np.max(np.linalg.norm(np.linalg.solve(modes, np.asarray(entries, dtype=float).T), axis=1))
     inverse = np.linalg.inv(modes)
     coupling = np.max([np.abs(inverse @ A @ modes) for A in polytope.floats()], axis=0) / pace
     roots = np.sqrt(np.maximum(poles, 1e-12))
