@@ -50,13 +50,13 @@ IMPORTS = {
         *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
         *("guarantee_loop", "guarantee_layer", "guarantee_slow"),
     ),
-    "guarantee_reach": (
+    "guarantee_invariant_set": (
         *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
         *("guarantee_loop", "guarantee_impulse_sums", "guarantee_bounds"),
     ),
     "guarantee": (
         *("guarantee_reading", "guarantee_task", "guarantee_root"),
-        *("guarantee_loop", "guarantee_slow", "guarantee_bounds", "guarantee_reach"),
+        *("guarantee_loop", "guarantee_slow", "guarantee_bounds", "guarantee_invariant_set"),
     ),
     "slow_sliding": (
         *("guarantee_reading", "guarantee_task", "guarantee_numbers"),

@@ -9,8 +9,8 @@ from fractions import Fraction
 from typing import Any
 
 from guarantee_bounds import bounds
+from guarantee_invariant_set import bounds_within, read_reach
 from guarantee_loop import read_loop
-from guarantee_reach import bounds_within, read_reach
 from guarantee_reading import Row, keys, lower, need, numbers, upper
 from guarantee_root import root_within
 from guarantee_slow import read_slow

@@ -13,8 +13,8 @@ from quakedesign.certificates.files import read_json
 from quakedesign.certificates.guarantee.claims import Claims
 from quakedesign.certificates.guarantee.continuous import ContinuousPeaks
 from quakedesign.certificates.guarantee.held import Held
+from quakedesign.certificates.guarantee.invariant_set import MOST_FACETS, MOST_PIECES, Reach, require_fit
 from quakedesign.certificates.guarantee.pump import Pump
-from quakedesign.certificates.guarantee.reach import MOST_FACETS, MOST_PIECES, Reach, require_fit
 from quakedesign.certificates.guarantee.slow_gain import SlowGain
 from quakedesign.certificates.guarantee.statement import Guarantee
 from quakedesign.certificates.guarantee.task import Friction, Task

@@ -10,7 +10,7 @@ from quakedesign.certificates.guarantee import sector
 from quakedesign.certificates.guarantee.claims import MARGIN, Claims, above
 from quakedesign.certificates.guarantee.held import Held
 from quakedesign.certificates.guarantee.inputs import Gains
-from quakedesign.certificates.guarantee.reach import Reach, reached_bounds
+from quakedesign.certificates.guarantee.invariant_set import Reach, reached_bounds
 from quakedesign.certificates.guarantee.slow_gain import SlowGain, slow_gains
 from quakedesign.certificates.guarantee.small_gain import Bounds, NoGuarantee, best_bounds, certified_bounds
 from quakedesign.certificates.guarantee.task import Task

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.inputs import channels_of
-from quakedesign.certificates.guarantee.reach import SOONEST, Reach, reduced
+from quakedesign.certificates.guarantee.invariant_set import SOONEST, Reach, reduced
 from quakedesign.synthesis.guaranteed.estimate import Estimate, gains_of
 from quakedesign.synthesis.guaranteed.rounding import short
 
@@ -59,7 +59,7 @@ def unclocked_estimate(task: Task, held: Held) -> Estimate | None:
 
 @dataclass(frozen=True)
 class _Floats:
-    """A loop from sample to sample, as in `quakedesign.certificates.guarantee.reach`.
+    """A loop from sample to sample, as in `quakedesign.certificates.guarantee.invariant_set`.
 
     `inputs` flow and `sampled` enter with a sample, both in the order of the channels, zeros where they do not; `force`
     is what an acceleration that is no input by itself may be about, of a disturbance of bounded rate, else 0.

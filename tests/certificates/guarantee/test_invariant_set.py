@@ -15,11 +15,12 @@ from scipy.optimize import linprog
 from standalone_guarantee import checker
 
 from quakedesign.certificates.claim import Verdict
-from quakedesign.certificates.guarantee import NoGuarantee, guarantee, reach
+from quakedesign.certificates.guarantee import NoGuarantee, guarantee
+from quakedesign.certificates.guarantee import invariant_set as reach
 from quakedesign.certificates.guarantee.ball_matrices import matrix
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
 from quakedesign.certificates.guarantee.inputs import channels_of
-from quakedesign.certificates.guarantee.reach import _Between, reduced
+from quakedesign.certificates.guarantee.invariant_set import _Between, reduced
 from quakedesign.errors import CertificateError, ParameterError
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"
