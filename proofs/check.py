@@ -7,6 +7,7 @@ argument cannot be read. The modules in `IMPORTS` must stand beside this file.
 What has to be read: this file, exact_numbers.py, which reads files and computes, and what the kind of file imports.
 """
 
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -198,4 +199,10 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    try:
+        code = main(sys.argv[1:])
+        sys.stdout.flush()
+    except BrokenPipeError:  # nobody reads on: no verdict was told
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 1
+    sys.exit(code)

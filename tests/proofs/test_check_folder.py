@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import py_compile
 import re
 import shutil
@@ -160,3 +161,13 @@ def test_every_file_has_all_steps(monkeypatch):
     monkeypatch.setattr(numbers, "MAX_STEPS", needed - 1)
     with pytest.raises(checker.Refused, match="fewer steps"):
         checker.check(text)
+
+
+def test_who_stops_reading_is_told_nothing_more(folder):
+    """As with `| head -1`: the pipe is closed before anything is written."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, str(folder / "check.py"), *written(folder, "sos")]
+    with open(writing, "wb") as pipe:
+        found = subprocess.run(command, stdout=pipe, stderr=subprocess.PIPE, cwd=folder, timeout=60, check=False)
+    assert (found.returncode, found.stderr) == (1, b"")
