@@ -209,7 +209,7 @@ def designs_of(
     wanted, designs = list(names), []
     for i, name in enumerate(wanted):
         tell(f"synthesis and proof of {name}", i / len(wanted))
-        designs.append(synthesise(fault, name, **(options or {})))
+        designs.append(synthesise(fault, name, progress=tell, **(options or {})))
     return designs
 
 

@@ -1,5 +1,6 @@
 """From a fault to gains with a proof, and from given gains to a verdict."""
 
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -31,6 +32,7 @@ def design(
     stress: str | float | Fraction | None = None,
     spread: str | float | Fraction = 0,
     disturbance_class: str = CLASSES[0],
+    progress: Callable[[str, float], None] | None = None,
 ) -> Design:
     """Find gains with a proof for a fault.
 
@@ -79,6 +81,8 @@ def design(
     disturbance_class : str
         Of the guarantee: ``"amplitude"``, any disturbance as large as the fault's, or ``"rate"``, one that starts at 0
         and is no faster either, such as a tide.
+    progress : callable, optional
+        Called with what the search for a law around friction with a state is doing, and the fraction done [-].
 
     Returns
     -------
@@ -111,6 +115,7 @@ def design(
         )
     told: Any = {"objective": objective, "continuous": continuous, "measured": measured, "noise": noise}
     told |= {"disturbance_class": disturbance_class, "path": {} if fault.friction.state_names else path}
+    told |= {"tell": progress} if progress else {}
     return law.design(Problem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **told))
 
 

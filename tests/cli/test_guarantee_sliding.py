@@ -18,8 +18,10 @@ from quakedesign.fault import load_fault
 from quakedesign.fault.friction import friction_law
 from quakedesign.fault.template import fault_toml
 from quakedesign.loop import LinearLaw
+from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.guaranteed import sliding_answer
 from quakedesign.synthesis.guaranteed.slow_sliding import proved_sliding
+from quakedesign.synthesis.methods import state_feedback
 
 LAW = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(Fraction(1), Fraction(0)))
 HELD = Held(law=LAW, step=Fraction(300))
@@ -169,3 +171,24 @@ def test_a_pump_that_cannot_hold_what_may_be_asked_for_has_no_guarantee(monkeypa
             found = sliding_answer.answer_sliding(fault, stress=stress, pump=weak, **asked)
             assert not found.proved
             assert "may be asked for, which a pump of" in found.lines()[0]
+
+
+def test_the_stresses_that_are_tried_are_told_with_what_came_of_them(monkeypatch):
+    def proved(task, design, *, log_rate):
+        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 38_000 else NONE
+
+    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
+    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
+    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
+    told = []
+    known = sliding_answer.answer_sliding(
+        load_fault("crustal-patch"), diffusion=Fraction(800), tell=lambda what, done: told.append(what)
+    )
+    assert known.task.stress == 36_000
+    tried = [what for what in told if "stress" in what]
+    assert [what.partition(" Pa")[0] for what in tried] == ["a stress of 4.1e+04"] * 2 + ["a stress of 3.6e+04"] * 2
+    assert [what.rpartition(": ")[2] for what in tried] == ["proof", "not proved", "proof", "proved"]
+    missing = replace(known, found=NONE, held=None)
+    monkeypatch.setattr(state_feedback, "answer_sliding", lambda *_, tell, **__: tell("a law", 0.5) or missing)
+    synthesise(load_fault("crustal-patch"), "elqr", progress=lambda what, done: told.append(what))
+    assert told[-1] == "a law"

@@ -53,6 +53,7 @@ would have had to obey the smaller one until then. So the slip rate never exceed
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from itertools import accumulate
 from typing import Any
 
@@ -331,6 +332,7 @@ def _state_slopes(task: SlidingTask, claims: SlidingClaims) -> Range:
     return (1 - off) / grown, (1 + off) * grown
 
 
+@lru_cache(maxsize=64, typed=True)
 def exponential(size: Fraction) -> Fraction:
     """e^Y from above, for 0 ≤ Y ≤ 3: what Taylor's sum leaves out is below its next term over 1 − Y/(n + 1)."""
     term = _ONE
@@ -339,6 +341,7 @@ def exponential(size: Fraction) -> Fraction:
     return _partial(size) + term / (1 - size / (_TERMS + 1))
 
 
+@lru_cache(maxsize=64, typed=True)
 def _partial(size: Fraction) -> Fraction:
     """e^Y from below."""
     total = term = _ONE

@@ -31,7 +31,10 @@ from quakedesign.synthesis.guaranteed.slow_sliding import (
 )
 from quakedesign.synthesis.linear.plant.sliding_model import sliding_model
 
+Tell = Callable[[str, float], None]
+"""Of what is being done, and the fraction done [-]."""
 _TRIFLE = Fraction(1)  # stress [Pa] that is tried where a law is estimated to stand none: another law may stand more
+_SEARCHED = 0.8  # of the work, when a law of a search is proved
 _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of an estimate that may be too large
 
 
@@ -99,7 +102,7 @@ def answer_sliding(
     step: Fraction | None = None,
     stress: Fraction | None = None,
     spread: Fraction = Fraction(0),
-    tell: Callable[[str, float], None] = lambda what, done: None,
+    tell: Tell = lambda what, done: None,
     **around: Unpack[Around],
 ) -> SlidingAnswer:
     """Design and prove a law for a rate-and-state fault at the mean rate of its task.
@@ -148,7 +151,7 @@ def answer_sliding(
         raise ParameterError(
             f"the rate of a pump is not known of slow sliding. Received {float(pump.rate):g} Pa/s. Leave it out."
         )
-    prove = _proof(pump, given=stress is not None)
+    prove = _proof(pump, tell, given=stress is not None)
     tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
     answer, reach, remedy = _answer(task, held_over, LOG_RATES[0], around, prove), Reach(share=Fraction(1)), ""
     if answer.held is None:
@@ -203,15 +206,26 @@ def _remedy(
     return "" if suits == step else near
 
 
-def _proof(pump: Pump | None, *, given: bool) -> Prove:
+def _proof(pump: Pump | None, tell: Tell, *, given: bool) -> Prove:
     """Proofs whose pressures the pump can hold, under the task's stress if that is given, or about the largest."""
 
-    def prove(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
-        if given:
-            return _held_by(pump, proved_sliding(task, held, log_rate=log_rate))
-        return _with_the_largest_stress(task, held, log_rate=log_rate, pump=pump)
+    def tried(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+        under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
+        tell(f"{under}: proof", _SEARCHED)
+        found = _held_by(pump, proved_sliding(task, held, log_rate=log_rate))
+        tell(f"{under}: {'proved' if isinstance(found, SlidingGuarantee) else 'not proved'}", _SEARCHED)
+        return found
 
-    return prove
+    def about_the_largest(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+        most = largest_stress(task, held, log_rate=log_rate)
+        found: SlidingGuarantee | NoGuarantee
+        for share in _SHARES if most else _SHARES[:1]:
+            found = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), held, log_rate)
+            if isinstance(found, SlidingGuarantee):
+                break
+        return found
+
+    return tried if given else about_the_largest
 
 
 def _answer(
@@ -236,17 +250,3 @@ def _held_by(pump: Pump | None, found: SlidingGuarantee | NoGuarantee) -> Slidin
         return found
     too_much = pump.exceeded(*found.valve_pressures)
     return NoGuarantee(reason=too_much, small_gain=None) if too_much else found
-
-
-def _with_the_largest_stress(
-    task: SlidingTask, design: Held, *, log_rate: Fraction, pump: Pump | None = None
-) -> SlidingGuarantee | NoGuarantee:
-    """A guarantee under about the largest stress that has one: what is estimated of it, or somewhat less."""
-    most = largest_stress(task, design, log_rate=log_rate) or _TRIFLE
-    found: SlidingGuarantee | NoGuarantee
-    for share in _SHARES:
-        tried = replace(task, stress=two_digits(share * most))
-        found = _held_by(pump, proved_sliding(tried, design, log_rate=log_rate))
-        if isinstance(found, SlidingGuarantee):
-            break
-    return found

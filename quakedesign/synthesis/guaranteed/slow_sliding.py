@@ -24,7 +24,7 @@ from quakedesign.certificates.slow_sliding.small_gain import (
     model_of,
 )
 from quakedesign.errors import ParameterError
-from quakedesign.loop import LinearLaw, SlidingModel
+from quakedesign.loop import LinearLaw, PeriodicLoop, SlidingModel
 from quakedesign.synthesis.guaranteed.estimate import gains_of
 from quakedesign.synthesis.guaranteed.poles import spectral_radius
 from quakedesign.synthesis.guaranteed.rounding import short
@@ -40,6 +40,7 @@ _STARTS = (
 _SIMPLEX = (0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.05, 0.05, 0.05)
 _EVALUATIONS = 120
 _HOPELESS = 60  # laws after which a search ends that has found none with bounds
+_POOR, _PATIENCE = 2.0, 40  # cost of the best of so many laws with which a search ends: too far from 1
 _FORGETTING = 0.972  # largest eigenvalue of a period, so that the proof need not sum many
 _GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}  # over Y, pressures in 2a of the normal stress
 _TURNS = 6
@@ -51,22 +52,27 @@ _NEAR = 0.89  # by which an estimate has to be better than its claims, as the pr
 _FAILED = 50.0
 _SMALL = Fraction(1, 10**4)  # of the normal stress
 _DIGITS, _SHORT = 6, 3
-_AXES = ("direct_effect", "evolution_effect", "critical_slip")
+_ENDS = {"direct_effect": 0, "evolution_effect": 1, "critical_slip": 0}  # of the ranges at the worst corner
+_AXES = tuple(_ENDS)
+_NAMES = tuple(SlidingClaims.__dataclass_fields__)
 
 
 def proved_sliding(
     task: SlidingTask, held: Held, *, log_rate: Fraction = LOG_RATES[0]
 ) -> SlidingGuarantee | NoGuarantee:
     """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or why there are none."""
-    claims = _claims(worst_corner(task), held, log_rate)
-    if claims is None:
+    corner = worst_corner(task)
+    claims = _claims(corner, held, log_rate)
+    if claims is None or (corner != task and _excess(corner, held, claims) >= _NEAR):
         return NoGuarantee(reason=_too_much(task, log_rate), small_gain=None)
     try:
-        by_estimate = SlidingGuarantee(task=task, held=held, cuts=_cut(task, held, claims, [MOST_CELLS]), claims=claims)
+        cuts = _cut(task, held, claims, [MOST_CELLS - 1])
+        by_estimate = SlidingGuarantee(task=task, held=held, cuts=cuts, claims=claims)
         smaller = replace(by_estimate, claims=_smallest_claims(by_estimate))
         if smaller.check() is Verdict.PROVED:
             return smaller
-        return replace(by_estimate, cuts=_cut(task, held, claims, [MOST_CELLS], exactly=True))
+        _cut(corner, held, claims, [0], exactly=True)  # no cuts of a box help where this does not do
+        return replace(by_estimate, cuts=_cut(task, held, claims, [MOST_CELLS - 1], exactly=True))
     except ParameterError:
         return NoGuarantee(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box", small_gain=None)
 
@@ -77,13 +83,13 @@ def _smallest_claims(found: SlidingGuarantee) -> SlidingClaims:
     By the estimate times what the bounds are more than it, measured on the worst cell. All that is bounded grows with
     the claims, so that what follows from claims follows from itself as well.
     """
-    claims, names = found.claims, tuple(SlidingClaims.__dataclass_fields__)
+    claims = found.claims
     for _ in range(_MEASURED):
         worst = max(found.cells, key=lambda cell: _excess(cell, found.held, claims))
         bounds, estimate = cell_bounds(worst, found.held, claims), _estimate(worst, found.held, claims)
         if isinstance(bounds, NoGuarantee) or estimate is None:
             break
-        room = {name: _SPARE * float(bounds[name]) / float(estimate[name]) for name in names}
+        room = {name: _SPARE * float(bounds[name]) / float(estimate[name]) for name in _NAMES}
         claims = _followed(found, claims, room)
     return claims
 
@@ -192,15 +198,19 @@ def searched_sliding(
         if tried is None:
             return _FAILED
         model = model_of(corner, claims)
-        radius = _FAILED if model is None else spectral_radius(loop_of(tried, model, corner))
+        if model is None:
+            return 2 * _FAILED
+        loop = loop_of(tried, model, corner)
+        radius = spectral_radius(loop)
         if radius > _FORGETTING:
             return _FAILED + radius
-        found = _estimate(corner, tried, claims)
+        found = _estimate_of(loop, corner, tried, claims)
         return _FAILED / 2 if found is None else float(found["log_rate"] / log_rate)
 
     def ends(intermediate_result: OptimizeResult) -> None:
-        hopeless = len(costs) > _HOPELESS and intermediate_result.fun >= _FAILED / 2
-        if hopeless or intermediate_result.fun <= enough:
+        cost = intermediate_result.fun
+        patience = _HOPELESS if cost >= _FAILED / 2 else _PATIENCE
+        if (cost >= _POOR and len(costs) > patience) or cost <= enough:
             raise StopIteration
 
     best = min([np.array(start) for start in _STARTS] + ([] if near is None else [near]), key=cost)
@@ -214,8 +224,7 @@ def searched_sliding(
 
 def worst_corner(task: SlidingTask) -> SlidingTask:
     """Small a, large b, small D: where the fault is least stable."""
-    ends = {"direct_effect": 0, "evolution_effect": 1, "critical_slip": 0}
-    fixed = {axis: (task.ranges[axis][end],) * 2 for axis, end in ends.items()}
+    fixed = {axis: (task.ranges[axis][end],) * 2 for axis, end in _ENDS.items()}
     return replace(task, ranges={**task.ranges, **fixed})
 
 
@@ -271,7 +280,7 @@ def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims 
         found = _estimate(task, held, claims)
         if found is None:
             return None
-        wider = {k: float(found[k]) * _ROOM / _NEAR for k in SlidingClaims.__dataclass_fields__}
+        wider = {k: float(found[k]) * _ROOM / _NEAR for k in _NAMES}
         if min(float(getattr(claims, k)) / v for k, v in wider.items() if k != "log_rate") >= 1 / _ROOM:
             break
         try:
@@ -285,9 +294,10 @@ def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims 
 
 def _estimate(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
     model = model_of(task, claims)
-    if model is None:
-        return None
-    loop = loop_of(held, model, task)
+    return None if model is None else _estimate_of(loop_of(held, model, task), task, held, claims)
+
+
+def _estimate_of(loop: PeriodicLoop, task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
     gains = gains_of(loop)
     if gains is None:
         return None
@@ -301,7 +311,7 @@ def _estimate(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str,
 
 
 def _cut(task: SlidingTask, held: Held, claims: SlidingClaims, left: list[int], *, exactly: bool = False) -> Cuts:
-    """Cuts of a box until the claims follow on every cell; `left` counts the cells that there may still be.
+    """Cuts of a box until the claims follow on every cell; `left` counts the cuts that there may still be.
 
     By the estimate, or `exactly`.
 
@@ -310,24 +320,21 @@ def _cut(task: SlidingTask, held: Held, claims: SlidingClaims, left: list[int], 
     ParameterError
         When that takes too many.
     """
-    if left[0] < 1:
-        raise ParameterError(f"a box must fall into at most {MOST_CELLS} cells. Received one that needs more.")
-    wide = any(task.ranges[axis][0] < task.ranges[axis][1] for axis in _AXES)
+    wide = [axis for axis in _AXES if task.ranges[axis][0] < task.ranges[axis][1]]
     if _excess(task, held, claims) < (_NEAR if wide else 1):
         found = cell_bounds(task, held, claims) if exactly else None
         if not exactly or (isinstance(found, dict) and follows(found, claims)):
-            left[0] -= 1
             return (None,)
-    halves = [
-        (axis, (low + high) / 2, parts(task, axis, (low + high) / 2))
-        for axis, (low, high) in task.ranges.items()
-        if low < high and axis in _AXES
-    ]
-    if not halves:
-        raise ParameterError("a box must have cells on which its claims follow. Received a point without.")
-    axis, at, both = min(halves, key=lambda half: max(_excess(part, held, claims) for part in half[2]))
-    below = _cut(both[0], held, claims, left, exactly=exactly)
-    return ((axis, at), *below, *_cut(both[1], held, claims, left, exactly=exactly))
+    if not wide or left[0] < 1:
+        raise ParameterError(
+            f"a box must fall into at most {MOST_CELLS} cells on which its claims follow. Received one that does not."
+        )
+    left[0] -= 1
+    middles = {axis: (task.ranges[axis][0] + task.ranges[axis][1]) / 2 for axis in wide}
+    halves = {axis: parts(task, axis, at) for axis, at in middles.items()}
+    axis = min(wide, key=lambda name: _excess(halves[name][_ENDS[name]], held, claims))
+    below, above = (_cut(part, held, claims, left, exactly=exactly) for part in halves[axis])
+    return ((axis, middles[axis]), *below, *above)
 
 
 def _excess(task: SlidingTask, held: Held, claims: SlidingClaims) -> float:
@@ -335,7 +342,7 @@ def _excess(task: SlidingTask, held: Held, claims: SlidingClaims) -> float:
     found = _estimate(task, held, claims)
     if found is None:
         return _FAILED
-    return max(float(found[k]) / float(getattr(claims, k)) for k in SlidingClaims.__dataclass_fields__)
+    return max(float(found[k]) / float(getattr(claims, k)) for k in _NAMES)
 
 
 def _too_much(task: SlidingTask, log_rate: Fraction) -> str:

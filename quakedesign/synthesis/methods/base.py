@@ -69,6 +69,8 @@ class Problem(Generic[Designed]):
         Of friction with a state.
     disturbance_class : str
         ``amplitude`` or ``rate``, of the disturbances that a guarantee is about.
+    tell : callable
+        Called with what a long search is doing, and the fraction done [-].
     """
 
     fault: Fault
@@ -81,6 +83,7 @@ class Problem(Generic[Designed]):
     path: Around = field(default_factory=Around)
     sliding: Sliding = field(default_factory=Sliding)
     disturbance_class: str = CLASSES[0]
+    tell: Callable[[str, float], None] = lambda what, done: None
 
     @property
     def task(self) -> Task:

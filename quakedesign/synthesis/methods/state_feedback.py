@@ -151,7 +151,7 @@ def _sliding(problem: Problem[Designed], law: type[ExtendedLQR]) -> Designed:
         )
     wanted, fault = problem.sliding, problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))
-    answer = answer_sliding(fault, stress=wanted.stress, spread=wanted.spread, diffusion=path)
+    answer = answer_sliding(fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, diffusion=path)
     reason = answer.found.reason if isinstance(answer.found, NoGuarantee) else None
     if answer.held is None:
         return problem.undecided(law.name, str(reason), sliding=answer)

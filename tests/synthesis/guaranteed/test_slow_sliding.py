@@ -215,3 +215,35 @@ def test_ten_percent_of_a_b_and_d_c_are_certified_to_within_three_times_the_wors
     assert smaller.check() is Verdict.PROVED
     assert smaller.peak_slip_rate < F(132, 100) * wide.task.rate
     assert worst_sliding(smaller).log_rate < smaller.claims.log_rate < 2 * worst_sliding(smaller).log_rate
+
+
+def test_the_proof_of_a_box_ends_where_its_bounds_are_larger_than_their_estimate(monkeypatch):
+    """However small a box is cut: once at the worst corner, and at a box after as many cuts as there may be."""
+    asked, wide = [], task("0.02", 8000)
+    monkeypatch.setattr(slow_sliding, "_smallest_claims", lambda found: replace(found.claims, push=UpperBound(F(1))))
+    monkeypatch.setattr(slow_sliding, "cell_bounds", lambda *told: asked.append(told) or {})
+    monkeypatch.setattr(slow_sliding, "follows", lambda bounds, claims: False)
+    assert "in 64 cells of the box" in proved_sliding(wide, HELD).reason
+    assert len(asked) == 1
+    monkeypatch.setattr(slow_sliding, "_excess", lambda *told: 0.5)
+    monkeypatch.setattr(slow_sliding, "follows", lambda bounds, claims: len(asked) == 2)
+    assert "in 64 cells of the box" in proved_sliding(wide, HELD).reason
+    assert len(asked) == 2 + 64
+    monkeypatch.setattr(slow_sliding, "_excess", lambda plant, *told: 1.0 if plant == wide else 0.95)
+    monkeypatch.setattr(slow_sliding, "_cut", None)
+    assert proved_sliding(wide, HELD).reason.endswith("with the laws that were tried")
+
+
+@pytest.mark.parametrize(("cost", "least", "most"), [(2.5, 41, 55), (1.5, 60, 72)])
+def test_a_search_ends_whose_best_law_stays_too_far_from_what_is_asked(monkeypatch, cost, least, most):
+    """A stress far beyond what laws stand: told before a proof is tried."""
+    costs = []
+
+    def estimated(loop, corner, held, claims):
+        costs.append(cost - len(costs) / 1000)
+        return {"log_rate": costs[-1] / 2}
+
+    monkeypatch.setattr(slow_sliding, "spectral_radius", lambda loop: 0.5)
+    monkeypatch.setattr(slow_sliding, "_estimate_of", estimated)
+    slow_sliding.searched_sliding(task("0", 8000), F(50), F(1, 2), {"lag": F(10)}, most=70)
+    assert least <= len(costs) <= most
