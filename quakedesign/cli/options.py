@@ -113,7 +113,8 @@ class LawOptions:
         none, nominal or centred: what a sliding mode adds to ν from what is known of the fault; not to designed gains.
     certificate
         File that guarantee --out has written of an e-LQR, in place of the above: its law runs, with its T_s, limit and
-        noise, behind the delay, lag and rock that it is proved for.
+        noise, behind the delay, lag and rock that it is proved for; in slow sliding under a sine of all the stress that
+        it is proved for unless --stress is told.
     """
 
     controller: str = "cta"

@@ -21,6 +21,7 @@ _GROUP = Group("Friction with a state (rate-and-state)")
 _BOTH = {"duration": "duration", "plant": "plant", "method": "method"}
 _FREE = {"drift": "loading_rate", **_BOTH}
 _HELD = {"step": "step", "lag": "lag", "diffusion": "diffusion", **_BOTH}
+_OF_LAW = ("step", "delay", "lag", "diffusion")  # what a certificate says itself
 _PUMP = ("delay", "jitter", "quantum", "saturation", "withdrawal", "rate_limit")
 _READING = {"slip_noise": "deviation", "bandwidth": "bandwidth", "slip_quantum": "quantum", "seed": "seed"}
 _AROUND = ("fault", "controller", "gains", "state", "out", "force", "json")
@@ -95,7 +96,11 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
     asked = _single(options)
     changed = {name: value for name, value in asked.items() if value != usual[name]}
     trajectory: Recording
-    if "controller" in changed:
+    certificate = changed.pop("certificate", None)
+    if certificate is not None:
+        held = run_held(fault, **_as_proved(fault, certificate, changed, options))
+        trajectory, answer, lines = held.trajectory, held.to_dict(), sliding_run_lines
+    elif "controller" in changed:
         _require_designed(asked)
         held = run_held(fault, **_instruments(fault, changed, options), **options["state"].of_control())
         trajectory, answer, lines = held.trajectory, held.to_dict(), sliding_run_lines
@@ -150,7 +155,9 @@ class SpreadOptions:
         from quakedesign.studies.single import Choice
         from quakedesign.synthesis import design
 
-        refuse({"certificate": law.certificate}, "friction with a state")
+        period = {} if self.stress_period is None else {"stress_period": self.stress_period}
+        if law.certificate is not None and (chosen := law.choose(fault.with_box("paper"))):
+            return chosen, _of_proof(chosen.claim, self.spread, self.stress) | period
         _require_designed({"controller": law.controller, "gains": law.gains})
         off = rational(self.spread, "spread")
         diffusion = path.get("diffusion")
@@ -158,9 +165,43 @@ class SpreadOptions:
         if designed.controller is None or designed.sliding is None:
             raise ParameterError(f"a campaign needs a law. Received none from design: {designed.details['reason']}.")
         told = {"spread": off, "stress": float(designed.sliding.task.stress)}
-        return Choice(controller=designed.controller), told | (
-            {} if self.stress_period is None else {"stress_period": self.stress_period}
+        return Choice(controller=designed.controller), told | period
+
+
+def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
+    """Spread and stress of a campaign with the law of a certificate: all that it is proved for unless told.
+
+    Raises
+    ------
+    ParameterError
+        For a delay or noise, which campaigns of slow sliding do not have.
+    """
+    from quakedesign.rationals import rational
+
+    if claim.held.delay or claim.held.slip_noise:
+        raise ParameterError(
+            "a campaign of slow sliding is told the slip at once and as it is. Received a certificate with a delay or "
+            "noise. Use simulate --certificate."
         )
+    low, high = claim.task.ranges["direct_effect"]
+    off = rational(spread, "spread") or (high - low) / (high + low)
+    return {"spread": off, "stress": float(claim.task.stress) if stress is None else stress}
+
+
+def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
+    """The law of a certificate around its fault, under a sine of all the stress that it is proved for unless told.
+
+    The reading is off by at most the noise of the certificate: the nearest multiple of twice that.
+    """
+    from quakedesign.loop.sensing import Transducer
+
+    claim = options["law"].choose(fault).claim
+    refuse({name: changed.get(name) for name in _OF_LAW}, f"{certificate}, whose law has its own")
+    told = {"stress": float(claim.task.stress)} | options["state"].of_control()
+    told |= _instruments(fault, {**changed, "step": float(claim.held.step)}, options)
+    if told["transducer"] is None and claim.held.slip_noise:
+        told["transducer"] = Transducer(quantum=2 * float(claim.held.slip_noise))
+    return {**told, "step": None, "claim": claim}
 
 
 def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:

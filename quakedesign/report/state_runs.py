@@ -79,7 +79,7 @@ def left_out_lines(comparison: "Compared") -> list[str]:
 
 
 def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
-    """Lines for people, from `HeldRun.to_dict`: outcome, errors, pressure; no guarantee."""
+    """Lines for people, from `HeldRun.to_dict`: outcome, errors, pressure, and what is proved where that is known."""
     outcome, found = answer["outcome"], answer["metrics"]
     least, largest = (p / 1e6 for p in answer["pressure"])
     path = "".join(f", through a {name.replace('_', ' ')}" for name in answer["stages"])
@@ -94,7 +94,7 @@ def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
         f"|ln(V/V_r)| at most {found['max_log_rate']:.3g}, slip error at most {found['max_slip_error']:.3g} m",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law asks for at most "
         f"{found['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
-        "no guarantee: what is said was seen in this run",
+        f"proved: {proved}" if (proved := answer["guarantee"]) else "no guarantee: what is said was seen in this run",
     ]
 
 

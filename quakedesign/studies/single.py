@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.certificates import Verdict, load_guarantee
-from quakedesign.certificates.guarantee import Guarantee, task_of
+from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, task_of
 from quakedesign.certificates.guarantee.about import differences
 from quakedesign.certificates.premises import Premise, least_authority
+from quakedesign.certificates.slow_sliding import SlidingGuarantee, sliding_task
 from quakedesign.controllers import Controller, Sampling, control_law, published
 from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError, require_known
@@ -37,13 +38,13 @@ class Choice:
     controller : Controller
     lipschitz : Fraction or None
         Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law.
-    claim : Guarantee or None
+    claim : Guarantee, SlidingGuarantee or None
         What is proved of the law as it runs, where it comes from the file of that.
     """
 
     controller: Controller
     lipschitz: Fraction | None = None
-    claim: Guarantee | None = None
+    claim: Guarantee | SlidingGuarantee | None = None
 
     def noise(self, seed: int) -> Measurement:
         """What the controller is told wrongly at most by its guarantee, anywhere within that; none without one."""
@@ -70,14 +71,12 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         For a sliding mode.
     """
     claim = load_guarantee(path)
-    if not isinstance(claim, Guarantee):
+    if isinstance(claim, ContinuousPeaks) or isinstance(claim, SlidingGuarantee) != bool(fault.friction.state_names):
         raise CertificateError(
-            "the law of a certificate runs once per sample and follows a reference. Received "
-            f"{path}, a law in continuous time or one of slow sliding. Give a file of guarantee FAULT --out FILE; "
-            "slow sliding is run in Python, by qd.simulate(fault, qd.load_guarantee(path).controller)."
+            "the law of a certificate runs once per sample, and is about friction with a state where that of the fault "
+            f"has one. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."
         )
-    apart = differences(claim.task, task_of(fault, rate_limited=claim.task.change is not None))
-    if apart:
+    if apart := _apart(fault, claim):
         raise CertificateError(
             f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
             f"{'; '.join(apart)}. Give the fault that it is about, or prove a new one with guarantee."
@@ -86,6 +85,13 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
     if claim.check() is not Verdict.PROVED:
         raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
     return Choice(controller=controller, claim=claim)
+
+
+def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee) -> list[str]:
+    """What of a fault a certificate does not cover."""
+    if isinstance(claim, SlidingGuarantee):
+        return claim.task.differences(sliding_task(fault, claim.task.stress))
+    return differences(claim.task, task_of(fault, rate_limited=claim.task.change is not None))
 
 
 def optional_choice(fault: Fault, name: str, gains: tuple[str, ...], **more: Any) -> Choice | None:

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from quakedesign.certificates.slow_sliding import SlidingGuarantee
+from quakedesign.controllers import Sampling
 from quakedesign.errors import ParameterError, SimulationError, UnknownNameError, require_known
 from quakedesign.fault import Disturbance, Fault, SlidingReference
 from quakedesign.fault.checks import require_positive
 from quakedesign.loop import SlidingModel
-from quakedesign.loop.actuators import SampledStage
+from quakedesign.loop.actuators import Actuator, SampledStage
 from quakedesign.loop.sensing import Transducer
 from quakedesign.rationals import rational
 from quakedesign.simulation import PressureCourse, StateTrajectory, simulate_state
@@ -270,6 +272,8 @@ class HeldRun:
     stages : tuple of str
         What else the pressure goes through.
     trajectory : SlidingRun
+    claim : SlidingGuarantee or None
+        What is proved of the law, where it comes from the file of that.
     """
 
     fault: Fault
@@ -279,6 +283,7 @@ class HeldRun:
     diffusion: Fraction
     stages: tuple[str, ...]
     trajectory: SlidingRun
+    claim: SlidingGuarantee | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Answer of ``simulate`` with a controller, SI units."""
@@ -305,6 +310,7 @@ class HeldRun:
             "duration": float(run.time[-1]),
             "steps": len(run.time),
             "run": dict(run.provenance),
+            "guarantee": self.claim.sentence() if self.claim else None,
         }
 
 
@@ -321,8 +327,11 @@ def run_held(
     duration: float | None = None,
     plant: str = "smooth",
     method: str = "cvodes",
+    claim: SlidingGuarantee | None = None,
 ) -> HeldRun:
-    """Let the e-LQR of `sliding_law` hold a fault at the mean rate of its task, from steady sliding.
+    """Let the e-LQR of `sliding_law`, or that of a guarantee, hold a fault at the mean rate of its task.
+
+    It starts in steady sliding.
 
     Parameters
     ----------
@@ -340,6 +349,8 @@ def run_held(
         Of a sine of shear stress [Pa], [s].
     duration, plant, method
         As of `run_state`.
+    claim : SlidingGuarantee, optional
+        Its law runs, with its T_s, delay, lag and rock in place of those above, which are not to be given.
 
     Raises
     ------
@@ -347,13 +358,17 @@ def run_held(
     """
     _require_runnable(fault, plant)
     held, path = rational(fault.sampling_time if step is None else step), rational(diffusion)
-    model = sliding_model(fault)
-    law = sliding_law(model, held, diffusion=path)
+    through, model = rational(lag), sliding_model(fault)
+    if claim is None:
+        law = sliding_law(model, held, diffusion=path)
+    else:
+        law, held, path, through = claim.held.law, claim.held.step, claim.held.diffusion, claim.held.lag
+        stages = (*Actuator.meant_for(Sampling(step=held, delay=claim.held.delay)).sampled, *stages)
     run = simulate_sliding(
         fault,
         law,
         held,
-        lag=rational(lag),
+        lag=through,
         diffusion=path,
         stages=stages,
         transducer=transducer,
@@ -362,8 +377,8 @@ def run_held(
         inertia=PLANTS[plant],
         method=method,
     )
-    around: dict[str, Any] = {"lag": rational(lag), "diffusion": path, "stages": tuple(s.name for s in stages)}
-    return HeldRun(fault=fault, model=model, step=held, **around, trajectory=run)
+    around: dict[str, Any] = {"lag": through, "diffusion": path, "stages": tuple(s.name for s in stages)}
+    return HeldRun(fault=fault, model=model, step=held, **around, trajectory=run, claim=claim)
 
 
 def _require_runnable(fault: Fault, plant: str) -> None:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
@@ -12,6 +12,9 @@ from quakedesign.certificates.guarantee.small_gain import NoGuarantee
 from quakedesign.certificates.slow_sliding.cells import Cuts, cells
 from quakedesign.certificates.slow_sliding.small_gain import SlidingClaims, cell_bounds, exponential, follows
 from quakedesign.certificates.slow_sliding.task import SlidingTask
+
+if TYPE_CHECKING:
+    from quakedesign.loop import SampledController
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +48,11 @@ class SlidingGuarantee:
 
     def __repr__(self) -> str:
         return f"SlidingGuarantee({self.task.name}: |ln(v/V)| <= {self.claims.log_rate:.4g})"
+
+    @property
+    def controller(self) -> "SampledController":
+        """The law for `simulate`, with its T_s and the delay, lag and rock that it is proved for."""
+        return self.held.controller
 
     @cached_property
     def cells(self) -> tuple[SlidingTask, ...]:

@@ -14,10 +14,23 @@ from typing import get_args
 
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.loop import StateLaw
+from quakedesign.rationals import six_digits
 
 Range = tuple[Fraction, Fraction]
 AXES = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")
 """Constants that are only known to lie in ranges: a, b, D [m], μ* and σ′ [Pa]."""
+
+_SAME = {
+    "density": "kg/m^3",
+    "shear_modulus": "Pa",
+    "length": "m",
+    "damping": "kg/s",
+    "rate": "m/s",
+    "ramp": "Pa/s",
+    "state_law": "-",
+    "regularised": "-",
+}
+_WITHIN = {"distance": "m", "swing": "-", "stress": "Pa"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +86,29 @@ class SlidingTask:
             )
         require_known(self.state_law, get_args(StateLaw), "state_law")
 
+    def differences(self, asked: "SlidingTask") -> list[str]:
+        """What of another task a proof for this one does not cover, each with both values, SI; empty if everything is.
+
+        Constants of the fault, V, the plan and the law of friction must be the same; constants of friction, distance,
+        swing and stress lie within those of the proof. The name is none of it.
+        """
+        found = [
+            f"{name} [{unit}] {_as_told(getattr(self, name))} there, {_as_told(getattr(asked, name))} here"
+            for name, unit in _SAME.items()
+            if getattr(self, name) != getattr(asked, name)
+        ]
+        found += [
+            f"{name} [{unit}] up to {_as_told(getattr(self, name))} there, {_as_told(getattr(asked, name))} here"
+            for name, unit in _WITHIN.items()
+            if getattr(self, name) < getattr(asked, name)
+        ]
+        return found + [
+            f"{axis} from {' to '.join(map(_as_told, self.ranges[axis]))} there, "
+            f"{' to '.join(map(_as_told, asked.ranges[axis]))} here"
+            for axis in AXES
+            if asked.ranges[axis][0] < self.ranges[axis][0] or asked.ranges[axis][1] > self.ranges[axis][1]
+        ]
+
     @property
     def stiffness(self) -> Fraction:
         """K [Pa/m]."""
@@ -108,3 +144,8 @@ class SlidingTask:
         """N = σ′ − p [Pa] along the reference, with |p − p*| up to `push` [Pa]."""
         low, high = self.ranges["normal_stress"]
         return low - self.pressure_per_slip * self.distance - push, high + push
+
+
+def _as_told(value: Fraction | str | bool) -> str:
+    """With six digits, or as it is."""
+    return six_digits(value) if isinstance(value, Fraction) else str(value)

@@ -1,0 +1,111 @@
+"""A law from the file of its guarantee of slow sliding: run as it is proved, for what the proof covers alone."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction as F
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import quakedesign as qd
+from quakedesign.certificates import Verdict, save_guarantee
+from quakedesign.cli import main
+from quakedesign.cli.options import LawOptions
+from quakedesign.cli.state import SpreadOptions
+from quakedesign.errors import ParameterError
+from quakedesign.loop.sensing import Transducer
+from quakedesign.simulation.sliding_conditions import TIDE, Tide
+from quakedesign.studies import state_runs
+from quakedesign.studies.state_runs import run_held
+
+FILE = Path(__file__).parents[2] / "proofs" / "certificates" / "sliding_crustal-patch.json"
+CRUSTAL = qd.load_fault("crustal-patch")
+CLAIM = qd.load_guarantee(FILE)
+SHORT = ("--duration", "3 h")
+
+
+def told(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main([*map(str, arguments)])
+    out, err = capsys.readouterr()
+    return stop.value.code, out, err
+
+
+def test_it_runs_with_its_step_and_rock_under_all_the_stress_that_it_is_proved_for(capsys):
+    code, out, err = told(capsys, "simulate", "crustal-patch", "--certificate", FILE, *SHORT, "--json")
+    answer, held, stress = json.loads(out), CLAIM.held, float(CLAIM.task.stress)
+    assert (code, err, answer["guarantee"]) == (0, "", CLAIM.sentence())
+    assert (answer["step"], answer["diffusion"]) == (float(held.step), float(held.diffusion))
+    same = qd.simulate(CRUSTAL, CLAIM.controller, duration=3 * 3600.0, tide=Tide(amplitude=stress, period=TIDE))
+    assert answer["metrics"]["max_asked"] == pytest.approx(float(np.max(np.abs(same.asked))), rel=1e-9)
+    assert answer["stress"] == pytest.approx(float(np.max(np.abs(same.stress))), rel=1e-9)
+    code, out, _ = told(
+        capsys, "simulate", "crustal-patch", "--certificate", FILE, *SHORT, "--stress", "1 kPa", "--controller", "elqr"
+    )
+    assert code == 0
+    assert "under a shear stress of up to 0.9986 kPa" in out
+    assert "proved: from steady sliding" in out
+
+
+@pytest.mark.parametrize(
+    ("fault", "more", "said"),
+    [
+        ("creeping-patch", (), "rate [m/s] 0.000001 there"),
+        ("real-fault", (), "about friction with a state where that of the fault has one"),
+        ("crustal-patch", ("--lag", "2 s"), "lag cannot be used with"),
+        ("crustal-patch", ("--controller", "cta"), "a certificate holds its law"),
+    ],
+)
+def test_it_is_for_its_fault_and_as_it_is(capsys, fault, more, said):
+    code, out, err = told(capsys, "simulate", fault, "--certificate", FILE, *more)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+def test_a_delay_and_noise_of_the_proof_are_in_the_run(capsys, monkeypatch, tmp_path):
+    late = replace(CLAIM, held=replace(CLAIM.held, delay=CLAIM.held.step, slip_noise=F(1, 10**6)))
+    assert run_held(CRUSTAL, claim=late, duration=1000.0).stages == ("delay",)
+    save_guarantee(late, tmp_path / "late.json")
+    monkeypatch.setattr(type(CLAIM), "check", lambda claim: Verdict.PROVED)
+    seen = {}
+    monkeypatch.setattr(state_runs, "run_held", lambda fault, **told: seen.update(told) or run_held(fault, **told))
+    code, out, _ = told(
+        capsys, "simulate", "crustal-patch", "--certificate", tmp_path / "late.json", "--duration", "1000 s", "--json"
+    )
+    assert (code, json.loads(out)["stages"]) == (0, ["delay"])
+    assert seen["transducer"] == Transducer(quantum=2e-6)
+    with pytest.raises(ParameterError, match="a delay or noise"):
+        SpreadOptions().choose(CRUSTAL, LawOptions(certificate=tmp_path / "late.json"), None, {})
+
+
+def test_a_campaign_varies_what_it_is_proved_for_unless_told():
+    law = LawOptions(certificate=FILE)
+    chosen, varied = SpreadOptions().choose(CRUSTAL, law, None, {})
+    assert chosen.controller == CLAIM.controller
+    low, high = CLAIM.task.ranges["direct_effect"]
+    assert varied == {"spread": (high - low) / (high + low), "stress": float(CLAIM.task.stress)}
+    told = {"spread": F(1, 100), "stress": 1000.0, "stress_period": 60.0}
+    assert SpreadOptions(spread="0.01", stress=1000.0, stress_period=60.0).choose(CRUSTAL, law, None, {})[1] == told
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("density", F(1)), ("shear_modulus", F(1)), ("length", F(1)), ("damping", F(1)), ("rate", F(1)), ("ramp", F(1)),
+        ("state_law", "slip"), ("regularised", True), ("distance", F(10)), ("swing", F(1, 2)), ("stress", F(10**9)),
+    ],
+)  # fmt: skip
+def test_what_a_proof_does_not_cover_is_named(name, value):
+    (found,) = CLAIM.task.differences(replace(CLAIM.task, **{name: value}))
+    assert found.startswith(f"{name} [")
+    assert not CLAIM.task.differences(replace(CLAIM.task, distance=F(1, 10**6), stress=F(1), name="another"))
+
+
+def test_constants_of_friction_lie_within_those_of_a_proof():
+    for axis, (low, high) in CLAIM.task.ranges.items():
+        wide = replace(CLAIM.task, ranges={**CLAIM.task.ranges, axis: (low * F(9, 10), high * F(11, 10))})
+        assert wide.differences(CLAIM.task) == []
+        for ends in ((low * F(9, 10), high), (low, high * F(11, 10))):
+            (found,) = CLAIM.task.differences(replace(CLAIM.task, ranges={**CLAIM.task.ranges, axis: ends}))
+            assert found.startswith(f"{axis} from ")
