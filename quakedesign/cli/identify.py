@@ -12,7 +12,7 @@ def identify(
     data: Path,
     /,
     *,
-    law: str = "rate-and-state-aging",
+    law: str | None = None,
     stiffness: str | None = None,
     normal_stress: Pascals | None = None,
     seed: Whole = 0,
@@ -33,7 +33,8 @@ def identify(
         CSV file with units in its first line, such as 'time [s], load_point_displacement [um], shear_stress [MPa],
         normal_stress [MPa]'; load_point_rate, shear_force, normal_force, friction and slip are known, too.
     law
-        Friction law with a state, or one that depends on slip.
+        Friction law: rate-and-state-aging and rate-and-state-slip are both fitted, and the better one taken, unless
+        told; regularised-rate-and-state, exponential-slip-weakening or linear-slip-weakening, say, are others.
     stiffness
         Of the machine, such as '5 GPa/m' ('2 kN/um' for forces, '1e-3 1/um' for friction); fitted unless given.
     normal_stress
@@ -49,7 +50,14 @@ def identify(
     """
     from quakedesign.fault import load_fault
     from quakedesign.identification import identify as fitted
-    from quakedesign.identification import next_command, other_parts, read_record, save_fault, task_remarks
+    from quakedesign.identification import (
+        law_remarks,
+        next_command,
+        other_parts,
+        read_record,
+        save_fault,
+        task_remarks,
+    )
     from quakedesign.report.identification import identification_lines, require_format, save_figure
 
     for path, what in ((out, "fault file"), (figure, "figure")):
@@ -66,10 +74,12 @@ def identify(
         save_figure(identification, figure)
     if out is not None and identification.identified:
         save_fault(identification, around, out)
-    told = [f"written: {', '.join(map(str, written))}"] if written else []
+    told = law_remarks(identification, around)
+    told += [f"written: {', '.join(map(str, written))}"] if written else []
     if out in written:
         told.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
-        told += [*task_remarks(identification, around), f"next: {next_command(identification, out)}"]
+        ahead = "next:" if identification.explained else "next, if nothing above explains the record better:"
+        told += [*task_remarks(identification, around), f"{ahead} {next_command(identification, out)}"]
     if out is not None and not identification.identified:
         told.append(f"not written: {out}, which needs every parameter")
     places = {"figure": figure, "file": out if identification.identified else None}

@@ -4,6 +4,7 @@ from quakedesign.arguments import check_arguments
 from quakedesign.identification.fault_file import (
     cover,
     identified_fault,
+    law_remarks,
     next_command,
     other_parts,
     save_fault,
@@ -20,6 +21,7 @@ __all__ = [
     "cover",
     "identified_fault",
     "identify",
+    "law_remarks",
     "next_command",
     "other_parts",
     "read_record",

@@ -153,7 +153,31 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
     assumed = [said for said in fault.assumed if said.startswith(_OF_TASK)]
     told = [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
     beyond = beyond_rates(law, mean_rate(task)) if law.state_names else ""
-    return [*told, *filter(None, [beyond])]
+    return [*told, *_moved(law, _at_rate_of(fault, law)), *filter(None, [beyond])]
+
+
+def law_remarks(identification: Identification, fault: Fault) -> list[str]:
+    """Whether a record prefers another law with state than the fault names, where it was not told which to take.
+
+    Parameters
+    ----------
+    identification : Identification
+    fault : Fault
+    """
+    named, found = fault.friction, identification.law
+    if identification.rival is None or not named.state_names or named.name == found.name:
+        return []
+    return [f"{fault.name} names {named.name}, the record prefers {found.name}; --law {named.name} takes the other"]
+
+
+def _moved(law: FrictionLaw, moved: FrictionLaw) -> list[str]:
+    """One friction at two reference rates, in words."""
+    (old, was), (new, now) = (
+        (getattr(found, "reference_rate", None), getattr(found, "reference_coefficient", 0.0)) for found in (law, moved)
+    )
+    if new == old:
+        return []
+    return [f"reference_coefficient {was:.5g} at {old:.4g} m/s is {now:.5g} at {new:.4g} m/s, as the file says it"]
 
 
 def next_command(identification: Identification, path: str | Path) -> str:

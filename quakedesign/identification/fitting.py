@@ -55,6 +55,8 @@ class Fit:
         Coordinates as they are fitted.
     measured : ndarray
         Friction [-].
+    counts : ndarray
+        Of how many measurements every sample is the mean.
     kept : ndarray of bool
         Samples that count.
     agreeing, starts : int
@@ -64,6 +66,7 @@ class Fit:
     experiment: Experiment
     fitted: "np.ndarray"
     measured: "np.ndarray"
+    counts: "np.ndarray"
     kept: "np.ndarray"
     agreeing: int
     starts: int
@@ -75,9 +78,21 @@ class Fit:
         return residuals
 
     @property
+    def scaled(self) -> "np.ndarray":
+        """Residuals [-] in units of one measurement: the noise of a mean of n falls with the root of n."""
+        scaled: np.ndarray = self.residuals * np.sqrt(self.counts)
+        return scaled
+
+    @property
+    def weights(self) -> "np.ndarray":
+        """Of all residuals; 0 for outliers."""
+        weights: np.ndarray = np.sqrt(self.counts) * self.kept
+        return weights
+
+    @property
     def squares(self) -> float:
         """Sum of squares of the residuals that count."""
-        return float(np.sum(self.residuals[self.kept] ** 2))
+        return float(np.sum(self.scaled[self.kept] ** 2))
 
     @property
     def freedom(self) -> int:
@@ -86,13 +101,13 @@ class Fit:
 
     @property
     def noise(self) -> float:
-        """Standard deviation of one sample [-]."""
+        """Standard deviation of one measurement [-]."""
         return float(np.sqrt(self.squares / self.freedom))
 
     @property
     def accuracy(self) -> float:
-        """Of the simulated friction [-]: a small share of the noise."""
-        return _SHARE_OF_NOISE * self.noise
+        """Of the simulated friction [-]: a small share of the noise of a sample."""
+        return _SHARE_OF_NOISE * self.noise / float(np.sqrt(np.mean(self.counts)))
 
     @cached_property
     def correlation(self) -> float:
@@ -100,7 +115,7 @@ class Fit:
 
         Summed over lags up to five times itself (Sokal 1997, in Functional Integration, NATO ASI B361, 131).
         """
-        kept = self.residuals[self.kept]
+        kept = self.scaled[self.kept]
         size = 1 << (2 * len(kept) - 1).bit_length()
         spectrum = np.abs(np.fft.rfft(kept, size)) ** 2
         covariance = np.fft.irfft(spectrum, size)[: len(kept) // 2]
@@ -118,13 +133,13 @@ class Fit:
 
     def distance(self, fitted: "np.ndarray") -> float:
         """`excess` of given coordinates, infinite where there is no such experiment."""
-        squares = float(np.sum((self.measured - self.experiment.friction(fitted))[self.kept] ** 2))
+        squares = float(np.sum(((self.measured - self.experiment.friction(fitted)) * self.weights)[self.kept] ** 2))
         return self.excess(squares) if np.isfinite(squares) else np.inf
 
     @cached_property
     def deviations(self) -> "np.ndarray":
         """Standard deviations of what is fitted, from the slopes; infinite where these say nothing."""
-        slopes = _finite(self.experiment.slopes(self.fitted))[self.kept]
+        slopes = (_finite(self.experiment.slopes(self.fitted)) * self.weights[:, None])[self.kept]
         scale = np.linalg.norm(slopes, axis=0)
         scale[scale == 0] = 1
         values, turn = np.linalg.svd(slopes / scale, full_matrices=False)[1:]
@@ -137,8 +152,33 @@ class Fit:
         return deviations
 
 
-def fit(experiment: Experiment, measured: "np.ndarray", *, seed: int, search: Search | None = None) -> Fit:
+def fit(
+    experiment: Experiment,
+    measured: "np.ndarray",
+    *,
+    seed: int,
+    counts: "np.ndarray | None" = None,
+    near: "np.ndarray | None" = None,
+    search: Search | None = None,
+) -> Fit:
     """Best fit of all starts, without outliers, on an experiment that is simulated accurately enough for the noise.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    measured : ndarray
+        Friction [-].
+    seed : int
+        Of the draw of the starts.
+    counts : ndarray, optional
+        Of how many measurements every sample is the mean; of one unless told.
+    near : ndarray, optional
+        Where to start first.
+    search : Search, optional
+
+    Returns
+    -------
+    Fit
 
     Raises
     ------
@@ -151,11 +191,13 @@ def fit(experiment: Experiment, measured: "np.ndarray", *, seed: int, search: Se
             f"a record must have at least {3 * len(experiment.coordinates)} samples for what is fitted. "
             f"Received {len(measured)}. Give a longer record."
         )
-    everything = np.ones(len(measured), dtype=bool)
-    experiment, starts = _starts(experiment, measured, seed, how)
+    counts = np.ones(len(measured)) if counts is None else counts
+    roots = np.sqrt(counts)
+    experiment, starts = _starts(experiment, measured, roots, seed, how)
+    starts = starts if near is None else [near, *starts]
     minima: list[tuple[np.ndarray, float]] = []
     for start in starts:
-        minima.append(minimised(experiment, measured, everything, start, steps=how.coarse))
+        minima.append(minimised(experiment, measured, roots, start, steps=how.coarse))
         best_q, best = min(minima, key=lambda pair: pair[1])
         agreeing = sum(squares <= best * (1 + how.agreement) for _, squares in minima)
         if len(minima) >= how.least and agreeing > 1:
@@ -164,7 +206,8 @@ def fit(experiment: Experiment, measured: "np.ndarray", *, seed: int, search: Se
         experiment=experiment,
         fitted=best_q,
         measured=measured,
-        kept=everything,
+        counts=counts,
+        kept=np.ones(len(measured), dtype=bool),
         agreeing=agreeing,
         starts=len(minima),
     )
@@ -172,7 +215,7 @@ def fit(experiment: Experiment, measured: "np.ndarray", *, seed: int, search: Se
 
 
 def _starts(
-    experiment: Experiment, measured: "np.ndarray", seed: int, how: Search
+    experiment: Experiment, measured: "np.ndarray", roots: "np.ndarray", seed: int, how: Search
 ) -> "tuple[Experiment, list[np.ndarray]]":
     """The candidates that come nearest, and the experiment with steps for the best of them."""
     draw = np.random.default_rng(seed)
@@ -180,7 +223,7 @@ def _starts(
     candidates = draw.uniform(ends[:, 0], ends[:, 1], (how.candidates, len(ends)))
     scatter = max(float(np.std(np.diff(measured, 2))) / 6**0.5, 1e-9)
     experiment = experiment.resolved(ends.mean(axis=1), scatter)
-    costs = np.array([np.sum(np.abs(measured - experiment.friction(q))) for q in candidates])
+    costs = np.array([np.sum(roots * np.abs(measured - experiment.friction(q))) for q in candidates])
     costs[~np.isfinite(costs)] = np.inf
     order = np.argsort(costs, kind="stable")[: how.most]
     usable = [candidates[i] for i in order if np.isfinite(costs[i])]
@@ -195,13 +238,18 @@ def _starts(
 def minimised(
     experiment: Experiment,
     measured: "np.ndarray",
-    kept: "np.ndarray",
+    weights: "np.ndarray",
     start: "np.ndarray",
     *,
     fixed: "np.ndarray | None" = None,
     steps: int = 100,
 ) -> "tuple[np.ndarray, float]":
-    """Coordinates with the least sum of squares near a start, and that sum; `fixed` ones stay as they are."""
+    """Coordinates with the least sum of squares near a start, and that sum; `fixed` ones stay as they are.
+
+    Residuals count by their weights, not at all with one of 0.
+    """
+    kept = weights > 0
+    roots = weights[kept]
     free = np.ones(len(start), dtype=bool) if fixed is None else ~fixed
     low, high = experiment.bounds
     whole = np.clip(np.array(start, dtype=float), low, high)
@@ -212,7 +260,7 @@ def minimised(
         return full
 
     def residuals(part: "np.ndarray") -> "np.ndarray":
-        solution: np.ndarray = (experiment.friction(at(part)) - measured)[kept]
+        solution: np.ndarray = roots * (experiment.friction(at(part)) - measured)[kept]
         return solution
 
     first = residuals(whole[free])
@@ -222,7 +270,7 @@ def minimised(
     solution = least_squares(
         lambda part: residuals(part) / size,
         np.clip(whole[free], np.nextafter(low, high)[free], np.nextafter(high, low)[free]),
-        jac=lambda part: _finite(experiment.slopes(at(part)))[kept][:, free] / size,
+        jac=lambda part: roots[:, None] * _finite(experiment.slopes(at(part)))[kept][:, free] / size,
         bounds=(low[free], high[free]),
         x_scale="jac",
         ftol=_SHARE_OF_EXCESS / len(first),
@@ -242,9 +290,9 @@ def _finite(slopes: "np.ndarray") -> "np.ndarray":
 def settled(fit: Fit, how: Search) -> Fit:
     """A fit on a finer simulation and without outliers, until neither changes."""
     for _ in range(how.rounds):
-        kept = ~outliers(fit.residuals, how.longest_outlier)
+        kept = ~outliers(fit.scaled, how.longest_outlier)
         finer = fit.experiment.resolved(fit.fitted, fit.accuracy)
-        fitted, _ = minimised(finer, fit.measured, kept, fit.fitted)
+        fitted, _ = minimised(finer, fit.measured, replace(fit, kept=kept).weights, fit.fitted)
         unchanged = finer is fit.experiment and np.array_equal(kept, fit.kept)
         fit = replace(fit, experiment=finer, fitted=fitted, kept=kept)
         if unchanged:
@@ -265,3 +313,14 @@ def outliers(residuals: "np.ndarray", longest: int) -> "np.ndarray":
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         outlying[begin:end] = end - begin <= longest
     return outlying
+
+
+def advantage(one: Fit, other: Fit) -> tuple[float, float]:
+    """How many times as large the sum of squares of another fit is, and by how much its AIC is higher.
+
+    At the samples that both count, of fits with as many parameters: n·ln of that ratio, with n independent samples.
+    """
+    both = one.kept & other.kept
+    ours, theirs = (float(np.sum(fit.scaled[both] ** 2)) for fit in (one, other))
+    independent = float(both.sum()) / min(one.correlation, other.correlation)
+    return theirs / ours, independent * float(np.log(theirs / ours))

@@ -120,7 +120,7 @@ def _distance(fit: Fit, place: int, step: float, near: _Place) -> tuple[float, _
         near = replace(near, experiment=near.experiment.resolved(start, fit.accuracy), resolved_at=start)
     fixed = np.zeros(len(start), dtype=bool)
     fixed[place] = True
-    others, squares = minimised(near.experiment, fit.measured, fit.kept, start, fixed=fixed, steps=30)
+    others, squares = minimised(near.experiment, fit.measured, fit.weights, start, fixed=fixed, steps=30)
     if fit.excess(squares) < -_BETTER:
         raise BetterFit(others)
     distance = math.sqrt(max(fit.excess(squares), 0)) if np.isfinite(squares) else math.inf

@@ -1,6 +1,7 @@
 """Records of laboratory experiments: columns with units, read at the boundary into SI."""
 
 import csv
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,9 +28,9 @@ COLUMNS = {
 """Every known column and its SI unit."""
 
 _SHEAR = {"shear_stress": "normal_stress", "shear_force": "normal_force"}
-_LARGEST_FILE = 1 << 24
+_LARGEST_FILE = 1 << 27
 _PLAUSIBLE = 0.01, 3.0  # median friction [-]
-MOST_SAMPLES = 10000
+MOST_SAMPLES = 2_000_000
 _HEADING = re.compile(r"\s*(\w[\w \-]*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))?\s*")
 _BETWEEN_WORDS = re.compile(r"[ \-]+")
 
@@ -54,6 +55,8 @@ class Record:
         Effective normal stress [Pa] or force [N]; 1 where only friction is known.
     normal_unit : str
         ``"Pa"``, ``"N"`` or nothing.
+    counts : ndarray or None
+        Of how many measurements every sample is the mean; of one unless told.
     """
 
     name: str
@@ -63,6 +66,7 @@ class Record:
     slip: "np.ndarray | None"
     normal: "np.ndarray"
     normal_unit: str
+    counts: "np.ndarray | None" = None
 
     def __repr__(self) -> str:
         return f"Record({self.name!r}: {self.time.size} samples in {self.time[-1] - self.time[0]:.4g} s)"
@@ -104,8 +108,8 @@ def read_record(path: str | Path, *, normal_stress: float | None = None) -> Reco
     factors = _headings(next(csv.reader([lines[0][1]])))
     if len(lines) - 1 > MOST_SAMPLES:
         raise RecordError(
-            f"a record must have at most {MOST_SAMPLES} samples. Received {len(lines) - 1}. Average neighbouring ones, "
-            "or cut out the part that counts."
+            f"a record must have at most {MOST_SAMPLES} samples. Received {len(lines) - 1}. Cut out the part that "
+            "counts."
         )
     values = _values(lines[1:], list(factors))
     given = {name: column * factor for (name, factor), column in zip(factors.items(), values.T, strict=True)}
@@ -114,6 +118,12 @@ def read_record(path: str | Path, *, normal_stress: float | None = None) -> Reco
 
 def _headings(cells: Sequence[str]) -> dict[str, float]:
     """SI value of one unit of every column, by name."""
+    if all(_number(cell) is not None for cell in cells):
+        raise RecordError(
+            f"a record must begin with a line of headings. Received {shown(','.join(cells))}, numbers alone. Write the "
+            "columns with their units above, as in time [s], load_point_displacement [um], shear_stress [MPa], "
+            "normal_stress [MPa]."
+        )
     headings: dict[str, float] = {}
     for cell in cells:
         match = _HEADING.fullmatch(cell)
@@ -141,19 +151,37 @@ def _remedy(name: str) -> str:
 
 def _values(lines: Sequence[tuple[int, str]], names: Sequence[str]) -> "np.ndarray":
     """Numbers of all lines, shape (samples, columns)."""
-    rows = []
-    for number, line in lines:
-        cells = line.split(",")
-        if len(cells) != len(names):
-            raise RecordError(f"line {number} must hold {len(names)} values. Received {len(cells)}.")
-        try:
-            rows.append([float(cell) for cell in cells])
-        except ValueError:
-            raise RecordError(f"line {number} must hold numbers. Received {shown(line.strip())}.") from None
-    values = np.array(rows, dtype=float).reshape(len(rows), len(names))
-    if wrong := np.flatnonzero(~np.all(np.isfinite(values), axis=1)).tolist():
-        raise RecordError(f"line {lines[wrong[0]][0]} must hold finite numbers. Remove lines without measurement.")
+    try:
+        values = np.loadtxt([line for _, line in lines], delimiter=",", comments=None, ndmin=2)
+    except ValueError:
+        values = np.empty((0, 0))
+    if values.shape == (len(lines), len(names)) and np.all(np.isfinite(values)):
+        return values
+    return np.array([_row(number, line, names) for number, line in lines])
+
+
+def _row(number: int, line: str, names: Sequence[str]) -> list[float]:
+    """Numbers of one line, or what is wrong with it."""
+    cells = line.split(",")
+    if len(cells) != len(names):
+        raise RecordError(f"line {number} must hold {len(names)} values. Received {len(cells)}.")
+    values = []
+    for name, cell in zip(names, cells, strict=True):
+        value = _number(cell)
+        if value is None or not math.isfinite(value):
+            raise RecordError(
+                f"line {number} must hold a finite number in column {name}. Received {shown(cell.strip())}. Remove "
+                "lines without measurement."
+            )
+        values.append(value)
     return values
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return float(cell)
+    except ValueError:
+        return None
 
 
 def _record(name: str, given: dict[str, "np.ndarray"], normal_stress: float | None) -> Record:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,9 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import FrictionLaw
 from quakedesign.identification.fitting import CONFIDENCE, Fit
 from quakedesign.identification.record import Record
+
+_CORRELATED = 2.0  # samples
+_DECISIVE = 10.0  # of AIC: odds of about 150 to 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +70,29 @@ class Outlier:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Rival:
+    """Another law with as many parameters, which explains the record less well.
+
+    Attributes
+    ----------
+    law : str
+        Its name.
+    squares : float
+        How many times as large the weighted sum of squares is that it leaves.
+    excess : float
+        By how much its AIC is higher, twice the fall of the logarithm of the likelihood.
+    """
+
+    law: str
+    squares: float
+    excess: float
+
+    def __str__(self) -> str:
+        told = f"{self.law} fits worse: squares {self.squares:.4g} times as large, AIC higher by {self.excess:.3g}"
+        return told if self.excess > _DECISIVE else f"{told}; so little that the record hardly tells the laws apart"
+
+
+@dataclass(frozen=True, kw_only=True)
 class Identification:
     """Friction parameters of a record with their confidence regions.
 
@@ -86,6 +112,8 @@ class Identification:
         What was taken for granted.
     seed : int
         Of the starts.
+    rival : Rival or None
+        The law that was fitted as well and not taken, where none was asked for.
     """
 
     record: Record
@@ -96,6 +124,7 @@ class Identification:
     law: FrictionLaw
     notes: tuple[str, ...]
     seed: int
+    rival: Rival | None = None
 
     def __repr__(self) -> str:
         ends = {e.name: f"{e.value:.4g} ({e.low:.4g} to {e.high:.4g}) {e.unit}" for e in self.estimates.values()}
@@ -106,6 +135,21 @@ class Identification:
     def identified(self) -> bool:
         """Whether the record tells every parameter."""
         return all(estimate.identified for estimate in self.estimates.values())
+
+    @property
+    def explained(self) -> bool:
+        """Whether law and machine explain the record: whether what is left looks like noise from sample to sample."""
+        return self.fit.correlation <= _CORRELATED
+
+    def to_try(self) -> list[str]:
+        """What may explain a record better, where law and machine explain it only in part."""
+        other = "no --law, which fits both laws with a state" if self.law.state_names else "another --law"
+        return [
+            "--figure, which shows where",
+            *([other] if self.rival is None else []),
+            *(["--stiffness of the machine, if it was measured"] if "stiffness" in self.estimates else []),
+            "a record without trend, and without steps that differ from the others",
+        ]
 
     @property
     def box(self) -> dict[str, tuple[float, float]]:
@@ -174,6 +218,8 @@ class Identification:
                 "samples": int(fit.kept.sum()),
                 "correlation": fit.correlation,
             },
+            "measurements": int(np.sum(fit.counts)),
+            "rival": None if self.rival is None else asdict(self.rival),
             "box": {name: [_finite(end) for end in ends] for name, ends in self.box.items()},
             "outliers": [{"time": o.time, "time_unit": "s", "size": o.size, "size_unit": ""} for o in self.outliers],
             "starts": {"seed": self.seed, "searches": fit.starts, "agreeing": fit.agreeing},

@@ -11,14 +11,13 @@ from quakedesign.fault import FrictionLaw
 from quakedesign.identification.experiment import Coordinate, Experiment
 from quakedesign.identification.record import Record
 from quakedesign.identification.sliding import STIFFNESS, Drive, Sliding
+from quakedesign.identification.straight import reading_step, scatter, straight_beginning
 from quakedesign.identification.weakening import START, Drawn, MeasuredSlip
 
 _EFFECTS = {"low": 1e-5, "high": 1.0, "start": (2e-3, 3e-2)}
 _SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}
 _FAR_OFF = 4.0  # deviations of a displacement that no noise explains
 _MODERATE = 1e3
-_FIRST = 20  # samples
-_MEDIAN = 0.6745  # of the size of a normal deviate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,30 +143,10 @@ def _stiffness(record: Record, path: float) -> Coordinate:
 
 
 def first_rate(time: "np.ndarray", position: "np.ndarray") -> float:
-    """Rate [m/s] of a position that moves steadily at first: of the longest beginning that is a line but for noise.
-
-    A position that stays now and then among its first samples is read in steps, which count as noise.
-    """
-    levels = np.unique(position)
-    read_in_steps = len(levels) > 1 and np.any(np.diff(position[:_FIRST]) == 0)
-    step = float(np.min(np.diff(levels))) if read_in_steps else 1e-9 * float(np.ptp(position))
-    allowed = _FAR_OFF * scatter(time, position) + step
-    good, bad = 2, len(time) + 1
-    while bad - good > 1:
-        count = (good + bad) // 2
-        slope, offset = np.polyfit(time[:count], position[:count], 1)
-        straight = np.max(np.abs(position[:count] - slope * time[:count] - offset)) <= allowed
-        good, bad = (count, bad) if straight else (good, count)
-    return float(np.polyfit(time[:good], position[:good], 1)[0])
-
-
-def scatter(time: "np.ndarray", values: "np.ndarray") -> float:
-    """Standard deviation of noise from sample to sample: the median distance from the line between both neighbours."""
-    if len(time) < 3:
-        return 0.0
-    share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
-    off = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
-    return float(np.median(np.abs(off) / np.sqrt(1 + share**2 + (1 - share) ** 2))) / _MEDIAN
+    """Rate [m/s] of a position that moves steadily at first: of the longest beginning that is a line but for noise."""
+    allowed = _FAR_OFF * scatter(time, position) + reading_step(position)
+    count = straight_beginning(time, position, allowed)
+    return float(np.polyfit(time[:count], position[:count], 1)[0])
 
 
 def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:

@@ -26,11 +26,13 @@ def identification_lines(identification: Identification) -> list[str]:
     columns = f"{'parameter':24}{'value':>12}{'95 %: from':>14}{'to':>12}  unit"
     shown = [*identification.estimates.values(), *([identification.difference] if identification.difference else [])]
     tail = [
-        f"noise {fit.noise:.3g} of friction in {int(fit.kept.sum())} samples; of {fit.starts} searches from different "
+        f"noise {fit.noise:.3g} of friction in {_samples(identification)}; of {fit.starts} searches from different "
         f"starts (seed {identification.seed}) {fit.agreeing} end in this fit"
         f"{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
+        *([str(identification.rival)] if identification.rival else []),
         *_warnings(identification),
         *_outliers(identification),
+        *_reference(identification),
         f"assumed: {'; '.join(identification.notes)}",
     ]
     return [*_wrapped(head), columns, *map(_row, shown), "", *_wrapped(tail)]
@@ -55,12 +57,24 @@ def _warnings(identification: Identification) -> list[str]:
             f"{'shorter' if short else 'longer'} than the some 1 to 100 um of laboratories: check the unit of the "
             "displacement"
         )
-    if identification.fit.correlation > 2:
+    if not identification.explained:
         told.append(
             f"residuals are correlated over {identification.fit.correlation:.1f} samples: law or machine explain the "
-            "record only in part; regions are widened by that, as if there were fewer samples"
+            "record only in part; regions are widened by that, as if there were fewer samples. Try: "
+            f"{'; '.join(identification.to_try())}"
         )
     return told
+
+
+def _samples(identification: Identification) -> str:
+    fit = identification.fit
+    kept, all_ = int(fit.kept.sum()), int(np.sum(fit.counts))
+    return f"{kept} samples" if all_ == len(fit.counts) else f"one of {all_} samples, taken as {len(fit.counts)} means"
+
+
+def _reference(identification: Identification) -> list[str]:
+    rate = getattr(identification.law, "reference_rate", None)
+    return [] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]
 
 
 def _outliers(identification: Identification) -> list[str]:

@@ -141,3 +141,11 @@ KINDS = {
     "slip weakening at measured slip": weakening,
     "slip weakening behind a spring": drawn,
 }
+
+LONG = {
+    "long velocity steps, stiffness fitted": cache(
+        lambda: sliding("rate-and-state-slip", STEPS, sample=0.01, stiffness_given=False)
+    ),
+    "long slip weakening behind a spring": lambda: drawn(samples=20000),
+}
+"""Which are fitted by means."""

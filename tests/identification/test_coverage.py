@@ -10,20 +10,22 @@ import pytest
 from quakedesign.fault import friction_law
 from quakedesign.identification.fitting import fit
 from quakedesign.identification.setup import set_up
+from quakedesign.identification.thinning import thinned
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
 synthetic = importlib.util.module_from_spec(SPECIFICATION)
 sys.modules[SPECIFICATION.name] = synthetic
 SPECIFICATION.loader.exec_module(synthetic)
-KINDS = synthetic.KINDS
+KINDS = synthetic.KINDS | synthetic.LONG
 
 REPEATS = 100
 
 
 def fitted(made, seed):
-    record = made.noisy(seed)
+    record = thinned(made.noisy(seed))
     setup = set_up(record, friction_law(made.law), made.stiffness)
-    return fit(setup.experiment, record.friction[setup.used], seed=seed)
+    counts = None if record.counts is None else record.counts[setup.used]
+    return fit(setup.experiment, record.friction[setup.used], seed=seed, counts=counts)
 
 
 def truth_of(made, best):

@@ -21,11 +21,13 @@ from quakedesign.identification import (
     cover,
     identified_fault,
     identify,
+    law_remarks,
     next_command,
     other_parts,
     save_fault,
     task_remarks,
 )
+from quakedesign.identification.result import Rival
 from quakedesign.identification.setup import set_up
 from quakedesign.rationals import rational
 from quakedesign.report.identification import identification_lines
@@ -233,6 +235,28 @@ def test_what_a_task_was_taken_from_and_a_rate_that_the_record_does_not_know_are
     assert task_remarks(replace(weak, law=patch.friction), patch) == []
     save_fault(weak, replace(lab, assumed=assumed[1:2]), path)
     assert "# assumed with the friction that is replaced: target slip 1 m" in path.read_text()
+
+
+def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(weak):
+    """By hand: mu at the rate of the fault is 0.6 - 0.005 ln(1e-9/1e-6) = 0.63454."""
+    patch = load_fault("crustal-patch")
+    moved = {"reference_rate": 1e-6, "slowest_rate": 1e-8, "fastest_rate": 1e-3, "reference_coefficient": 0.6}
+    effects = {"direct_effect": 0.01, "evolution_effect": 0.015}
+    slip = friction_law("rate-and-state-slip")(**asdict(patch.friction) | moved | effects)
+    found = replace(weak, law=slip, rival=Rival(law=patch.friction.name, squares=2.0, excess=300.0))
+    assert "reference_coefficient 0.6 at 1e-06 m/s is 0.63454 at 1e-09 m/s, as the file says it" in task_remarks(
+        found, patch
+    )
+    assert "that of steady sliding at 1e-06 m/s" in " ".join(identification_lines(found))
+    assert "aging fits worse: squares 2 times as large, AIC higher by 300" in " ".join(
+        " ".join(identification_lines(found)).split()
+    )
+    (said,) = law_remarks(found, patch)
+    assert "crustal-patch names rate-and-state-aging, the record prefers rate-and-state-slip" in said
+    assert law_remarks(replace(found, rival=None), patch) == []
+    assert law_remarks(found, load_fault("lab-fault")) == []
+    assert law_remarks(found, replace(patch, friction=slip)) == []
+    assert "hardly tells" in str(Rival(law="x", squares=1.001, excess=3.0))
 
 
 @pytest.mark.parametrize(("slip", "said"), [(4e-8, "40 nm is far shorter"), (0.02, "2 cm is far longer"), (1e-6, "")])

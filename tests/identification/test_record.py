@@ -73,13 +73,15 @@ def test_a_constant_normal_stress_stands_in_for_a_column(tmp_path):
         ([HEAD + ", friction", "0, 5, 3, 5000, 1"], "exactly one column friction"),
         ([HEAD, ROWS[0], ROWS[0]], "time must ascend"),
         ([HEAD, ROWS[0], "1, 2, 3"], "line 3 must hold 4 values. Received 3"),
-        ([HEAD, ROWS[0], "1, 2, three, 4"], "line 3 must hold numbers"),
-        ([HEAD, ROWS[0], "1, 2, nan, 4"], "line 3 must hold finite numbers"),
+        ([HEAD, ROWS[0], "1, 2, three, 4"], r"3 must hold a finite number in column shear_stress\. Received 'three'"),
+        ([HEAD, ROWS[0], "1, 2, nan, 4"], r"3 must hold a finite number in column shear_stress\. Received 'nan'"),
+        ([*ROWS], r"begin with a line of headings\. Received '0, 5, 3, 5000', numbers alone"),
         ([HEAD, ROWS[0], "100, 2, 3, -1"], "normal_stress must be positive"),
-        ([HEAD, *["0, 0, 0, 0"] * 10001], "at most 10000 samples"),
+        ([HEAD, *["0, 0, 0, 0"] * 5], "at most 4 samples. Received 5"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(tmp_path, lines, said):
+def test_what_is_wrong_is_said_in_one_line(tmp_path, monkeypatch, lines, said):
+    monkeypatch.setattr("quakedesign.identification.record.MOST_SAMPLES", 4)
     with pytest.raises(QuakedesignError, match=said) as refused:
         read_record(written(tmp_path, *lines))
     assert "\n" not in str(refused.value)

@@ -1,0 +1,139 @@
+"""Means in place of samples keep what a fit is about: lines, steps, single outliers and their weights."""
+
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quakedesign.errors import RecordError
+from quakedesign.fault import friction_law
+from quakedesign.identification import Record, identify
+from quakedesign.identification.fitting import fit
+from quakedesign.identification.setup import set_up
+from quakedesign.identification.straight import reading_step, straight_beginning
+from quakedesign.identification.thinning import thinned
+
+SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
+synthetic = importlib.util.module_from_spec(SPECIFICATION)
+sys.modules[SPECIFICATION.name] = synthetic
+SPECIFICATION.loader.exec_module(synthetic)
+
+SAMPLES, AT = 40000, 25000
+
+
+def stepped(seed=0):
+    """A rate that becomes tenfold at a sample, friction that jumps there and decays within 100 samples."""
+    time = 0.05 * np.arange(SAMPLES)
+    after = np.maximum(np.arange(SAMPLES) - AT, 0)
+    true = 0.6 + 0.02 * np.exp(-after / 100) * (after > 0)
+    friction = true + 3e-4 * np.random.default_rng(seed).standard_normal(SAMPLES)
+    moved = 1e-6 * (time + 9 * 0.05 * after)
+    normal = np.full(SAMPLES, 5e6)
+    record = Record(
+        name="long", time=time, friction=friction, load_point=moved, slip=None, normal=normal, normal_unit="Pa"
+    )
+    return record, true
+
+
+def test_short_records_stay_as_they_are():
+    record = synthetic.KINDS["velocity steps, slip"]().noisy(0)
+    assert thinned(record) is record
+
+
+def test_samples_near_a_step_stay_and_all_others_count_once():
+    record, _ = stepped()
+    means = thinned(record)
+    assert means.counts.sum() == SAMPLES
+    assert len(means.time) < 1500
+    assert means.counts[0] == 1
+    near = np.abs(means.time - record.time[AT]) < 9 * 0.05
+    assert np.all(means.counts[near] == 1)
+    np.testing.assert_allclose(means.counts @ means.friction, record.friction.sum())
+    np.testing.assert_allclose(means.counts @ means.time, record.time.sum())
+    assert means.counts.max() <= 2500
+
+
+def test_a_mean_is_what_friction_is_at_the_mean_time_but_for_far_less_than_its_noise():
+    """Friction without noise, averaged over the means of the noisy record, against the curve at their times."""
+    record, true = stepped()
+    means = thinned(record)
+    edges = np.concatenate([[0], np.cumsum(means.counts)])
+    averaged = np.add.reduceat(true, edges[:-1]) / means.counts
+    after = means.time / 0.05 - AT
+    curve = 0.6 + 0.02 * np.exp(-np.maximum(after, 0) / 100) * (after > 0)
+    assert np.max(np.abs(averaged - curve) * np.sqrt(means.counts)) < 0.1 * 3e-4
+
+
+def test_an_outlier_stays_a_sample_of_its_own():
+    record, _ = stepped()
+    friction = record.friction.copy()
+    friction[10000] += 0.05
+    means = thinned(replace(record, friction=friction))
+    (place,) = np.flatnonzero(np.abs(means.time - record.time[10000]) < 1e-9)
+    assert means.counts[place] == 1
+
+
+def test_what_bends_everywhere_is_refused():
+    record, _ = stepped()
+    waves = 0.6 + 0.1 * np.sin(np.arange(SAMPLES) / 2)
+    with pytest.raises(RecordError, match="at most 20000 samples or means"):
+        thinned(replace(record, friction=waves))
+
+
+def test_weights_are_the_numbers_of_samples():
+    """Two halves of a record, one of them as means of four: the fit is that of all samples, linear in the law."""
+    made = synthetic.weakening(samples=800)
+    plain = made.noisy(5)
+    edges = np.concatenate([np.arange(400), np.arange(400, 800, 4)])
+    counts = np.diff([*edges, 800])
+
+    def means(values):
+        return np.add.reduceat(values, edges) / counts
+
+    fits = []
+    for record in (
+        plain,
+        replace(
+            plain,
+            time=means(plain.time),
+            friction=means(plain.friction),
+            slip=means(plain.slip),
+            normal=means(plain.normal),
+            counts=counts,
+        ),
+    ):
+        setup = set_up(record, friction_law(made.law), None)
+        taken = None if record.counts is None else record.counts[setup.used]
+        fits.append(fit(setup.experiment, record.friction[setup.used], seed=0, counts=taken))
+    whole, part = fits
+    np.testing.assert_allclose(part.fitted, whole.fitted, atol=0.1 * np.min(whole.deviations))
+    np.testing.assert_allclose(part.deviations, whole.deviations, rtol=0.15)
+    assert part.noise == pytest.approx(whole.noise, rel=0.1)
+
+
+@pytest.mark.parametrize(("law", "other"), [("slip", "aging"), ("aging", "slip")])
+def test_the_law_that_made_a_record_is_preferred_unless_one_is_asked_for(law, other):
+    made = synthetic.sliding(f"rate-and-state-{law}", synthetic.STEPS[:2], sample=0.4)
+    found = identify(made.noisy(0), stiffness=made.stiffness)
+    assert (found.law.name, found.rival.law) == (f"rate-and-state-{law}", f"rate-and-state-{other}")
+    residuals = found.fit.residuals[found.fit.kept]
+    asked = identify(made.noisy(0), found.rival.law, stiffness=made.stiffness)
+    assert asked.rival is None
+    ratio = asked.fit.squares / np.sum(residuals**2)
+    assert found.rival.squares == pytest.approx(ratio, rel=0.1)
+    assert found.rival.excess > 10
+    independent = len(residuals) / min(found.fit.correlation, asked.fit.correlation)
+    assert found.rival.excess == pytest.approx(independent * np.log(found.rival.squares), rel=0.1)
+
+
+def test_a_line_reaches_to_the_first_bend_and_readings_in_steps_are_known():
+    time = np.arange(1000.0)
+    values = np.where(time < 600, time, 600 + 3 * (time - 600))
+    assert straight_beginning(time, values, 0.5) in (601, 602)
+    assert straight_beginning(time, time, 1e-9) == 1000
+    assert reading_step(np.round(0.15 * time, 1)) == pytest.approx(0.1)
+    assert reading_step(np.round(0.01 * time, 1)) == pytest.approx(0.1)
+    assert reading_step(np.where(time < 5, time, 5 + 3 * (time - 5))) < 1e-5
