@@ -57,6 +57,8 @@ class Record:
         ``"Pa"``, ``"N"`` or nothing.
     counts : ndarray or None
         Of how many measurements every sample is the mean; of one unless told.
+    first_rate : float or None
+        Rate of the load point in its steady beginning [m/s]; that of the samples unless told.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Record:
     normal: "np.ndarray"
     normal_unit: str
     counts: "np.ndarray | None" = None
+    first_rate: float | None = None
 
     def __repr__(self) -> str:
         return f"Record({self.name!r}: {self.time.size} samples in {self.time[-1] - self.time[0]:.4g} s)"

@@ -11,12 +11,11 @@ from quakedesign.fault import FrictionLaw
 from quakedesign.identification.experiment import Coordinate, Experiment
 from quakedesign.identification.record import Record
 from quakedesign.identification.sliding import STIFFNESS, Drive, Sliding
-from quakedesign.identification.straight import reading_step, scatter, straight_beginning
+from quakedesign.identification.straight import FAR_OFF, first_rate, scatter
 from quakedesign.identification.weakening import START, Drawn, MeasuredSlip
 
 _EFFECTS = {"low": 1e-5, "high": 1.0, "start": (2e-3, 3e-2)}
 _SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}
-_FAR_OFF = 4.0  # deviations of a displacement that no noise explains
 _MODERATE = 1e3
 
 
@@ -85,7 +84,7 @@ def _sliding(record: Record, law: type[FrictionLaw], stiffness: float | None) ->
         )
     lengths = np.diff(record.time)
     rates = np.diff(record.load_point) / lengths
-    first = first_rate(record.time, record.load_point)
+    first = record.first_rate or first_rate(record.time, record.load_point)
     if not first > 0:
         raise RecordError(
             f"a record for {law.name} must begin in steady sliding. Received a load point that moves at {first:.3g} "
@@ -142,18 +141,11 @@ def _stiffness(record: Record, path: float) -> Coordinate:
     )
 
 
-def first_rate(time: "np.ndarray", position: "np.ndarray") -> float:
-    """Rate [m/s] of a position that moves steadily at first: of the longest beginning that is a line but for noise."""
-    allowed = _FAR_OFF * scatter(time, position) + reading_step(position)
-    count = straight_beginning(time, position, allowed)
-    return float(np.polyfit(time[:count], position[:count], 1)[0])
-
-
 def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
     """Samples after the slip has left the noise about zero for good."""
     assert record.slip is not None
     noise = scatter(record.time, record.slip)
-    resting = np.flatnonzero(record.slip <= _FAR_OFF * noise)
+    resting = np.flatnonzero(record.slip <= FAR_OFF * noise)
     used = np.arange(len(record.slip)) > (resting[-1] if len(resting) else -1)
     if used.sum() < 3 * len(law.quantities()):
         raise RecordError(

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+FAR_OFF = 4.0  # deviations of a displacement that no noise explains
 _FIRST = 20  # samples
 _BENDS = 2  # among the first samples, which a change of rate alone may have
 _MEDIAN = 0.6745  # of the size of a normal deviate
@@ -39,3 +40,10 @@ def straight_beginning(time: "np.ndarray", values: "np.ndarray", allowed: float)
         count = (good + bad) // 2
         good, bad = (count, bad) if straight(count) else (good, count)
     return min(good, len(time))
+
+
+def first_rate(time: "np.ndarray", position: "np.ndarray") -> float:
+    """Rate [m/s] of a position that moves steadily at first: of the longest beginning that is a line but for noise."""
+    allowed = FAR_OFF * scatter(time, position) + reading_step(position)
+    count = straight_beginning(time, position, allowed)
+    return float(np.polyfit(time[:count], position[:count], 1)[0])

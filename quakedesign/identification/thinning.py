@@ -7,7 +7,7 @@ from scipy import stats
 
 from quakedesign.errors import RecordError
 from quakedesign.identification.record import Record
-from quakedesign.identification.straight import reading_step, scatter, straight_beginning
+from quakedesign.identification.straight import first_rate, reading_step, scatter, straight_beginning
 
 MOST_PLAIN = 3000  # samples that are taken as they are
 MOST_MEANS = 20000
@@ -59,6 +59,7 @@ def thinned(record: Record) -> Record:
         slip=None if record.slip is None else means(record.slip),
         normal=means(record.normal),
         counts=counts,
+        first_rate=None if record.load_point is None else first_rate(record.time, record.load_point),
     )
 
 

@@ -49,6 +49,7 @@ def test_samples_near_a_step_stay_and_all_others_count_once():
     assert means.counts.sum() == SAMPLES
     assert len(means.time) < 1500
     assert means.counts[0] == 1
+    assert means.first_rate == pytest.approx(1e-6, rel=1e-12)
     near = np.abs(means.time - record.time[AT]) < 9 * 0.05
     assert np.all(means.counts[near] == 1)
     np.testing.assert_allclose(means.counts @ means.friction, record.friction.sum())
@@ -65,6 +66,17 @@ def test_a_mean_is_what_friction_is_at_the_mean_time_but_for_far_less_than_its_n
     after = means.time / 0.05 - AT
     curve = 0.6 + 0.02 * np.exp(-np.maximum(after, 0) / 100) * (after > 0)
     assert np.max(np.abs(averaged - curve) * np.sqrt(means.counts)) < 0.1 * 3e-4
+
+
+def test_a_rate_read_in_steps_is_that_of_all_samples():
+    """Bends of friction in the steady beginning leave single readings there, a step of 0.1 µm off the line."""
+    record, _ = stepped()
+    friction = record.friction.copy()
+    friction[600] += 0.01
+    read = np.round(record.load_point / 1e-7) * 1e-7
+    means = thinned(replace(record, friction=friction, load_point=read))
+    setup = set_up(means, friction_law("rate-and-state-slip"), None)
+    assert setup.experiment.drive.first_rate == pytest.approx(1e-6, rel=1e-5)
 
 
 def test_an_outlier_stays_a_sample_of_its_own():
