@@ -14,7 +14,8 @@ from quakedesign.identification import Record, identify
 from quakedesign.identification.fitting import fit
 from quakedesign.identification.setup import set_up
 from quakedesign.identification.straight import reading_step, straight_beginning
-from quakedesign.identification.thinning import thinned
+from quakedesign.identification.thinning import _edges, thinned
+from quakedesign.report.identification import identification_lines
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
 synthetic = importlib.util.module_from_spec(SPECIFICATION)
@@ -79,6 +80,42 @@ def test_a_rate_read_in_steps_is_that_of_all_samples():
     assert setup.experiment.drive.first_rate == pytest.approx(1e-6, rel=1e-5)
 
 
+def test_means_are_short_against_the_way_to_both_bends_and_their_piece():
+    bends = np.array([0, 40000, 40500, 100000])
+    edges = _edges(np.arange(100000.0), bends)
+    begin, end = edges[:-1], edges[1:] - 1
+    piece = np.searchsorted(bends, begin, side="right")
+    long = end > begin
+    behind, ahead = begin - bends[piece - 1], bends[piece] - 1 - end
+    assert np.all((end - begin <= 0.1 * behind)[long & (piece > 1)])
+    assert np.all((end - begin <= 0.1 * ahead + 1e-9)[long & (piece < 3)])
+    assert np.all(end - begin <= np.maximum((bends[piece] - bends[piece - 1]) / 20, 0))
+    assert np.max(np.diff(edges)) == 2500
+    assert len(edges) < 500
+
+
+@pytest.mark.parametrize("name", ["load_point", "slip", "normal"])
+def test_samples_stay_where_any_column_bends(name):
+    record, _ = stepped()
+    flat = 0.6 + 3e-4 * np.random.default_rng(1).standard_normal(SAMPLES)
+    line = 1e-6 * record.time
+    straight = replace(record, friction=flat, load_point=line, slip=line)
+    bent = record.load_point if name != "normal" else 5e6 + 1e3 * np.maximum(np.arange(SAMPLES) - AT, 0)
+    near = slice(AT - 3, AT + 4)
+    assert not set(record.time[near]) & set(thinned(straight).time)
+    assert set(record.time[near]) <= set(thinned(replace(straight, **{name: bent})).time)
+
+
+def test_a_long_record_is_fitted_by_its_means_and_says_so():
+    made = synthetic.weakening(samples=8000)
+    found = identify(made.noisy(2), made.law)
+    assert len(found.fit.counts) < 1500
+    assert found.fit.noise == pytest.approx(made.noise, rel=0.1)
+    assert found.to_dict()["measurements"] == found.record.counts[found.used].sum()
+    told = " ".join(" ".join(identification_lines(found)).split())
+    assert f"of friction in one of {found.fit.counts.sum()} samples, taken as {len(found.fit.counts)} means" in told
+
+
 def test_an_outlier_stays_a_sample_of_its_own():
     record, _ = stepped()
     friction = record.friction.copy()
@@ -124,6 +161,7 @@ def test_weights_are_the_numbers_of_samples():
     np.testing.assert_allclose(part.fitted, whole.fitted, atol=0.1 * np.min(whole.deviations))
     np.testing.assert_allclose(part.deviations, whole.deviations, rtol=0.15)
     assert part.noise == pytest.approx(whole.noise, rel=0.1)
+    assert part.distance(part.fitted) == pytest.approx(0, abs=1e-6)
 
 
 @pytest.mark.parametrize(("law", "other"), [("slip", "aging"), ("aging", "slip")])
