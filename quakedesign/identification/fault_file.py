@@ -157,7 +157,7 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
 
 
 def law_remarks(identification: Identification, fault: Fault) -> list[str]:
-    """Whether a record prefers another law with state than the fault names, where it was not told which to take.
+    """Whether a record has another law with state than the fault names, where it was not told which to take.
 
     Parameters
     ----------
@@ -167,7 +167,8 @@ def law_remarks(identification: Identification, fault: Fault) -> list[str]:
     named, found = fault.friction, identification.law
     if identification.rival is None or not named.state_names or named.name == found.name:
         return []
-    return [f"{fault.name} names {named.name}, the record prefers {found.name}; --law {named.name} takes the other"]
+    why = "the record prefers" if named.name == identification.rival.law else "the record was fitted without it, by"
+    return [f"{fault.name} names {named.name}, {why} {found.name}; --law {named.name} takes the other"]
 
 
 def _moved(law: FrictionLaw, moved: FrictionLaw) -> list[str]:
