@@ -27,6 +27,7 @@ def limits(
     diffusion: ExactSeconds | None = None,
     well: ExactMetres | None = None,
     stress: Pascals | None = None,
+    spread: str = "0",
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
     slip_noise: ExactMetres = "0",
     rate_noise: ExactMetresPerSecond = "0",
@@ -57,6 +58,9 @@ def limits(
     stress
         Of a fault with rate-and-state friction, whose limits are those of its linearisation about slow sliding: bound
         of the shear stress disturbance, such as '25 kPa'; the largest that a design stands unless given.
+    spread
+        Of such a fault: by how much of their values a, b and D_c may be off in what is proved, such as 0.1; what is
+        impossible is so for the nominal ones.
     measured
         What controllers are told: slip-and-rate, or slip.
     slip_noise
@@ -85,6 +89,7 @@ def limits(
         lag=lag,
         diffusion=diffusion if well is None else rock(diffusion, well, diffusivity),
         stress=stress,
+        spread=spread,
         measured=measured,
         slip_noise=slip_noise,
         rate_noise=rate_noise,

@@ -74,10 +74,15 @@ def rock(diffusion: str | None, well: str | None, diffusivity: str | None) -> st
     if well is None and diffusivity is None:
         return diffusion
     if well is None or diffusivity is None or diffusion not in (None, "0"):
+        units = {"well": "m", "diffusivity": "m^2/s", "diffusion": "s"}
+        told = {"well": well, "diffusivity": diffusivity, "diffusion": diffusion}
+        received = " and ".join(
+            f"--{name} of {value} {units[name]}" for name, value in told.items() if value not in (None, "0")
+        )
+        alone = " alone" if " and " not in received else ""
         raise ParameterError(
             "a well is told by its distance and the diffusivity of the rock, or by L^2/D. Received "
-            f"well {well}, diffusivity {diffusivity}, diffusion {diffusion}. Give --well and --diffusivity, or "
-            "--diffusion alone."
+            f"{received}{alone}. Give --well and --diffusivity, or --diffusion alone."
         )
     distance, spread = rational(well, "well"), rational(diffusivity, "diffusivity")
     if distance <= 0 or spread <= 0:

@@ -57,14 +57,18 @@ def mean_rate(task: Reference) -> float:
     return task.target_slip / task.operation_time
 
 
-def beyond_rates(law: FrictionLaw, rate: float) -> str:
-    """That a slip rate [m/s] lies outside the working range of a law, as one sentence; empty for one inside."""
+def beyond_rates(law: FrictionLaw, rate: float, *, source: str = "") -> str:
+    """That a slip rate [m/s] lies outside the working range of a law, as one sentence; empty for one inside.
+
+    The range is that of slowest_rate and fastest_rate, unless another `source` of it is named.
+    """
     slowest, fastest = law.working_rates
     if slowest <= rate <= fastest:
         return ""
     return (
-        f"V = {rate:.3g} m/s is {'below' if rate < slowest else 'above'} the rates for which friction is known, "
-        f"{slowest:.2g} to {fastest:.2g} m/s (slowest_rate, fastest_rate): a, b and D_c are extrapolated"
+        f"V = {rate:.3g} m/s is {'below' if rate < slowest else 'above'} the rates "
+        f"{source or 'for which friction is known'}, {slowest:.2g} to {fastest:.2g} m/s"
+        f"{'' if source else ' (slowest_rate, fastest_rate)'}: a, b and D_c are extrapolated"
     )
 
 

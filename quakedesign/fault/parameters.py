@@ -213,7 +213,14 @@ class Fault:
         return rest_slip(self.friction, self.effective_normal_stress * self.area, self.stiffness)
 
 
-_PLANT = ("density", "shear_modulus", "length", "damping", "effective_normal_stress", "sampling_time")
+_PLANT = {
+    "density": "kg/m^3",
+    "shear_modulus": "Pa",
+    "length": "m",
+    "damping": "kg/s",
+    "effective_normal_stress": "Pa",
+    "sampling_time": "s",
+}
 
 
 def require_plant(**numbers: float) -> None:
@@ -230,7 +237,8 @@ def require_plant(**numbers: float) -> None:
             if name == "damping":
                 require_nonnegative(damping=value)
             else:
-                require_positive(compression if name == "effective_normal_stress" else "", **{name: value})
+                usual = f"It is in {_PLANT[name]} here; check sign and unit." if name in _PLANT else ""
+                require_positive(compression if name == "effective_normal_stress" else usual, **{name: value})
             require_ordinary(**{name: value})
     problems.refuse()
 

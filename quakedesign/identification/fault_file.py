@@ -152,7 +152,7 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
     law, task = identification.law, fault.reference
     assumed = [said for said in fault.assumed if said.startswith(_OF_TASK)]
     told = [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
-    beyond = beyond_rates(law, mean_rate(task)) if law.state_names else ""
+    beyond = beyond_rates(law, mean_rate(task), source="of the record") if law.state_names else ""
     return [*told, *_moved(law, _at_rate_of(fault, law)), *filter(None, [beyond])]
 
 

@@ -93,9 +93,19 @@ def _of_task(entry: "Entry") -> list[str]:
     return entry.answer.task_lines() if entry.answer else []
 
 
+_OF_SLIDING = (
+    "; pressure over the measured slip error (k1) and slip rate (k2: not used), and over what the law predicts, "
+    "scaled: slip error, state of friction, modes of the rock's pressure, and the level of all that it does not know"
+)
+
+
 def _gains(entry: "Entry") -> str:
-    gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in entry.design.gains.items())
-    return f"gains: {gains or 'none'}"
+    law = entry.design.controller
+    units = law.gain_units if law and entry.design.sliding else {}
+    gains = ", ".join(
+        f"{name} = {float(v):.6g} {units.get(name, '')}".rstrip() for name, v in entry.design.gains.items()
+    )
+    return f"gains: {gains or 'none'}{_OF_SLIDING if units else ''}"
 
 
 def _print_tables(comparison: Comparison, console: Any) -> None:

@@ -281,6 +281,7 @@ def limits(
     lag: float | str | Fraction = 0,
     diffusion: float | str | Fraction | None = None,
     stress: float | None = None,
+    spread: float | str | Fraction = 0,
     measured: str = MEASURED[0],
     slip_noise: float | str | Fraction = 0,
     rate_noise: float | str | Fraction = 0,
@@ -307,6 +308,9 @@ def limits(
     stress : float, optional
         Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that a design stands unless
         given.
+    spread : float, str or Fraction
+        Of friction with a state: by how much of their values a, b and D_c may be off [-] for a design that is proved;
+        what is impossible is so for the nominal ones.
     measured : str
         What controllers are told: ``slip-and-rate`` or ``slip``.
     slip_noise, rate_noise : float, str or Fraction
@@ -331,18 +335,15 @@ def limits(
         slip_noise=rational(slip_noise, "slip noise"),
         rate_noise=rational(rate_noise, "rate noise"),
     )
+    off = rational(spread, "spread")
     if fault.friction.state_names:
-        if told != Told():
-            raise ParameterError(
-                f"no limit of slow sliding is known for noise. Received {fault.friction.name}, told {told.words()}. "
-                "Leave noise out: what cannot be done without it cannot be done with it."
-            )
+        _require_no_noise(fault, told)
         path: Around = {"lag": rational(lag, "lag"), "diffusion": rational(diffusion or 0, "diffusion")}
-        return _sliding_limits(fault, pressure, diffusivity, stress, path if prove else None)
-    if stress is not None:
+        return _sliding_limits(fault, pressure, diffusivity, stress, path if prove else None, off)
+    if stress is not None or off:
         raise ParameterError(
-            f"stress needs friction with a state. Received {fault.friction.name}. Leave it out: the disturbance of the "
-            "fault is meant."
+            f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Leave it "
+            "out: the box and the disturbance of the fault are meant."
         )
     if rational(lag, "lag") or diffusion is not None:
         raise ParameterError(
@@ -406,6 +407,14 @@ def _limits(
     }
 
 
+def _require_no_noise(fault: Fault, told: Told) -> None:
+    if told != Told():
+        raise ParameterError(
+            f"no limit of slow sliding is known for noise. Received {fault.friction.name}, told {told.words()}. "
+            "Leave noise out: what cannot be done without it cannot be done with it."
+        )
+
+
 def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fraction, Fraction]:
     withdrawal = rational(fault.effective_normal_stress if pressure is None else pressure, "pressure")
     spread = rational(diffusivity, "diffusivity")
@@ -418,7 +427,12 @@ def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fr
 
 
 def _sliding_limits(
-    fault: Fault, pressure: float | None, diffusivity: float, stress: float | None, path: Around | None
+    fault: Fault,
+    pressure: float | None,
+    diffusivity: float,
+    stress: float | None,
+    path: Around | None,
+    off: Fraction,
 ) -> SlidingLimits:
     """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path.
 
@@ -430,7 +444,7 @@ def _sliding_limits(
     asked = None if stress is None else rational(stress, "stress")
     told = path if path is not None and any(path.values()) else None
     near: Around = {"diffusion": near_path(model)}
-    answer = None if path is None else answer_sliding(fault, stress=asked, **near)
+    answer = None if path is None else answer_sliding(fault, stress=asked, spread=off, **near)
     found = answer.found if answer is not None and isinstance(answer.found, SlidingGuarantee) else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
@@ -442,7 +456,7 @@ def _sliding_limits(
     impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
     rock, farthest = (told or {}).get("diffusion", Fraction(0)), impossible["largest_diffusion_time"]
     if told is not None and (farthest is None or rock <= farthest):
-        behind = answer_sliding(fault, stress=asked, **told).found
+        behind = answer_sliding(fault, stress=asked, spread=off, **told).found
         found = behind if isinstance(behind, SlidingGuarantee) else None
     proved: dict[str, Bound | None] = {}
     if found is not None:

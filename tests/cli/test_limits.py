@@ -1,6 +1,7 @@
 """The command that says what no controller can do."""
 
 import json
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -96,7 +97,7 @@ def test_noise_forbids_more(capsys):
     ("given", "said"),
     [
         (("crustal-patch", "--slip-noise", "1 um"), "no limit of slow sliding is known for noise"),
-        (("crustal-patch", "--stress", "0 Pa"), "a stress above 0"),
+        (("crustal-patch", "--stress", "0 Pa"), "a stress must be above 0"),
         (("real-fault", "--stress", "1 kPa"), "stress needs friction with a state"),
     ],
 )
@@ -129,9 +130,11 @@ def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, m
 def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are_told(monkeypatch, capsys):
     """(40 m)²/(2 m²/s) = 800 s."""
     known, asked = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text()), []
+    spreads = []
 
-    def answered(fault, *, stress, **around):
+    def answered(fault, *, stress, spread, **around):
         asked.append(around)
+        spreads.append(spread)
         return SlidingAnswer(found=known, task=known.task, held=known.held)
 
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", answered)
@@ -151,6 +154,11 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     told = " ".join(capsys.readouterr().out.split())
     assert "L^2/D = 1e+10 s: IMPOSSIBLE for every controller" in told
     assert f"proved: one design behind rock of L^2/D = {float(known.held.diffusion):.4g} s" in told
+    assert set(spreads) == {0}
+    assert run(*patch, "--diffusion", "9 s", "--spread", "0.01") == 0
+    assert spreads[-2:] == [Fraction(1, 100)] * 2
+    assert run("lab-fault", "--spread", "0.01") == 2
+    assert "a spread needs friction with a state" in capsys.readouterr().err
     for others in (("--well", "40 m", "--diffusion", "9 s"), ("--well", "0 m")):
         assert run(*patch, *others) == 2
     assert run("lab-fault", "--well", "1 m") == run("lab-fault", "--lag", "1 s") == 2

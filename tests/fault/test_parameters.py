@@ -85,6 +85,11 @@ def test_unphysical_values_are_refused(name, value):
         replace(REAL, **{name: value})
 
 
+def test_what_a_length_is_in_is_said():
+    with pytest.raises(ParameterError, match=r"length must be .* It is in m here; check sign and unit\."):
+        replace(REAL, length=-800.0)
+
+
 def test_the_sign_of_stress_is_explained():
     with pytest.raises(ParameterError, match=r"Compression is positive here; check the sign\."):
         replace(REAL, effective_normal_stress=-5e7)

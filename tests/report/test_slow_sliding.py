@@ -94,6 +94,9 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     name, outcome, *_ = told.getvalue().splitlines()
     assert name.startswith("crustal-patch (")
     assert outcome == "  e-LQR (designed): guaranteed: slip rate <= 1.2e-06 m/s, slip error <= 8.33e-05 m"
+    gains = next(line for line in told.getvalue().splitlines() if "gains: " in line)
+    assert re.search(r"k1 = \S+ Pa/m, k2 = 0 Pa s/m, slip = \S+ Pa, ", gains)
+    assert "slip error, state of friction, modes of the rock's pressure" in " ".join(told.getvalue().split())
 
 
 def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(comparison, monkeypatch):
@@ -124,6 +127,7 @@ def test_the_report_is_the_one_of_all_faults(folder):
     assert first.index("never exceeds") < first.index("Not designed, 2-CTA, 2-DIA")
     assert "the slip rate follows the pressure at once" in first
     assert "guaranteed as it runs" in page
+    assert "Uncertainty box" not in page
     assert not re.search(r"for ever\b", page[: page.index("Glossary")])
     assert first.index("every shear stress disturbance up to") < first.index("while the reference goes")
     assert "a well near the fault" in page
@@ -171,7 +175,7 @@ def test_without_a_diffusion_the_well_is_near(monkeypatch):
     monkeypatch.setattr(state_feedback, "answer_sliding", answer)
     with pytest.raises(ParameterError, match="enough"):
         design(PATCH, "elqr", stress="25000")
-    assert asked == {"stress": Fraction(25000), "spread": 0, "diffusion": Fraction(800)}
+    assert asked | {"tell": None} == {"stress": Fraction(25000), "spread": 0, "tell": None, "diffusion": Fraction(800)}
 
 
 @pytest.mark.slow

@@ -134,11 +134,11 @@ def answer_sliding(
             "not apply to it, as the slip rate follows the pressure at once. Received "
             f"{controller} and the box {box.name}. Give --controller elqr, --box paper and --spread."
         )
-    if not 0 <= spread < 1 or (stress is not None and stress <= 0):
-        raise ParameterError(
-            f"a spread must be from 0 to below 1, a stress above 0. Received {float(spread):g} and "
-            f"{float(stress or 0):g} Pa. Change them."
-        )
+    if not 0 <= spread < 1:
+        meant = f": {float(spread):g} % is {float(spread) / 100:g}" if 1 <= spread < 100 else ""
+        raise ParameterError(f"a spread must be from 0 to below 1. Received {float(spread):g}. Change it{meant}.")
+    if stress is not None and stress <= 0:
+        raise ParameterError(f"a stress must be above 0. Received {float(stress):g} Pa. Change it, or leave it out.")
     if not (around.get("lag") or around.get("diffusion")):
         raise ParameterError(
             "slow sliding is guaranteed through rock or a lag between well and fault. Received neither. Give "
