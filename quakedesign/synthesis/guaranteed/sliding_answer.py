@@ -161,7 +161,7 @@ def answer_sliding(
     for log_rate in LOG_RATES[1:]:
         if (answer.proved and (stress or answer.task.stress > _TRIFLE)) or reach.share < 1:
             break
-        tell(f"a law for |ln(v/V)| up to {log_rate}", 0.6)
+        tell(f"a law for |ln(v/V)| up to {log_rate}", _SEARCHED)
         smaller = _answer(task, held_over, log_rate, around, prove, reach.numbers)
         more = smaller.proved and (not answer.proved or smaller.task.stress > answer.task.stress)
         answer = smaller if more else answer
