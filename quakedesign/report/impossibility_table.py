@@ -80,13 +80,15 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
         f"the others: pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference needs, "
         f"D = {float(limits.diffusivity):g} m^2/s; a constant stress that begins after a sample makes errors grow "
         "without bound, even if the controller knows everything from the next sample on",
-        f"proved: one design{_path(limits.guarantee)}, of the fault itself with inertia; pressure at the fault",
+        "proved: nothing of a design"
+        if limits.guarantee is None
+        else f"proved: one design{_path(limits.guarantee)}, of the fault itself with inertia; pressure at the fault",
     ]
 
 
-def _path(found: SlidingGuarantee | None) -> str:
+def _path(found: SlidingGuarantee) -> str:
     """What the design that is proved stands behind."""
-    ways = {} if found is None else {"a lag of": found.held.lag, "rock of L^2/D =": found.held.diffusion}
+    ways = {"a lag of": found.held.lag, "rock of L^2/D =": found.held.diffusion}
     told = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]
     return f" behind {' and '.join(told)}" if told else ""
 

@@ -436,8 +436,8 @@ def _sliding_limits(
 ) -> SlidingLimits:
     """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path.
 
-    Where a path or no stress is told, the stress is that which the design with a near well stands; behind a path that
-    is impossible no design is looked for.
+    Unless a stress is told, it is that which the design stands, or that with a near well where none is found behind the
+    path; behind a path that is impossible under the latter no design is looked for.
     """
     withdrawal, spread = _given(fault, pressure, diffusivity)
     model, step = sliding_model(fault), rational(fault.sampling_time)
@@ -453,11 +453,12 @@ def _sliding_limits(
             f"was found that stands any{_why(answer)}. Give --stress, such as '25 kPa'."
         )
     push = SlidingPush(model=model, amplitude=amplitude)
-    impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
-    rock, farthest = (told or {}).get("diffusion", Fraction(0)), impossible["largest_diffusion_time"]
+    farthest, rock = longest_diffusion(push, withdrawal, step), (told or {}).get("diffusion", Fraction(0))
     if told is not None and (farthest is None or rock <= farthest):
         behind = answer_sliding(fault, stress=asked, spread=off, **told).found
         found = behind if isinstance(behind, SlidingGuarantee) else None
+        push = replace(push, amplitude=found.task.stress) if found else push
+    impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
     proved: dict[str, Bound | None] = {}
     if found is not None:
         proved["peak_slip_rate_error"] = _above_the_reference(found)

@@ -1,6 +1,7 @@
 """The command that says what no controller can do."""
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -125,6 +126,29 @@ def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, m
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run(str(file)) == 0
     assert "errors of this fault swing while they grow, or do not grow" in " ".join(capsys.readouterr().out.split())
+
+
+def test_both_sides_are_of_the_stress_that_the_design_behind_the_well_stands(monkeypatch, capsys):
+    """A design behind a farther well stands less than that near the fault; where there is none, nothing is proved."""
+    near = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
+    known = {Fraction(800): near, Fraction(900): replace(near, task=replace(near.task, stress=near.task.stress / 2))}
+
+    def answered(fault, *, diffusion, lag=0, **asked):
+        found = known.get(diffusion, NoGuarantee(reason="too far", small_gain=None))
+        return SlidingAnswer(found=found, task=near.task, held=None)
+
+    monkeypatch.setattr(impossible_and_proved, "answer_sliding", answered)
+    sides = {}
+    for diffusion in ("800 s", "900 s", "1000 s"):
+        assert run("crustal-patch", "--diffusion", diffusion, "--json") == 0
+        sides[diffusion] = json.loads(capsys.readouterr().out)
+    full, half, none = sides.values()
+    assert half["stress"] == full["stress"] / 2 == none["stress"] / 2 == float(near.task.stress) / 2
+    rates = [float(one["peak_slip_rate_error"]["impossible_beyond"]) for one in (full, half)]
+    assert rates[1] == pytest.approx(rates[0] / 2, rel=1e-3)  # of the linearised fault
+    assert none["peak_slip_rate_error"]["proved_up_to"] is None
+    assert run("crustal-patch", "--diffusion", "1000 s") == 0
+    assert "proved: nothing of a design" in capsys.readouterr().out
 
 
 def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are_told(monkeypatch, capsys):
