@@ -20,6 +20,7 @@ from quakedesign.fault.template import fault_toml
 from quakedesign.loop import LinearLaw
 from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis.guaranteed import sliding_answer
+from quakedesign.synthesis.guaranteed.sliding_reach import Reach
 from quakedesign.synthesis.guaranteed.slow_sliding import proved_sliding
 from quakedesign.synthesis.methods import state_feedback
 
@@ -101,7 +102,16 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
     monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
     fault, around = load_fault("crustal-patch"), {"diffusion": Fraction(800)}
     found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found
-    assert found.reason == "too much; a proof was found for a stress of at most 20 kPa: leave out --stress"
+    assert found.reason == (
+        "too much; a proof was found for a stress of at most 20 kPa: give --stress '20 kPa'; somewhat more may do"
+    )
+    none = NoGuarantee(reason="no law whose loop is stable", small_gain=None)
+    with monkeypatch.context() as patched:
+        found_below = lambda task, step, **around: HELD if task.stress < 35_000 else none  # noqa: E731
+        patched.setattr(sliding_answer, "designed_sliding", found_below)
+        patched.setattr(sliding_answer, "farthest", lambda *_, **__: Reach(share=Fraction(1)))
+        found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found
+    assert found.reason.startswith("no law was found that holds the fault under 40 kPa; a proof was found for a stress")
     monkeypatch.setattr(sliding_answer, "proved_sliding", lambda task, design, *, log_rate: NONE)
     assert sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found == NONE
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Unpack
 
 import numpy as np
 
-from quakedesign.bounds import LowerBound
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Held, NoGuarantee
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.guarantee.pump import Pump
@@ -168,6 +168,9 @@ def answer_sliding(
     if isinstance(answer.found, NoGuarantee) and not remedy and stress:
         pumped: dict[str, Any] = {} if pump is None else {"pump": pump}
         remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, **around, **pumped))
+        if remedy and answer.held is None:
+            none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
+            answer = replace(answer, found=NoGuarantee(reason=none, small_gain=None))
     if isinstance(answer.found, NoGuarantee):
         why = (stress and _beyond(fault, stress, around)) or answer.found.reason
         return replace(answer, found=replace(answer.found, reason="; ".join(filter(None, (why, remedy)))))
@@ -192,7 +195,7 @@ def _under_less(answer: SlidingAnswer) -> str:
     if not answer.proved:
         return ""
     most = LowerBound(answer.task.stress).quantity("Pa")
-    return f"a proof was found for a stress of at most {most}: leave out --stress"
+    return f"a proof was found for a stress of at most {most}: give --stress '{most}'; somewhat more may do"
 
 
 def _remedy(
