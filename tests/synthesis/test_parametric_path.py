@@ -42,6 +42,16 @@ def test_the_sign_is_that_of_the_margin_that_a_solver_finds(law):
         assert answer in (None, solved.found) or abs(solved.margin) < 1e-9
 
 
+def test_a_path_leaves_shapes_alone_that_others_share():
+    """Two threads would else ask one solver at once, and its digits would depend on what it was asked before."""
+    sheet = sheet_of("super-twisting")
+    every = loops(sheet)
+    sweep = Sweep(every[0], sheet.degree)
+    frame = sweep.frame(every[0])
+    assert Path(sweep, frame).found(every[0]) is not None
+    assert [shape._solver for shape in sweep.cones(frame).shapes] == [None] * len(sweep.cones(frame).shapes)
+
+
 def test_both_bounds_hold_wherever_a_step_has_them(monkeypatch):
     every = loops(sheet_of("super-twisting"))
     sweep = Sweep(every[0], 6)

@@ -8,10 +8,11 @@ Gram entries, and between polynomials of one shape only the cost changes.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter
-from typing import Any
+from typing import Any, Self
 
 import clarabel
 import numpy as np
@@ -93,6 +94,12 @@ class MomentProgram:
         self._solver: Any = None
         self._chosen: tuple[float, bool] | None = None
         self.solver_seconds = 0.0
+
+    def alone(self) -> Self:
+        """The same programme with a solver of its own, which shares nothing that changes with others."""
+        own = copy(self)
+        own._solver = None
+        return own
 
     def covers(self, target: Mapping[Exponents, Any]) -> bool:
         """Whether every monomial of a target can be produced at all."""

@@ -271,7 +271,7 @@ class _Rows:
 
     def interior(self, margin: Any) -> Any:
         """Functional of every row inside its cone, with L(N) = 1."""
-        centres = (one.solve({}) for one in self._shapes)
+        centres = (one.alone().solve({}) for one in self._shapes)
         nothing = np.full(self._places.shape[1], np.nan)  # outside of every cone
         values = np.array([nothing if c is None else list(c.functional.values()) for c in centres])
         sized = values / (values * margin[self._places]).sum(axis=1)[:, None]
