@@ -93,6 +93,23 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
     assert tried == [(half, half)]
 
 
+def test_a_well_that_is_impossible_is_said_to_be_that_before_what_would_do(monkeypatch):
+    """Beyond 1.3e6 s for 25 kPa on this fault, whatever law is looked for."""
+    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda *_, **__: NONE)
+    monkeypatch.setattr(sliding_answer, "farthest", lambda *_, **__: Reach(share=Fraction(1, 2)))
+    monkeypatch.setattr(sliding_answer, "what_would_do", lambda *_, **__: "another")
+    fault = load_fault("crustal-patch")
+
+    def reason(diffusion, stress):
+        return sliding_answer.answer_sliding(fault, diffusion=Fraction(diffusion), stress=stress).found.reason
+
+    assert reason(10**6, Fraction(25_000)) == "too much; another"
+    assert reason(2 * 10**6, None) == "too much; another"
+    said = reason(2 * 10**6, Fraction(25_000))
+    assert said.startswith("no controller whatever whose pressure is within 50 MPa")
+    assert said.endswith("; another")
+
+
 def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch):
     def proved(task, design, *, log_rate):
         return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
