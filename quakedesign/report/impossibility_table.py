@@ -14,7 +14,7 @@ from quakedesign.rationals import rational
 from quakedesign.report.drawing import NATURAL, figure, finish
 from quakedesign.report.figure_files import write_figures, write_results
 from quakedesign.studies import Limits
-from quakedesign.studies.impossible_and_proved import SlidingLimits
+from quakedesign.studies.fundamental_limits import SlidingLimits
 
 _FORBIDDEN, _HIDDEN, _PROVED = "#F3C6B2", "#F9E4DA", "#0072B2"
 

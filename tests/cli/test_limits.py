@@ -20,7 +20,7 @@ KEYS = ("peak_slip_rate_error", "largest_step", "largest_delay", "largest_diffus
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
-    monkeypatch.setattr("quakedesign.studies.impossible_and_proved.natural_peak", lambda _fault: 0.05)
+    monkeypatch.setattr("quakedesign.studies.fundamental_limits.natural_peak", lambda _fault: 0.05)
     monkeypatch.setattr(
         "quakedesign.studies.impossible_and_proved.design_held",
         lambda *_, **__: NoGuarantee(reason="none", small_gain=None),

@@ -32,7 +32,7 @@ CLAIMS = Claims(
 
 @pytest.fixture(autouse=True)
 def _natural_peak(monkeypatch):
-    monkeypatch.setattr("quakedesign.studies.impossible_and_proved.natural_peak", lambda fault: 0.25)
+    monkeypatch.setattr("quakedesign.studies.fundamental_limits.natural_peak", lambda fault: 0.25)
 
 
 @pytest.fixture
