@@ -378,3 +378,38 @@ def test_bounds_of_sides_lie_a_little_above_what_linear_programmes_and_fine_sums
             area += (np.abs(inputs @ row) + np.abs(inputs @ following)).sum() * 1e-5
             row = following
         assert highest <= bound <= highest + 0.006
+
+
+def test_a_set_that_is_left_by_a_hundred_thousandth_is_refused_by_both():
+    kept, left = (changed(("reach", "facets"), lambda rows, by=by: scaled(rows, by)) for by in ("1001/1000", "501/500"))
+    assert (standalone(kept), package(kept)) == ("proved", "proved")
+    beyond = [max(bounds) for bounds in zip(*rows_of(left, len(left["reach"]["facets"])), strict=True)]
+    assert all(1 < bound < 1 + 1e-4 for bound in beyond)
+    assert "must stay in the set" in standalone(left)
+    assert "may leave the set" in parse_guarantee(json.dumps(left)).bounds().reason
+
+
+@pytest.mark.parametrize(
+    ("place", "new"),
+    [
+        (("loop", "delay"), "1/1000"),
+        (("loop", "lag"), "1/1000"),
+        (("loop", "diffusion"), "1"),
+        (("loop", "jitter"), {"measured": "1/10000", "delay": "0"}),
+        (("loop", "first"), [["0", "1"], ["0", "0"]]),
+        (("start",), {"slip": "1/1000000", "rate": "0"}),
+    ],
+    ids=lambda v: v[-1] if isinstance(v, tuple) else "",
+)
+def test_what_a_set_does_not_know_of_is_refused_for_that_and_not_for_its_size(place, new):
+    assert "must be of a linear law from rest" in standalone(changed(place, new))
+
+
+def test_an_implicit_step_and_an_interval_no_longer_than_the_step_are_refused_for_themselves():
+    raw = json.loads((FILE.parent / "guarantee_cta_real-fault.json").read_text())
+    del raw["loop"]["first"]
+    raw["loop"]["longest"] = "1/5"
+    assert "must be of a linear law from rest" in standalone(raw)
+    assert "must be longer than step" in standalone(changed(("loop", "longest"), "1/1000"))
+    with pytest.raises(ParameterError, match="must be longer than the step"):
+        replace(claim().held, longest_step=claim().held.step)
