@@ -21,6 +21,7 @@ from quakedesign.certificates.guarantee.ball_matrices import matrix
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
 from quakedesign.certificates.guarantee.inputs import channels_of
 from quakedesign.certificates.guarantee.invariant_set import _Between, reduced
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.errors import CertificateError, ParameterError
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"
@@ -413,3 +414,28 @@ def test_an_implicit_step_and_an_interval_no_longer_than_the_step_are_refused_fo
     assert "must be longer than step" in standalone(changed(("loop", "longest"), "1/1000"))
     with pytest.raises(ParameterError, match="must be longer than the step"):
         replace(claim().held, longest_step=claim().held.step)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"lag": F(1, 1000)},
+        {"diffusion": F(1)},
+        {"initial_slip_rate": F(1)},
+        {"jitter": F(1, 10000)},
+        {"delay_jitter": F(1, 10000)},
+        {"averaging": F(1, 10000)},
+        {"ramp": F(1, 10000)},
+        {"pump": Pump(rate=F(10**7))},
+    ],
+    ids=lambda more: next(iter(more)),
+)
+def test_what_a_set_does_not_know_of_is_refused_before_its_size_is_looked_at(more):
+    with pytest.raises(ParameterError, match="samples that follow no clock are known from rest"):
+        replace(claim().held, **more)
+
+
+def test_a_law_that_starts_from_what_it_measures_needs_a_clock():
+    law = claim().held.law
+    with pytest.raises(ParameterError, match="samples that follow no clock are known from rest"):
+        replace(claim().held, law=replace(law, first=((F(0), F(1)), (F(0), F(0)))))
