@@ -439,3 +439,33 @@ def test_a_law_that_starts_from_what_it_measures_needs_a_clock():
     law = claim().held.law
     with pytest.raises(ParameterError, match="samples that follow no clock are known from rest"):
         replace(claim().held, law=replace(law, first=((F(0), F(1)), (F(0), F(0)))))
+
+
+def test_intervals_are_said_on_their_inner_side():
+    held = replace(claim().held, step=F("0.0010000001"), longest_step=F("0.0019999999"))
+    assert "anything from 0.00100001 s to 0.00199999 s, by no clock" in replace(claim(), held=held).sentence()
+
+
+def test_sizes_that_others_hide_are_invalid_too():
+    few = json.loads(text())
+    few["reach"]["facets"] = few["reach"]["facets"][:2]
+    few["reach"]["at_samples"] = [[[0, 1, 0]] * 7] * 2
+    few["reach"]["between"] = [[[0, 1, 0]] * 9] * 3
+    many = changed(("reach", "between"), lambda lines: [line * 4 for line in lines])
+    uneven = changed(("reach", "facets", 5), lambda row: [*row, "1"])
+    for raw, said in ((few, "reach needs 3 to 400 facets"), (many, "1 to 32 pieces"), (uneven, "list of 3 rationals")):
+        assert said in standalone(raw)
+        assert package(raw) == "invalid"
+
+
+@pytest.mark.parametrize(
+    ("place", "new", "said"),
+    [
+        (("reach", "facets"), lambda rows: (rows * 3)[:401], "reach needs 3 to 400 facets"),
+        (("reach", "facets", 0, 0), f"1/{10**20}", "at most 20 digits"),
+        (("reach", "at_samples"), lambda lines: [line[:1] * 25 for line in lines], "at most 4000 bases"),
+    ],
+    ids=["facets", "digits", "bases"],
+)
+def test_limits_of_a_set_are_said(place, new, said):
+    assert said in standalone(changed(place, new))
