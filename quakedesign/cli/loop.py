@@ -1,5 +1,6 @@
 """Commands about one closed loop: simulate it, see what sampling does to it, export its controller."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,11 @@ from quakedesign.cli.options import (
     StartOptions,
 )
 from quakedesign.cli.shared import app, console, given, new_file, print_lines, progress
-from quakedesign.cli.state import NO_STATE, StateOptions, require_no_state_options, show_state_run
+from quakedesign.cli.state import NO_STATE, StateOptions, changed_options, require_no_state_options, show_state_run
 from quakedesign.errors import ParameterError
 
 _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
+_BESIDE = ("scheme", "plant", "drift", "perturbation", "initial_slip", "initial_slip_rate", "weight", "authority")
 _NONE, _LAW, _USUAL, _REST = NoLawOptions(), LawOptions(), RunOptions(), StartOptions()
 
 
@@ -59,6 +61,7 @@ def simulate(
     """
     options = dict(locals())
     from quakedesign.fault import load_fault
+    from quakedesign.report.state_runs import proved_line
     from quakedesign.simulation import Load
     from quakedesign.studies.single import run_single
 
@@ -92,10 +95,23 @@ def simulate(
         )
     if out is not None:
         trajectory.save(out)
-    proved = chosen.claim.sentence() if chosen and chosen.claim else None
-    answer = _answer(trajectory, loaded, premises) | {"guarantee": proved}
-    output.show(answer, lambda: _print_run(trajectory, loaded, premises, proved))
+    proved, outside = None, list[str]()
+    if chosen and chosen.claim:
+        proved, outside = chosen.claim.sentence(), _outside(changed_options(simulate, options), chosen.claim.held)
+    answer = _answer(trajectory, loaded, premises) | {"guarantee": proved, "outside": outside}
+    output.show(answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside)))
     return 0
+
+
+def _outside(changed: dict[str, Any], held: Any) -> list[str]:
+    """Options of a run of a law that what is proved of it does not know."""
+    known = {name: float(time) for name, time in held.path.items()}
+    starts = zip(("initial_slip", "initial_slip_rate"), map(float, held.start), strict=True)
+    within = {name for name, most in starts if abs(changed.get(name, 0.0)) <= most}
+    within |= {name for name, time in known.items() if changed.get(name) == time}
+    kinds: tuple[Any, ...] = (ActuatorOptions, SensorOptions)
+    groups = (option.name for kind in kinds for option in fields(kind))
+    return [name for name in (*_BESIDE, *groups) if name in changed and name not in within]
 
 
 def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
@@ -119,14 +135,14 @@ def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
     }
 
 
-def _print_run(trajectory: Any, fault: Any, premises: Any, proved: str | None) -> None:
+def _print_run(trajectory: Any, fault: Any, premises: Any, proved: str) -> None:
     from quakedesign.report.terminal import print_run
 
     print_run(trajectory, fault, premises, console())
     if trajectory.energy:
         lost = f"{trajectory.energy.relative_residual:.2g} of the largest share"
         print_lines([f"  energy that the integration loses: {lost}"])
-    print_lines([f"  proved: {proved}"] if proved else [])
+    print_lines([f"  {proved}"] if proved else [])
 
 
 @app.command

@@ -78,6 +78,13 @@ def left_out_lines(comparison: "Compared") -> list[str]:
     return [f"Not designed, {', '.join(titles)}: {why}" for why, titles in named.items()]
 
 
+def proved_line(sentence: str | None, outside: list[str]) -> str:
+    """What is proved of the law of a run, and which options of the run the proof does not know; empty without one."""
+    if sentence is None:
+        return ""
+    return f"NOT proved of this run, by {', '.join(outside)}; without: {sentence}" if outside else f"proved: {sentence}"
+
+
 def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
     """Lines for people, from `HeldRun.to_dict`: outcome, errors, pressure, and what is proved where that is known."""
     outcome, found = answer["outcome"], answer["metrics"]
@@ -94,7 +101,7 @@ def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
         f"|ln(V/V_r)| at most {found['max_log_rate']:.3g}, slip error at most {found['max_slip_error']:.3g} m",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law asks for at most "
         f"{found['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
-        f"proved: {proved}" if (proved := answer["guarantee"]) else "no guarantee: what is said was seen in this run",
+        proved_line(answer["guarantee"], answer["outside"]) or "no guarantee: what is said was seen in this run",
     ]
 
 

@@ -311,6 +311,7 @@ class HeldRun:
             "steps": len(run.time),
             "run": dict(run.provenance),
             "guarantee": self.claim.sentence() if self.claim else None,
+            "outside": [],
         }
 
 

@@ -58,9 +58,39 @@ def test_it_runs_behind_its_lag_with_its_noise(file, capsys):
         capsys, "simulate", "real-fault", "--certificate", file, *SHORT, "--slip-noise", "1 nm", "--lag", "0.1 s",
         "--saturation", "20 MPa", "--json",
     )  # fmt: skip
-    run = json.loads(out)["run"]
+    answer = json.loads(out)
+    assert (answer["guarantee"], answer["outside"]) == (CLAIM.sentence(), ["saturation", "lag", "slip_noise"])
+    run = answer["run"]
     assert run["actuator"] == "Saturation(lowest=-20000000.0, highest=20000000.0), Lag(time_constant=0.1)"
     assert run["measurement"].startswith("Measurement(slip_noise=1e-09, ")
+
+
+@pytest.mark.parametrize(
+    ("more", "outside"),
+    [
+        ((), ""),
+        (("--lag", "20 ms", "--substeps", "20", "--seed", "3"), ""),
+        (("--saturation", "1 kPa"), "saturation"),
+        (("--plant", "coulomb", "--initial-slip", "1 mm"), "plant, initial_slip"),
+        (("--perturbation", "0.01"), "perturbation"),
+    ],
+)
+def test_a_run_that_is_not_what_is_proved_says_so(file, capsys, more, outside):
+    out = " ".join(told(capsys, "simulate", "real-fault", "--certificate", file, *SHORT, *more)[1].split())
+    if outside:
+        assert f"NOT proved of this run, by {outside}; without: from rest" in out
+        assert " proved: " not in out
+    else:
+        assert f"proved: {CLAIM.sentence()}" in out
+
+
+def test_a_start_for_which_a_law_is_proved_is_in_what_is_proved(capsys, tmp_path):
+    held = replace(HELD, initial_slip=F(1, 10**5))
+    claim = guarantee(task_of(REAL), held)
+    save_guarantee(claim, tmp_path / "law.json")
+    run = ("simulate", "real-fault", "--certificate", tmp_path / "law.json", *SHORT, "--json", "--initial-slip")
+    assert json.loads(told(capsys, *run, "10 um")[1])["outside"] == []
+    assert json.loads(told(capsys, *run, "11 um")[1])["outside"] == ["initial_slip"]
 
 
 def test_what_is_exported_says_first_what_it_is_for(file, capsys, tmp_path):

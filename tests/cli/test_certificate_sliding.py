@@ -49,6 +49,22 @@ def test_it_runs_with_its_step_and_rock_under_all_the_stress_that_it_is_proved_f
 
 
 @pytest.mark.parametrize(
+    ("more", "outside"),
+    [
+        ((), []),
+        (("--stress", "200 kPa"), ["stress"]),
+        (("--saturation", "1 MPa", "--slip-noise", "1 um", "--seed", "2"), ["saturation", "slip_noise"]),
+    ],
+)
+def test_a_run_that_is_not_what_is_proved_says_so(capsys, more, outside):
+    run = ("simulate", "crustal-patch", "--certificate", FILE, "--duration", "1000 s", *more)
+    assert json.loads(told(capsys, *run, "--json")[1])["outside"] == outside
+    said = " ".join(told(capsys, *run)[1].split())
+    assert ("NOT proved of this run, by " + ", ".join(outside) in said) == bool(outside)
+    assert (" proved: from steady sliding" in said) == (not outside)
+
+
+@pytest.mark.parametrize(
     ("fault", "more", "said"),
     [
         ("creeping-patch", (), "rate [m/s] 0.000001 there"),
