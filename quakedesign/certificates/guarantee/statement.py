@@ -242,6 +242,8 @@ def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuar
 
 
 def _slow_gains(task: Task, held: Held, slow_gain: SlowGain) -> Gains | NoGuarantee:
+    if held.longest_step:
+        return NoGuarantee(reason="samples that follow no clock have no slow gain", small_gain=None)
     loops = tuple(held.loop(task, model) for model in slow_gain.models(task))
     try:
         return slow_gains(loops, slow_gain.growth)
@@ -271,6 +273,8 @@ def _beyond_the_pump(held: Held, claims: Claims) -> str:
 
 
 def _bounds(task: Task, held: Held, loop: PeriodicLoop, reach: Reach | None = None) -> Bounds | NoGuarantee:
+    if reach is not None and not held.longest_step:
+        return NoGuarantee(reason="samples that follow a clock need no set", small_gain=None)
     if reach is not None:
         return reached_bounds(task, held, reach)
     if held.longest_step:

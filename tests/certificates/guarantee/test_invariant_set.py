@@ -22,6 +22,7 @@ from quakedesign.certificates.guarantee.files import guarantee_text, parse_guara
 from quakedesign.certificates.guarantee.inputs import channels_of
 from quakedesign.certificates.guarantee.invariant_set import _Between, reduced
 from quakedesign.certificates.guarantee.pump import Pump
+from quakedesign.certificates.guarantee.slow_gain import SlowGain
 from quakedesign.errors import CertificateError, ParameterError
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"
@@ -469,3 +470,18 @@ def test_sizes_that_others_hide_are_invalid_too():
 )
 def test_limits_of_a_set_are_said(place, new, said):
     assert said in standalone(changed(place, new))
+
+
+def test_a_slow_gain_which_is_of_a_clock_proves_nothing_without_one():
+    known, slow = claim(), SlowGain(parts=4, growth=F(1, 2))
+    for longest in (known.held.longest_step, F(1000)):
+        found = guarantee(known.task, replace(known.held, longest_step=longest), slow)
+        assert isinstance(found, NoGuarantee)
+    assert replace(known, slow_gain=slow).check() is Verdict.UNDECIDED
+    assert replace(known, slow_gain=slow, reach=None).check() is Verdict.UNDECIDED
+
+
+def test_with_a_clock_no_set_is_looked_at():
+    known = claim()
+    found = guarantee(known.task, replace(known.held, longest_step=F(0)), reach=known.reach)
+    assert "need no set" in found.reason
