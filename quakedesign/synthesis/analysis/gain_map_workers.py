@@ -125,7 +125,7 @@ class Screener:
         """Text of a certificate of a point at a level, or None; and solves."""
         before, loop = self._solves(), self.sheet.at(place, level)
         sweep = self._sweep(loop)
-        answer = None if sweep is None else sweep.solve(loop)
+        answer = None if sweep is None else sweep.solve(loop, anew=True)
         certificate = None
         if sweep is not None and answer is not None and answer.found:
             certificate = prove(sweep, loop, answer, self.sheet.subject)

@@ -63,10 +63,10 @@ class Cones:
         values = np.bincount(self.columns * count + self.parts, parts, minlength=len(self.margin) * count)
         return np.column_stack([self.margin, values.reshape(-1, count)])
 
-    def solve(self, parts: Any, accuracy: float) -> tuple[float, Any, Any] | None:
+    def solve(self, parts: Any, accuracy: float, *, anew: bool = False) -> tuple[float, Any, Any] | None:
         """Margin, a_j and L for the values of all parts, in the order of the rows; None if the solver fails twice."""
         self._numbers.value = np.bincount(self.slots, parts)
-        if not self.compiled.solve(accuracy, anew=False) and not self.compiled.solve(accuracy):
+        if not self.compiled.solve(accuracy, anew=anew) and not self.compiled.solve(accuracy):
             return None
         return -float(self._unit.dual_value), self._link.dual_value, self._moments.value
 

@@ -125,7 +125,9 @@ class Sweep:
         scale = balance(loop)
         return Frame(scale=scale, pace=self._in_units(scale).pace(self._features(values_of(loop))))
 
-    def solve(self, loop: Loop, frame: Frame | None = None, accuracy: float = ACCURACY) -> Screened | None:
+    def solve(
+        self, loop: Loop, frame: Frame | None = None, accuracy: float = ACCURACY, *, anew: bool = False
+    ) -> Screened | None:
         """Largest margin at one point; None if the solver fails.
 
         Parameters
@@ -135,6 +137,8 @@ class Sweep:
             Units; those of the point unless given. Margins in different units share their sign only.
         accuracy : float
             That the solver is asked for.
+        anew : bool
+            Whether no digit may depend on what was solved before.
 
         Raises
         ------
@@ -146,7 +150,7 @@ class Sweep:
         if not self.covers(loop):
             raise ValueError("the point has another structure. Compile a sweep for it.")
         values, units = values_of(loop), frame or self.frame(loop)
-        solution = self._in_units(units.scale).solve(self._features(values), units.pace, accuracy)
+        solution = self._in_units(units.scale).solve(self._features(values), units.pace, accuracy, anew=anew)
         self.solves += 1
         if solution is None:
             return None
@@ -235,10 +239,12 @@ class _Numbers:
         """What the products are multiplied by in every part."""
         return np.where(self.rate, self.coefficients / pace, self.coefficients)
 
-    def solve(self, features: Any, pace: float, accuracy: float) -> tuple[float, list[float], Any, float] | None:
+    def solve(
+        self, features: Any, pace: float, accuracy: float, *, anew: bool
+    ) -> tuple[float, list[float], Any, float] | None:
         """Margin, decision, derivative of the margin in every product, and seconds; None if the solver fails."""
         weights = self.weights(pace)
-        solution = self.cones.solve(weights * features[self.products], accuracy)
+        solution = self.cones.solve(weights * features[self.products], accuracy, anew=anew)
         if solution is None:
             return None
         margin, decision, moments = solution
