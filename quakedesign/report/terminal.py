@@ -147,7 +147,10 @@ def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", 
     console.print(run.name, style="bold")
     for sentence in run_sentences(run, fault):
         console.print(f"  {sentence}")
-    if run.provenance["controller"] != "none" and run.provenance["step"] != fault.sampling_time:
+    if "longest_interval" in run.provenance:
+        soonest, latest = (run.provenance[f"{end}_interval"] for end in ("shortest", "longest"))
+        console.print(f"  by no clock: each sample {soonest:.4g} s to {latest:.4g} s after the last, drawn anew")
+    elif run.provenance["controller"] != "none" and run.provenance["step"] != fault.sampling_time:
         console.print(f"  steps of {run.provenance['step']:.4g} s, not the fault's T_s = {fault.sampling_time:g} s")
     numbers = run.metrics.to_dict()
     if numbers["settled_from"] is not None:

@@ -189,7 +189,13 @@ def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
     path = {"a delay of": own.delay, "a lag of": own.lag, "rock of L^2/D =": own.diffusion} if own else {}
     between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
     behind = f"designed for {between} between its answer and the fault: the pressure is that to ask of the valve"
-    return tuple(filter(None, (controller.other_step(fault), behind if between else "")))
+    by_a_clock = (
+        f"to be called by a clock, once every {float(own.step):.6g} s, since the reference counts the calls: a case of "
+        "what is proved of samples by no clock"
+        if own and own.longest
+        else ""
+    )
+    return tuple(filter(None, (controller.other_step(fault), behind if between else "", by_a_clock)))
 
 
 def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, str]:

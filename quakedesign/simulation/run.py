@@ -162,6 +162,9 @@ def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveInte
     varied = {f"variation_{name}": value for name, value in zip(names(), recorder.loop.factors, strict=False)}
     pushed: dict[str, Any] = {"drift": load.drift} if load.drift else {}
     pushed |= {} if load.perturbation is None else {"perturbation": str(load.perturbation)}
+    clock = getattr(recorder.scheme, "clock", None)
+    if clock:
+        pushed |= {f"{end}_interval": getattr(clock, end) * recorder.step for end in ("shortest", "longest")}
     starts = zip(("initial_slip", "initial_slip_rate"), recorder.initial, strict=True)
     pushed |= {name: value for name, value in starts if value}
     return (

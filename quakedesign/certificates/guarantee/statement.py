@@ -62,7 +62,8 @@ class Guarantee:
     def __repr__(self) -> str:
         held, claims = self.held, self.claims
         errors = f"|e1| <= {claims.slip_error:.4g} m, |e2| <= {claims.slip_rate_error:.4g} m/s"
-        return f"Guarantee({self.task.name} held over {six_digits(held.step)} s: {errors})"
+        most = f" to {six_digits(held.longest_step)}" if held.longest_step else ""
+        return f"Guarantee({self.task.name} held over {six_digits(held.step)}{most} s: {errors})"
 
     @property
     def peak_slip_rate(self) -> UpperBound:

@@ -9,7 +9,7 @@ import casadi as ca
 from quakedesign.errors import ParameterError
 from quakedesign.loop.sensing.measurement import Measurement, generator, uniform
 
-GRAIN = 8  # steps of a simulation in the shortest interval
+GRAINS = range(8, 101)  # steps of a simulation in the shortest interval
 MOST_STEPS = 1000
 
 
@@ -44,8 +44,10 @@ class NoClock:
 
     @classmethod
     def of(cls, shortest: Fraction, longest: Fraction) -> Self:
-        """In eighths of the shortest interval [s], none longer than the longest [s]."""
-        return cls(shortest=GRAIN, longest=min(int(GRAIN * longest / shortest), MOST_STEPS))
+        """In 8 to 100 steps of the shortest interval [s], so many that the longest is nearly reached, never passed."""
+        ratio = longest / shortest
+        grain = max(GRAINS, key=lambda count: (Fraction(int(count * ratio), count), -count))
+        return cls(shortest=grain, longest=min(int(grain * ratio), MOST_STEPS))
 
     @property
     def start(self) -> tuple[float, ...]:

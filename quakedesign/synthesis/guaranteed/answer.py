@@ -13,6 +13,7 @@ from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.fault import Fault
 from quakedesign.loop import LinearLaw, RestLimit
 from quakedesign.loop.sensing.differences import least_bound
+from quakedesign.rationals import float_above
 from quakedesign.sos.exact.strict import texts
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
@@ -177,7 +178,7 @@ class Answer:
                 "shorter": shorter,
             }
         bounds, held = self.found.bounds(), self.found.held
-        small = None if isinstance(bounds, NoGuarantee) else float(bounds.small_gain)
+        small = None if isinstance(bounds, NoGuarantee) else float_above(bounds.small_gain)
         return {
             "verdict": "proved",
             "guarantee": self.found.sentence(),

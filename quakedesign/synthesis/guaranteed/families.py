@@ -76,7 +76,7 @@ def why_no_law(step: Fraction, measured: str, around: Around) -> str:
     if around.get("longest_step") and measured != MEASURED[0]:
         return "samples that follow no clock are designed for with slip and slip rate measured"
     if measured == MEASURED[2] and any(around.get(name) for name in _NOT_BY_DIFFERENCES):
-        return "what a differentiator tells is known from rest, on time, for a well at the fault"
+        return "what a differentiator tells is known from rest, at the instants of a clock, without a lag or rock"
     if not around.get("diffusion"):
         return ""
     if SHORTEST * around["diffusion"] < step:

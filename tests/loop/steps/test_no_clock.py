@@ -17,6 +17,7 @@ from quakedesign.loop.actuators.delay import Delay
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.loop.steps.no_clock import MOST_STEPS, NoClock
+from quakedesign.simulation.export import controller_step
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"
 FAULT, STEPS = load_fault("lab-fault"), 4000
@@ -100,5 +101,19 @@ def test_a_delay_within_a_step_is_refused():
 
 
 def test_grains_never_reach_beyond_the_longest_interval():
-    assert (NoClock.of(F(1), F("1.3")).longest, NoClock.of(F(1), F(2)).longest) == (10, 16)
-    assert NoClock.of(F(1), F(10**6)).longest == MOST_STEPS
+    known = {F(2): (8, 16), F("1.3"): (10, 13), F(25, 23): (23, 25), F(50, 49): (49, 50), F(10**6): (8, MOST_STEPS)}
+    for ratio, steps in known.items():
+        found = NoClock.of(F(3), 3 * ratio)
+        assert (found.shortest, found.longest) == steps
+    drawn = NoClock.of(F(1, 3), F("0.4321"))
+    assert F("1.2963") - F(1, 100) < F(drawn.longest, drawn.shortest) <= F("1.2963")
+
+
+def test_a_run_says_its_intervals_and_what_is_exported_that_a_clock_calls_it():
+    assert [seen().provenance[f"{end}_interval"] for end in ("shortest", "longest")] == [0.001, 0.002]
+    assert any("to be called by a clock, once every 0.001 s" in line for line in remarks_of(claim().controller))
+    assert not any("by a clock" in line for line in remarks_of(replace(claim().controller, longest=F(0))))
+
+
+def remarks_of(law):
+    return controller_step(FAULT, law).remarks
