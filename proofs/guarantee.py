@@ -11,7 +11,7 @@ from typing import Any
 from guarantee_bounds import bounds
 from guarantee_invariant_set import bounds_within, read_reach
 from guarantee_loop import read_loop
-from guarantee_reading import Row, keys, lower, need, numbers, upper
+from guarantee_reading import Row, entries, keys, lower, need, numbers, upper
 from guarantee_root import root_within
 from guarantee_slow import read_slow
 from guarantee_task import Task, read_task
@@ -77,7 +77,7 @@ def verify(document: dict[str, Any]) -> list[str]:
         "rate" not in pump or claims[STEP] <= pump["rate"] * pump["ramp"],
         "the largest step that is claimed must be made within the ramp of the pump",
     )
-    return statement(document, task, claims, small)
+    return [*statement(document, task, claims, small), *entries(document)]
 
 
 def read_start(value: Any) -> Row:

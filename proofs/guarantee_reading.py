@@ -1,13 +1,20 @@
 """What a certificate of the kind ``guarantee`` is read with: texts, rationals, rows, and why a file is refused."""
 
+import json
 import re
+from collections.abc import Iterator
+from decimal import Decimal
 from fractions import Fraction
+from hashlib import sha256
 from typing import Any
 
 from exact_numbers import Refused
 
 RATIONAL = re.compile(r"-?(0|[1-9][0-9]{0,399})(/[1-9][0-9]{0,399})?")
 Row = list[Fraction]
+NAMES = ("name", "states")  # nothing depends on them
+LISTED = 64  # entries of a list that are printed
+LONGEST = 24  # characters of a fraction that are printed
 
 
 def need(condition: bool, reason: str) -> None:
@@ -81,3 +88,66 @@ def inside(low: Fraction, high: Fraction) -> str:
         if Fraction(ends[0]) < Fraction(ends[1]):
             return f"in [{ends[0]}, {ends[1]}]"
     return f"in [{low}, {high}]"
+
+
+def entries(document: dict[str, Any]) -> list[str]:
+    """Everything that a file states, claims included: every entry but names, SI units, and what tells it from others.
+
+    What is rounded is marked; the SHA-256 is that of all entries but names and claims, as JSON with sorted keys.
+    """
+    parts = {key: unnamed(value) for key, value in document.items() if key not in ("format", "kind")}
+    claims = parts.pop("claims")
+    bounds = (f"{name} {(lower if name.startswith('least') else upper)(Fraction(claims[name]), 6)}" for name in sorted(claims))
+    canonical = json.dumps(parts, sort_keys=True, separators=(",", ":"))
+    return [
+        "entries, in SI units of FORMAT.md; ~ is rounded to nearest, claims outward:",
+        *(f"{key}: {'; '.join(written(parts[key]))}" for key in sorted(parts)),
+        f"claims: {', '.join(bounds)}",
+        f"SHA-256 of the entries without claims: {sha256(canonical.encode()).hexdigest()}",
+    ]
+
+
+def unnamed(value: Any) -> Any:
+    """The same without names."""
+    if type(value) is dict:
+        return {key: unnamed(entry) for key, entry in value.items() if key not in NAMES}
+    return value
+
+
+def written(value: Any, name: str = "") -> Iterator[str]:
+    """Plain entries of an object in one text, then its objects, each behind its name; keys are sorted."""
+    if type(value) is not dict:
+        yield plain(value)
+        return
+    flat = [f"{key} {plain(value[key])}" for key in sorted(value) if type(value[key]) is not dict]
+    if flat:
+        yield f"{name} " * bool(name) + ", ".join(flat)
+    for key in sorted(value):
+        if type(value[key]) is dict:
+            yield from written(value[key], f"{name} {key}".strip())
+
+
+def plain(value: Any) -> str:
+    """An entry of a list, or a list; a long one by how many entries it has."""
+    if type(value) is list:
+        many = leaves(value)
+        return f"({many} entries)" if many > LISTED else f"[{', '.join(map(plain, value))}]"
+    if type(value) is dict:
+        return f"{{{'; '.join(written(value))}}}"
+    canonical = type(value) is str and RATIONAL.fullmatch(value) is not None
+    return short(Fraction(value)) if canonical else str(value)
+
+
+def leaves(value: Any) -> int:
+    """How many entries there are; an empty list is one."""
+    parts = value.values() if type(value) is dict else value if type(value) is list else []
+    return sum(map(leaves, parts)) or 1
+
+
+def short(value: Fraction) -> str:
+    """A number itself in at most 15 digits or as a short fraction, else about it in six digits."""
+    numerator, denominator = Decimal(value.numerator), Decimal(value.denominator)
+    for text in (f"{float(numerator / denominator):.15g}", str(value)):
+        if len(text) <= LONGEST and "n" not in text and Fraction(text) == value:
+            return text
+    return f"~{numerator / denominator:.6g}"

@@ -13,7 +13,7 @@ from guarantee_bounds import peaks_of
 from guarantee_gains import gains
 from guarantee_loop import Loop, read_loop
 from guarantee_numbers import unit
-from guarantee_reading import Row, exact, inside, keys, lower, need, number, numbers, row, upper
+from guarantee_reading import Row, entries, exact, inside, keys, lower, need, number, numbers, row, upper
 from guarantee_task import FAULT, Task
 
 MAX_CELLS = 64
@@ -368,7 +368,7 @@ def verify(document: dict[str, Any]) -> list[str]:
         small = max(small, gain)
         for name in CLAIMS:
             need(found[name] < claims[name], f"the claim {name} must follow from all claims on every cell. It does not")
-    return statement(document, fault, claims, len(boxes), small)
+    return [*statement(document, fault, claims, len(boxes), small), *entries(document)]
 
 
 def statement(

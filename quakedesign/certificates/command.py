@@ -9,6 +9,7 @@ from quakedesign import fault as faults
 from quakedesign.certificates import guarantee, slow_sliding
 from quakedesign.certificates.certificate import Certificate
 from quakedesign.certificates.claim import Verdict
+from quakedesign.certificates.entries import entry_lines
 from quakedesign.certificates.files import evidence_of, read_json
 from quakedesign.certificates.kinds import ATTRACTION, GUARANTEE, LOOP, SLOW_SLIDING, kind_of
 from quakedesign.errors import CertificateError, WorkError
@@ -68,7 +69,8 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     claim = guarantee.read_guarantee(raw)
     if claim.check() is not Verdict.PROVED:
         raise CertificateError("the claims do not follow from the loop and the fault's data")
-    lines = [f"fault {claim.task.name}, by the data in the file", claim.sentence()]
+    about = entry_lines(guarantee.guarantee_document(claim))
+    lines = [f"fault {claim.task.name}, by the data in the file", claim.sentence(), *about]
     if fault is not None:
         if claim.task != _task(claim, fault):
             raise CertificateError(f"the data are not those of {fault.name}")

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from quakedesign.certificates.guarantee.continuous import ContinuousPeaks as ContinuousPeaks
     from quakedesign.certificates.guarantee.continuous import continuous_peaks as continuous_peaks
     from quakedesign.certificates.guarantee.fault_data import task_of as task_of
+    from quakedesign.certificates.guarantee.files import guarantee_document as guarantee_document
     from quakedesign.certificates.guarantee.files import read_guarantee as read_guarantee
     from quakedesign.certificates.guarantee.held import Held as Held
     from quakedesign.certificates.guarantee.slow_gain import SlowGain as SlowGain

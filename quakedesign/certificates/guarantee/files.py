@@ -58,12 +58,17 @@ _MOST_STATES = 20
 _ZERO = Fraction(0)
 
 
-def guarantee_text(claim: Claim) -> str:
-    """Text of the file."""
+def guarantee_document(claim: Claim) -> dict[str, Any]:
+    """What stands in the file."""
     about = _of_sliding(claim) if isinstance(claim, SlidingGuarantee) else _of_tracking(claim)
     bounds = {part.name: getattr(claim.claims, part.name) for part in fields(claim.claims)}
     claims = {name: bound.exact for name, bound in bounds.items() if bound is not None}
-    return json.dumps({"format": 1, **about, "claims": claims}, indent=1) + "\n"
+    return {"format": 1, **about, "claims": claims}
+
+
+def guarantee_text(claim: Claim) -> str:
+    """Text of the file."""
+    return json.dumps(guarantee_document(claim), indent=1) + "\n"
 
 
 def load_guarantee(path: str | Path) -> Claim:
