@@ -17,7 +17,7 @@ from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.attraction_files import read as read_attraction
 from quakedesign.sos.exact.attraction_words import claim_words
 from quakedesign.sos.exact.polynomial_files import read as read_polynomial_file
-from quakedesign.sos.exact.words import sentences
+from quakedesign.sos.exact.words import sentences, statement_words
 from quakedesign.symbolic.terms import written
 
 if TYPE_CHECKING:
@@ -103,7 +103,8 @@ def _polynomial(raw: Any) -> tuple[str, list[str]]:
     if not answer.check():
         raise CertificateError("the proof does not decide the statement")
     kind = "proved" if answer.verdict is Positivity.SOS else "refuted"
-    return kind, [line for line in sentences(answer) if not line.endswith("exact arithmetic")]
+    lines = [line for line in sentences(answer) if not line.endswith("exact arithmetic")]
+    return kind, [*lines, *statement_words(answer)]
 
 
 def _attraction(raw: Any) -> tuple[str, list[str]]:
@@ -119,11 +120,21 @@ def statement(certificate: Certificate) -> list[str]:
     loop = certificate.loop
     lines = [f"law {loop.law}, field equal to the law's own"]
     lines.append(", ".join(f"{name} = {v}" for name, v in loop.parameters.items()))
+    weights = ", ".join(f"{name} = {weight}" for name, weight in loop.states.items())
+    lines.append(f"domain: {loop.domain}; states with weights: {weights}")
     lines.append(", ".join(f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()))
+    lines += [
+        f"{name} in [{low}, {high}] is the positive square root of {of}" for name, (of, (low, high)) in loop.roots.items()
+    ]
+    lines += [f"argument of a nested power: {lift} = {written(terms)}" for lift, terms in loop.lifts.items()]
     lines += [f"{state}' = {written(terms)}" for state, terms in loop.field.items()]
     if certificate.refutation is not None:
-        point = ", ".join(f"{name}: {v}" for name, v in certificate.refutation.point.items())
-        return [*lines, f"Filippov equilibrium away from the origin, in cell coordinates {point}"]
+        found = certificate.refutation
+        point = ", ".join(f"{name}: {v}" for name, v in found.point.items())
+        lines.append(f"Filippov equilibrium away from the origin, in cell coordinates {point}")
+        for of, values in (("parameters", found.parameters), ("weights of the cells", found.weights)):
+            lines += [f"{of}: {', '.join(f'{name} = {v}' for name, v in values.items())}"] if values else []
+        return lines
     lines.append("V = " + " + ".join(f"({written([term])})" for term in certificate.lyapunov))
     lines.append("SignedPower(x, a) is |x|^a with the sign of x, AbsolutePower(x, a) is |x|^a")
     lines.append("claims: " + ", ".join(f"{name} {v}" for name, v in certificate.claims.items()))

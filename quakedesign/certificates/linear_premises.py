@@ -9,7 +9,7 @@ from quakedesign.certificates.premise import Premise
 from quakedesign.certificates.sectors import rest_pressure, sectors
 from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import float_above, rational
 
 
 def linear_premises(fault: Fault, controller: Controller, certificate: Certificate | None) -> list[Premise]:
@@ -60,7 +60,7 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
         ),
         Premise(
             name="vanishing_disturbance",
-            required=fault.disturbance.largest_explicit,
+            required=float_above(fault.disturbance_bounds[0]),
             certified=0.0,
             unit="m/s^2",
             note="for one that does not vanish see the certified peaks",

@@ -111,7 +111,7 @@ def _reference_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
 def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
     """Ranges of all that h' and its sensitivities depend on, but the errors: friction in its bounds and slopes."""
     friction, disturbance = friction_bounds(fault.friction), fault.disturbance
-    value, change = disturbance.exact_bounds
+    value, change = fault.disturbance_bounds
     growth = rational(disturbance.slip_growth), rational(disturbance.rate_growth)
     return plant_ranges(fault) | {
         stage: (Fraction(0), Fraction(1)),
@@ -177,4 +177,4 @@ def largest_sensitivities(
 def initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
     """Bound on |h| at t = 0, x = 0: the disturbance over β, friction at its static value; no feed-forward there."""
     static, least = static_friction(fault), plant_ranges(fault)[plant.N_hat][0]
-    return fault.disturbance.exact_bounds[0] * divisor / (static * least)
+    return fault.disturbance_bounds[0] * divisor / (static * least)

@@ -14,8 +14,11 @@ if TYPE_CHECKING:
     import sympy as sp
 
 
-def acceleration(quantity: Any, authority: Fraction, name: str) -> float:
-    """Value [m/s²] of a text such as ``"1e-4 m/s^2"``, or of a shear stress on a fault such as ``"35 kPa"``.
+STRESSES = ("constant", "amplitude")
+
+
+def acceleration(quantity: Any, authority: Fraction, name: str) -> tuple[float, bool]:
+    """Value [m/s²], and whether it was given as a stress, of a text such as ``"1e-4 m/s^2"``, or of a shear stress on a fault such as ``"35 kPa"``.
 
     A stress τ accelerates a fault by τA/m: rounded up in size, so that what is proved of the float is so of the stress.
 
@@ -35,7 +38,7 @@ def acceleration(quantity: Any, authority: Fraction, name: str) -> float:
         For a stress that is no size of anything on this fault.
     """
     try:
-        return si_value(quantity, "m/s^2", name)
+        return si_value(quantity, "m/s^2", name), False
     except UnitError as error:
         try:
             stress = rational(si_value(quantity, "Pa", name), name)
@@ -48,7 +51,7 @@ def acceleration(quantity: Any, authority: Fraction, name: str) -> float:
     size = float(exact)
     while rational(size) < exact:  # the decimal that proofs read
         size = nextafter(size, inf)
-    return size if stress >= 0 else -size
+    return (size if stress >= 0 else -size), True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,6 +70,9 @@ class Disturbance:
         [1/s²].
     rate_growth : float
         [1/s].
+    stresses : tuple of str
+        Which of ``constant`` and ``amplitude`` were given as a shear stress: proofs cover it for every area per mass of
+        the fault's box, while the number itself is for the nominal one.
     """
 
     constant: float = field(default=0.0, metadata={"unit": "m/s^2"})
@@ -74,11 +80,12 @@ class Disturbance:
     frequency: float = field(default=0.0, metadata={"unit": "rad/s"})
     slip_growth: float = field(default=0.0, metadata={"unit": "1/s^2"})
     rate_growth: float = field(default=0.0, metadata={"unit": "1/s"})
+    stresses: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         require_finite(constant=self.constant, slip_growth=self.slip_growth, rate_growth=self.rate_growth)
         require_nonnegative(amplitude=self.amplitude, frequency=self.frequency)
-        require_ordinary(**{each.name: getattr(self, each.name) for each in fields(self)})
+        require_ordinary(**{each.name: getattr(self, each.name) for each in fields(self) if "unit" in each.metadata})
 
     def acceleration(self, slip: "sp.Expr", rate: "sp.Expr", time: "sp.Expr") -> "sp.Expr":
         """φ̂_e [m/s²] at a slip [m], slip rate [m/s] and time [s]."""
@@ -102,8 +109,12 @@ class Disturbance:
         """Bound on the time derivative of that part [m/s³]."""
         return self.amplitude * self.frequency
 
-    @property
-    def exact_bounds(self) -> tuple[Fraction, Fraction]:
-        """Both bounds [m/s²] and [m/s³] of the decimals given, for proofs: of floats they may be rounded inward."""
-        amplitude = rational(self.amplitude)
-        return abs(rational(self.constant)) + amplitude, amplitude * rational(self.frequency)
+    def exact_bounds(self, width: Fraction = Fraction(0)) -> tuple[Fraction, Fraction]:
+        """Both bounds [m/s²] and [m/s³] of the decimals given, for proofs: of floats they may be rounded inward.
+
+        A stress accelerates by up to 1 + `width` times as much, the half-width of the area per mass [-].
+        """
+        constant, amplitude = (
+            abs(rational(getattr(self, name))) * (1 + width * (name in self.stresses)) for name in STRESSES
+        )
+        return constant + amplitude, amplitude * rational(self.frequency)

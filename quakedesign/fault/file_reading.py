@@ -68,8 +68,10 @@ def load_fault(source: str | Path, *, box: str | None = None, disturbance: str |
         raise ParameterError(
             f"a disturbance of friction with a state is a stress of its own. Received {disturbance!r}. Give --stress."
         )
-    amplitude = acceleration(disturbance, fault.exact_authority, "disturbance")
-    return fault.with_disturbance(replace(fault.disturbance, amplitude=amplitude))
+    amplitude, stressed = acceleration(disturbance, fault.exact_authority, "disturbance")
+    stresses = {*fault.disturbance.stresses} - {"amplitude"} | ({"amplitude"} if stressed else set())
+    changed = replace(fault.disturbance, amplitude=amplitude, stresses=tuple(sorted(stresses)))
+    return fault.with_disturbance(changed)
 
 
 def parse_fault(text: str, name: str) -> Fault:
@@ -165,14 +167,20 @@ def _assumed(parts: Mapping[str, Any], table: Table) -> tuple[str, ...]:
 
 
 def _disturbance(table: Table | None, problems: Problems, authority: Fraction) -> Disturbance | None:
+    stresses = []
+
     def value(quantity: Any, unit: str, name: str) -> float:
-        return acceleration(quantity, authority, name) if unit == "m/s^2" else si_value(quantity, unit, name)
+        if unit != "m/s^2":
+            return si_value(quantity, unit, name)
+        size, stressed = acceleration(quantity, authority, name)
+        stresses.extend([name.rpartition(".")[2]] if stressed else [])
+        return size
 
     read: dict[str, Any] = {**table.quantities(DISTURBANCE, optional=True, read=value)} if table else {}
     if table:
         table.close()
     with problems.collected():
-        return None if None in read.values() else Disturbance(**read)
+        return None if None in read.values() else Disturbance(**read, stresses=tuple(sorted(stresses)))
     return None
 
 

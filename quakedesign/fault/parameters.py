@@ -111,6 +111,11 @@ class Fault:
         """Return the same fault with a named uncertainty box."""
         return replace(self, box=uncertainty_box(name))
 
+    @property
+    def disturbance_bounds(self) -> tuple[Fraction, Fraction]:
+        """Bounds of the disturbance [m/s²] and of its rate [m/s³]; of a stress for every area per mass of the box."""
+        return self.disturbance.exact_bounds(self.box.authority)
+
     def with_disturbance(self, disturbance: Disturbance) -> "Fault":
         """Return the same fault under another disturbance."""
         return replace(self, disturbance=disturbance)

@@ -5,15 +5,17 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields
+from math import inf, nextafter
 from typing import Any
 
-from quakedesign.fault.disturbance import Disturbance
+from quakedesign.fault.disturbance import Disturbance, acceleration
 from quakedesign.fault.file_reading import DISTURBANCE, OPTIONAL, PLANT, TASK, WIDTHS
 from quakedesign.fault.friction import FrictionLaw, friction_law, friction_laws
 from quakedesign.fault.parameters import Fault
 from quakedesign.fault.reference import Reference
 from quakedesign.fault.uncertainty import BOXES, UncertaintyBox
 from quakedesign.fault.units import units_of
+from quakedesign.rationals import float_below, rational
 
 SCHEMA_NAME = "fault.schema.json"
 _EXAMPLES: dict[str, str | float] = {
@@ -60,7 +62,7 @@ def fault_toml(fault: Fault) -> str:
     named: dict[str, Mapping[str, Any]] = {
         "friction": {"law": fault.friction.name} | _law_values(fault.friction),
         "task": _values(fault.reference, TASK) | {"sampling_time": f"{fault.sampling_time!r} s"},
-        "disturbance": _values(fault.disturbance, DISTURBANCE),
+        "disturbance": _values(fault.disturbance, DISTURBANCE) | _stresses(fault),
         "uncertainty": {key: float(getattr(fault.box, key)) for key in WIDTHS},
     }
     top: dict[str, Any] = {"name": fault.name, "source": fault.source} | _values(fault, PLANT)
@@ -78,6 +80,18 @@ def _values(part: object, units: Mapping[str, str]) -> dict[str, Any]:
     return {
         key: (f"{value!r} {units[key]}" if units[key] else value) for key, value in held.items() if value is not None
     }
+
+
+def _stresses(fault: Fault) -> dict[str, str]:
+    """What of the disturbance was given as a stress: the least float that is read as no less."""
+    found = {}
+    for name in fault.disturbance.stresses:
+        size = abs(getattr(fault.disturbance, name))
+        stress = nextafter(float_below(rational(size) / fault.exact_authority), 0)
+        while acceleration(f"{stress!r} Pa", fault.exact_authority, name)[0] < size:
+            stress = nextafter(stress, inf)
+        found[name] = f"{stress if getattr(fault.disturbance, name) >= 0 else -stress!r} Pa"
+    return found
 
 
 def _law_values(law: FrictionLaw) -> dict[str, Any]:

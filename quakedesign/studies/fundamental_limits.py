@@ -165,7 +165,7 @@ class Limits:
     @property
     def against(self) -> str:
         """The disturbances that are meant."""
-        return f"any disturbance of at most {self.fault.disturbance.largest_explicit:.6g} m/s^2"
+        return f"any disturbance of at most {float(self.fault.disturbance_bounds[0]):.6g} m/s^2"
 
     @property
     def achieved(self) -> list[tuple[Fraction, UpperBound]]:
@@ -186,7 +186,7 @@ class Limits:
         return {
             "fault": self.fault.name,
             "box": self.fault.box.name,
-            "disturbance": self.fault.disturbance.largest_explicit,
+            "disturbance": float(self.fault.disturbance_bounds[0]),
             "class": "amplitude",
             "step": self.fault.sampling_time,
             "withdrawal": float(self.withdrawal),

@@ -33,8 +33,8 @@ def test_exact_bounds_are_those_of_the_decimals_where_floats_round_inward():
     given = Disturbance(constant=-0.1, amplitude=0.7, frequency=0.1)
     assert given.largest_explicit < 0.8
     assert given.largest_rate < 0.07
-    assert given.exact_bounds == (Fraction("0.8"), Fraction("0.07"))
-    assert FULL.exact_bounds == (Fraction(5, 2), 6)
+    assert given.exact_bounds() == (Fraction("0.8"), Fraction("0.07"))
+    assert FULL.exact_bounds() == (Fraction(5, 2), 6)
 
 
 def test_the_real_fault_feels_what_the_paper_simulates():

@@ -8,8 +8,10 @@ from importlib.resources import files
 
 import pytest
 
+from quakedesign.certificates.guarantee import task_of
 from quakedesign.errors import ParameterError, ScenarioError, UnitError, UnknownNameError
 from quakedesign.fault import friction_law, load_fault, parse_fault, presets
+from quakedesign.fault.template import fault_toml
 from quakedesign.rationals import rational
 
 REAL = (files("quakedesign.fault") / "presets" / "real-fault.toml").read_text(encoding="utf-8")
@@ -303,6 +305,41 @@ def test_a_disturbance_is_an_acceleration_or_a_shear_stress_on_the_fault(told, a
 def test_a_constant_stress_keeps_its_sign_and_a_wider_patch_its_shorter_side():
     text = edited(AMPLITUDE, 'constant = "-35 kPa"').replace(LENGTH, 'length = "50 km"\nwidth = "5 km"')
     assert parse_fault(text, "own.toml").disturbance.constant == -0.0028
+
+
+STRESSED = [("2 kPa", "1e-4 m/s^2", ("amplitude",)), ("1e-4 m/s^2", "-3 kPa", ("constant",)),
+            ("2 kPa", "-3 kPa", ("amplitude", "constant")), ("1e-4 m/s^2", "1e-4 m/s^2", ())]  # fmt: skip
+
+
+@pytest.mark.parametrize(("amplitude", "constant", "stresses"), STRESSED)
+@pytest.mark.parametrize("width", ["0", "1/10"])
+def test_a_stress_is_covered_for_every_area_per_mass_of_the_box(amplitude, constant, stresses, width):
+    """τ accelerates by τ/(ρL), ρL = 2500 kg/m³ · 5 km, and by up to a tenth more where that is uncertain."""
+    text = edited(AMPLITUDE, f'amplitude = "{amplitude}"\nconstant = "{constant}"')
+    fault = parse_fault(text, "own.toml").with_box("paper" if width == "0" else "ten-percent")
+    sizes = {"2 kPa": F(2000, 12500000), "-3 kPa": F(3000, 12500000), "1e-4 m/s^2": F(1, 10000)}
+    wide = {name: sizes[said] * (1 + F(width) * said.endswith("Pa")) for name, said in
+            (("amplitude", amplitude), ("constant", constant))}  # fmt: skip
+    assert fault.disturbance.stresses == stresses
+    assert fault.disturbance_bounds == (sum(wide.values()), wide["amplitude"] * F("0.69"))
+    assert task_of(fault).amplitude == sum(wide.values())
+    assert fault.disturbance.largest_explicit == pytest.approx(float(sizes[amplitude] + sizes[constant]))
+
+
+def test_another_disturbance_takes_the_place_of_a_stress_and_a_stress_that_of_another(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(edited(AMPLITUDE, 'amplitude = "2 kPa"'))
+    assert load_fault(path, disturbance="1e-4 m/s^2").disturbance.stresses == ()
+    path.write_text(REAL)
+    assert load_fault(path).disturbance.stresses == ()
+    assert load_fault(path, disturbance="3 kPa").disturbance.stresses == ("amplitude",)
+
+
+@pytest.mark.parametrize(("stress", "density"), [("2 kPa", "2500"), ("-0.35 bar", "2617.3"), ("0 Pa", "3"), ("7 Pa", "0.3")])
+def test_a_stress_is_written_as_one_and_read_again(stress, density):
+    text = edited(AMPLITUDE, f'constant = "{stress}"').replace("2500 kg", f"{density} kg")
+    fault = parse_fault(text, "own.toml")
+    assert parse_fault(fault_toml(fault), "again.toml") == fault
 
 
 def test_a_stress_is_never_made_a_smaller_acceleration():

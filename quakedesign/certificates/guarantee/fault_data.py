@@ -28,7 +28,7 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
     """
     fault.require_memoryless("a guarantee of tracking")
     law, given, box = friction_bounds(fault.friction), fault.disturbance, fault.box
-    amplitude, change = given.exact_bounds
+    amplitude, change = fault.disturbance_bounds
     if rate_limited and given.constant:
         raise ParameterError(
             "the class rate needs a disturbance that starts at 0. Received a constant one of "

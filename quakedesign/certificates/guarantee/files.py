@@ -189,7 +189,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         root = claim.held.law.root
         own |= {} if root is None else {"root": _root_document(root)}
         noise = claim.held.noise
-        own |= {"noise": {name: str(noise.get(f"{name}_noise", 0)) for name in _NOISE}} if noise else {}
+        own |= {"noise": {name: str(noise.get(f"{name}_noise", 0)) for name in _NOISE}} if any(noise.values()) else {}
         jitter = dict(zip(_JITTER, (claim.held.jitter, claim.held.delay_jitter), strict=True))
         jitter |= {"mean": claim.held.averaging} if claim.held.averaging else {}
         own |= {"jitter": {name: str(v) for name, v in jitter.items()}} if any(jitter.values()) else {}

@@ -14,7 +14,8 @@ def claim_words(claim: Attraction) -> list[str]:
     lines = [f"{name}' = {polynomial_words(f, names)}" for name, f in zip(names, claim.field, strict=True)]
     lines.append(f"V = {polynomial_words(claim.lyapunov, names)}")
     if isinstance(claim.proof, Point):
-        return [*lines, *_point_words(claim)]
+        level = [f"level {claim.level} is not proved by V"] if claim.level is not None else []
+        return [*lines, *level, *_point_words(claim)]
     if claim.proof is None:
         return lines
     return [*lines, f"every solution {_start(claim)} tends to the origin, which is asymptotically stable"]

@@ -49,6 +49,20 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
     return lines if answer.proof is not None else [*lines[:-1], f"{answer.seconds:.2f} s"]
 
 
+def statement_words(answer: Answer) -> list[str]:
+    """What `sentences` leaves out of a statement: its whole polynomial, its products and degree, and a functional."""
+    asked = answer.statement
+    whole = polynomial_words(asked.polynomial, asked.variables)
+    products = ("*".join(f"[{i}]" for i in chosen) or "1" for chosen in asked.products)
+    lines = [f"polynomial: {whole}"] if _short(whole) != whole else []
+    lines.append(f"products: {', '.join(products)}; degree: {asked.degree}")
+    if isinstance(answer.proof, Functional):
+        values = sorted(answer.proof.values.items(), reverse=True)
+        told = (f"L({polynomial_words({e: Fraction(1)}, asked.variables)}) = {value}" for e, value in values)
+        lines.append(f"functional, zero on all other monomials: {', '.join(told)}")
+    return lines
+
+
 def _reason(answer: Answer) -> list[str]:
     proof, asked = answer.proof, answer.statement
     if isinstance(proof, SumOfSquares):

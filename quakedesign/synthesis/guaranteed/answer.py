@@ -141,7 +141,7 @@ class Answer:
         own = isinstance(self.found, Guarantee) and self.found.task.change is None
         if not own or given.constant or not given.largest_rate:
             return []
-        change = UpperBound(given.exact_bounds[1])
+        change = UpperBound(self.fault.disturbance_bounds[1])
         return [
             f"this covers disturbances that jump; the fault's own changes by at most {change:.3g} m/s^3, for which the "
             "class rate may prove much less"

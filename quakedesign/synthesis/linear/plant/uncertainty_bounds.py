@@ -139,7 +139,7 @@ def _terms(fault: Fault, sectors: Sectors, ranges: Any, values: Any, drift: Frac
     k, eta = ranges[plant.k_hat], ranges[plant.eta_hat]
     lowest = sectors.slip[0] + k[1] - rational(disturbance.slip_growth)  # 0 where σ' − p* stays positive
     growth = [rational(v) for v in (disturbance.slip_growth, disturbance.rate_growth)]
-    shaking, _ = disturbance.exact_bounds
+    shaking, _ = fault.disturbance_bounds
     return [
         ("friction chord slope", "slip", (lowest, slip_chord)),
         ("stiffness", "slip", (values[plant.k_hat] - k[1], values[plant.k_hat] - k[0])),

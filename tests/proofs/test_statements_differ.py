@@ -1,0 +1,176 @@
+"""Files that state different things never print the same text: every entry of every kind of file, in both checkers."""
+
+import copy
+import importlib.util
+import json
+import re
+from fractions import Fraction as F
+from pathlib import Path
+
+import pytest
+from standalone_guarantee import CHECK
+
+from quakedesign.certificates import checking
+from quakedesign.certificates.command import check_files
+from quakedesign.certificates.entries import entry_lines
+from quakedesign.certificates.guarantee import guarantee_document, read_guarantee
+from quakedesign.errors import CertificateError
+
+CERTIFICATES = Path(__file__).parents[2] / "proofs" / "certificates"
+RATIONAL = re.compile(r"-?\d+(/\d+)?")
+
+
+def beside(name):
+    """Another module of tests, with the files that it makes by hand."""
+    specification = importlib.util.spec_from_file_location(f"{name}_differ", Path(__file__).with_name(f"{name}.py"))
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+LOOPS, POLYNOMIALS = beside("test_check"), beside("test_check_polynomials")
+REGIONS, GUARANTEES = beside("test_check_attraction"), beside("test_guarantee_reading")
+entries = CHECK.beside("guarantee_reading").entries
+
+
+def numbers(value, path=()):
+    """Every rational but 0 and every integer of a document, with the path to it."""
+    if isinstance(value, dict | list):
+        for key, entry in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from numbers(entry, (*path, key))
+    elif (isinstance(value, str) and RATIONAL.fullmatch(value) and F(value)) or type(value) is int:
+        yield path, value
+
+
+def others(value):
+    """Two per cent more and less; of an integer the next one."""
+    return [value + 1] if type(value) is int else [str(F(value) * share) for share in (F(51, 50), F(49, 50))]
+
+
+def changed(document, path, new):
+    document = copy.deepcopy(document)
+    holder = document
+    for key in path[:-1]:
+        holder = holder[key]
+    holder[path[-1]] = new
+    return document
+
+
+def variants(document):
+    return [(path, changed(document, path, new)) for path, value in numbers(document) for new in others(value)]
+
+
+def standalone(document):
+    try:
+        found = CHECK.check(json.dumps(document))
+    except CHECK.Refused:
+        return None
+    return found.verdict, found.statement
+
+
+def package(document, folder):
+    (folder / "file.json").write_text(json.dumps(document))
+    ((verdict, said),) = check_files([folder / "file.json"]).values()
+    return (verdict, said) if verdict in ("proved", "refuted") else None
+
+
+BY_HAND = [*LOOPS.PROOFS, *LOOPS.REFUTATIONS, *POLYNOMIALS.ALL,
+           REGIONS.cubic, REGIONS.everywhere, REGIONS.refuted, REGIONS.turning]  # fmt: skip
+
+
+@pytest.mark.parametrize("make", BY_HAND, ids=lambda make: make.__name__)
+def test_a_proof_with_another_number_is_refused_or_says_so(make, tmp_path, monkeypatch):
+    monkeypatch.setattr(checking, "_same_field", lambda loop, law: None)
+    document = make()
+    said = standalone(document), package(document, tmp_path)
+    assert None not in said
+    for path, other in variants(document):
+        assert standalone(other) != said[0], path
+        assert package(other, tmp_path) != said[1], path
+
+
+def start(raw):
+    return raw | {"start": {"slip": "1/9", "rate": "1/7"}}
+
+
+FREE = GUARANTEES.changed(GUARANTEES.HELD, (("loop", "longest"), "2")) | {
+    "reach": {"inputs": ["1", "2"], "facets": [["1", "1/3", "1"]], "at_samples": [[[0]]], "between": [[[0]]]}
+}
+SLIDING = json.loads((CERTIFICATES / "sliding_crustal-patch.json").read_text())
+SLIDING["fault"]["density"] = "1"
+SLIDING["reference"]["swing"] = "1/10"
+GIVEN = {
+    "jitter": GUARANTEES.changed(GUARANTEES.JITTERY, (("loop", "jitter", "mean"), "1/9")),
+    "start": start(GUARANTEES.changed(GUARANTEES.HELD, (("loop", "first"), [["1", "2"]]))),
+    "limits": GUARANTEES.changed(GUARANTEES.PUMPED, (("loop", "applied"), ["1/7"])),
+    "sliding": SLIDING,
+    "stored": json.loads((CERTIFICATES / "guarantee_real-fault.json").read_text()),
+} | {name.lower(): getattr(GUARANTEES, name) for name in ("ROOTED", "BEHIND", "CONTINUOUS", "LAYERED", "NOISY", "BOTH")}
+
+
+def reread(document):
+    """Entries as the package reads them; None where it refuses the file."""
+    try:
+        return entry_lines(guarantee_document(read_guarantee(document)))
+    except CertificateError:
+        return None
+
+
+@pytest.mark.usefixtures("coarse")
+@pytest.mark.parametrize("document", GIVEN.values(), ids=GIVEN)
+def test_every_entry_of_a_guarantee_stands_below_it_whatever_is_proved(document, monkeypatch):
+    said = entries(document)
+    assert reread(document) == said
+    for path, other in variants(document):
+        if path == ("format",):
+            continue
+        assert entries(other) != said, path
+        assert reread(other) in (None, entries(other)), path
+
+
+coarse = GUARANTEES.coarse
+
+
+def test_names_are_no_entries():
+    other = GUARANTEES.changed(GUARANTEES.HELD, (("fault", "name"), "another"), (("loop", "states"), ["y"]))
+    assert entries(other) == entries(GUARANTEES.HELD)
+    assert "another" not in " ".join(reread(other))
+
+
+def test_numbers_are_themselves_or_marked_and_claims_lie_outside():
+    document = GUARANTEES.changed(
+        GUARANTEES.HELD,
+        (("disturbance", "amplitude"), "1/" + "3" * 40),
+        (("fault", "density"), "7" * 30),
+        (("fault", "length"), "1" + "0" * 399),
+        (("claims", "slip_error"), "1/3"),
+        (("claims", "least_pressure"), "-1/3"),
+    )
+    said = "\n".join(reread(document))
+    assert "disturbance: amplitude ~3.00000e-40, change 1/7; growths rate -1/9, slip 1/9\n" in said
+    assert "density ~7.77778e+29, length ~1.00000e+399, normal_stress 9, " in said
+    assert "least_pressure -0.333334" in said
+    assert "slip_error 0.333334" in said
+
+
+@pytest.mark.parametrize("many", [1, 70])
+def test_long_lists_are_counted_and_still_tell_files_apart(many):
+    document = changed(FREE, ("reach", "facets"), [["1", "1/3", "1"]] * many)
+    document = changed(document, ("reach", "at_samples"), [[[0]]] * many)
+    said = entries(document)
+    assert entry_lines(document) == said
+    assert any("at_samples (70 entries), between [[[0]]], facets (210 entries)" in line for line in said) is (many > 1)
+    for path, other in variants(document):
+        if path != ("format",):
+            assert entries(other) != said, path
+            assert entry_lines(other) == entries(other), path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["guarantee_lab-fault", "sliding_crustal-patch"])
+def test_a_stored_guarantee_with_another_number_is_refused_or_says_so(name, tmp_path):
+    document = json.loads((CERTIFICATES / f"{name}.json").read_text())
+    said = standalone(document), package(document, tmp_path)
+    for path, other in variants(document):
+        assert standalone(other) != said[0], path
+        assert package(other, tmp_path) != said[1], path
