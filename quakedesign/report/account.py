@@ -129,8 +129,8 @@ def _slowly(entry: "Entry") -> list[str]:
 def badge(entry: "Entry") -> str:
     """Verdict in two or three words."""
     if entry.guaranteed is not None:
-        step = entry.design.controller.sampling_time if entry.design.other_step and entry.design.controller else None
-        return f"guaranteed at {step:.4g} s only" if step else "guaranteed as it runs"
+        step = entry.design.fault.sampling_time
+        return f"not guaranteed at T_s = {step:g} s" if entry.design.other_step else "guaranteed as it runs"
     found = entry.design.verdict
     return "proved in continuous time only" if found is Verdict.PROVED else str(found)
 

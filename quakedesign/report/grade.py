@@ -24,7 +24,8 @@ GRADES = (
 def grade(entry: "Entry") -> str:
     """Verdict on one controller, and what of its loop and task the proof leaves out."""
     if entry.guaranteed is not None:
-        return f"{_guaranteed(entry.guaranteed)}{_unmet(entry)}"
+        other = f"{entry.design.other_step_first}; " if entry.design.other_step else ""
+        return f"{other}{_guaranteed(entry.guaranteed)}{_unmet(entry)}"
     if entry.design.verdict is not Verdict.PROVED:
         return str(entry.design.verdict)
     missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _held(entry)
@@ -37,7 +38,8 @@ def _guaranteed(found: "Guarantee | SlidingGuarantee") -> str:
 
 
 def _unmet(entry: "Entry") -> str:
-    failing = [_failing(p) for p in entry.design.conditions if not p.holds]
+    own = ("sampling_time",) * bool(entry.design.other_step)
+    failing = [_failing(p) for p in entry.design.conditions if not p.holds and p.name not in own]
     return f", but {'; '.join(failing)}" if failing else ""
 
 

@@ -23,8 +23,7 @@ def guarantee_lines(entry: "Entry") -> list[str]:
     if entry.answer is None:
         return []
     asked = entry.design.details.get("reason") if entry.answer.proved else None
-    fault = entry.design.fault
-    too_long = [f"T_s = {fault.sampling_time:g} s is too long ({asked}): designed for a shorter one"] if asked else []
+    too_long = [f"{entry.design.other_step_first}: {asked}"] if asked else []
     first, *rest = entry.answer.lines()
     return [*too_long, f"guarantee: {first.removeprefix('proved: ')}", *rest, *_reach(entry)]
 

@@ -100,6 +100,14 @@ class Design:
         """That a law of samples does not run at the fault's T_s, for which it is not proved; empty if it does."""
         return self.controller.other_step(self.fault) if self.controller else ""
 
+    @property
+    def other_step_first(self) -> str:
+        """That nothing is guaranteed at the fault's own T_s, before what is for another; empty if its T_s runs."""
+        if not self.other_step or self.controller is None:
+            return ""
+        own = f"not guaranteed at T_s = {self.fault.sampling_time:g} s"
+        return f"{own}; designed for T_s = {self.controller.sampling_time:.4g} s"
+
     def with_premise(self, premise: Premise) -> "Design":
         """Return the design with one more premise, such as one read off a run."""
         return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
@@ -163,7 +171,7 @@ class Design:
 
     def __repr__(self) -> str:
         gains = ", ".join(f"{name} = {value}" for name, value in self.gains.items()) or "none"
-        verdict = ", ".join(filter(None, (str(self.verdict), self.other_step)))
+        verdict = ": ".join(filter(None, (self.other_step_first, str(self.verdict))))
         return f"Design of {self.title} for {self.fault.name}: {verdict}; gains {gains}"
 
     def _repr_html_(self) -> str:
@@ -174,5 +182,5 @@ class Design:
             for p in self.premises
         )
         head = "<tr><th>premise</th><th>required</th><th>certified</th><th>holds</th></tr>"
-        verdict = ", ".join(filter(None, (str(self.verdict), self.other_step)))
+        verdict = ": ".join(filter(None, (self.other_step_first, str(self.verdict))))
         return f"<b>{self.title}: {escape(verdict)}</b><br>{escape(gains)}<table>{head}{rows}</table>"

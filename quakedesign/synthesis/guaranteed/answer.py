@@ -1,6 +1,7 @@
 """What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds."""
 
 from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
 from math import log
 from typing import Any
 
@@ -46,6 +47,8 @@ class Answer:
         Of a search on the same loop; None without a guarantee.
     shorter : Guarantee or None
         For a design without a guarantee at its step: one near the longest step that has one.
+    asked_step : Fraction or None
+        T_s [s] that has no guarantee where `shorter` has one.
     compensation : Compensation or None
         Gains, scale and settings of a sliding mode that runs in the scheme ``compensated``.
     """
@@ -55,6 +58,7 @@ class Answer:
     worst: WorstFound | None = None
     worst_with_stick: WorstFound | None = None
     shorter: Guarantee | None = None
+    asked_step: Fraction | None = None
     compensation: Compensation | None = None
 
     @property
@@ -66,6 +70,8 @@ class Answer:
         """For people: the sentence first, then what was seen."""
         if not isinstance(self.found, Guarantee):
             said = [self.found.sentence()]
+            if self.asked_step is not None:
+                said = [f"not guaranteed at T_s = {float(self.asked_step):g} s: {self.found.reason}"]
             if self.shorter is not None:
                 said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             return [*said, "the command limits tells for which T_s, delays and wells designs of this fault have one"]

@@ -13,9 +13,11 @@ import quakedesign as qd
 from quakedesign.bounds import UpperBound
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
+from quakedesign.cli.design import positive
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
 from quakedesign.report import account, headlines, page
+from quakedesign.report.grade import grade
 from quakedesign.synthesis import answer, assess
 from quakedesign.synthesis.guaranteed import design_held, reached
 
@@ -82,10 +84,17 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert "even the nominal loop is not stable" in design.details["reason"]
     found = premises(design)["sampling_time"]
     assert (found.holds, found.certified) == (False, step)
-    said = f"NOT for the fault's T_s = 0.1 s: it runs once every {float(step):.4g} s"
-    assert said in repr(design)
-    assert said.replace("'", "&#x27;") in design._repr_html_()
+    assert design.other_step == f"NOT for the fault's T_s = 0.1 s: it runs once every {float(step):.4g} s"
+    said = f"not guaranteed at T_s = 0.1 s; designed for T_s = {float(step):.4g} s"
+    assert f": {said}: proved; gains" in repr(design)
+    assert f": {said}: proved</b>" in design._repr_html_()
     entry = SimpleNamespace(design=design, guaranteed=design.guarantee)
+    assert grade(entry).startswith(f"{said}; guaranteed: slip rate <= ")
+    assert "fails" not in grade(entry)
+    assert not positive(SimpleNamespace(of=lambda _: (SimpleNamespace(design=design, run=None),)))
+    proved = SimpleNamespace(proved=True, lines=lambda: ["proved: it"], limit_lines=list)
+    first = SimpleNamespace(design=design, answer=proved)
+    assert headlines.guarantee_lines(first)[0] == f"{said}: {design.details['reason']}"
     monkeypatch.setattr(page, "_natural", lambda _: "an earthquake")
     told = page.answer(SimpleNamespace(of=lambda _: (entry,), left_out={}))
     assert told[:2] == ["an earthquake", f"e-LQR: {said}"]
@@ -96,9 +105,10 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     without = SimpleNamespace(design=design.with_premise(late), answer=SimpleNamespace(limit_lines=list))
     assert headlines.limit_lines(without)[0].endswith(" s no delay was found with one")
     assert late.sides == ("0 s", "0 s")
-    assert account.badge(entry) == f"guaranteed at {float(step):.4g} s only"
+    assert account.badge(entry) == "not guaranteed at T_s = 0.1 s"
     real = SimpleNamespace(design=designed("real"), guaranteed=designed("real").guarantee)
     assert account.badge(real) == "guaranteed as it runs"
+    assert grade(real).startswith("guaranteed: slip rate <= ")
     # the same law held over the fault's own T_s has none
     assert guarantee(task_of(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
 
