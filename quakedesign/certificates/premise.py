@@ -7,6 +7,8 @@ from typing import Any
 
 from quakedesign.bounds import LowerBound, UpperBound
 
+_MOST_DIGITS = 40
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Premise:
@@ -58,7 +60,11 @@ class Premise:
         unit = "" if self.unit == "-" else f" {self.unit}"
         if self.required == self.certified != 0:
             return f"at most {self.required:.4g}{unit}", "the same number"
-        return f"{self.required:.4g}{unit}", f"{self.certified:.4g}{unit}"
+        for digits in range(4, _MOST_DIGITS):  # as many as it takes to see that what holds does
+            required, certified = (f"{side:.{digits}g}" for side in (self.required, self.certified))
+            if not self.holds or Fraction(required) <= Fraction(certified):
+                return f"{required}{unit}", f"{certified}{unit}"
+        return f"{self.required:.4g}{unit}", "no less"
 
     def to_dict(self) -> dict[str, Any]:
         """Keys of DESIGN.md and the unit; None for what is infinite."""

@@ -197,12 +197,15 @@ class Fault:
 
     @property
     def seismic_moment(self) -> float:
-        """M0 = nh³Δτ [N·m], eq. magnitude; nan for friction with a state: see `moment_of`."""
-        return float(self.squares) * self.side**3 * self.stress_drop
+        """M0 = GAD [N·m] of the rest slip D; 0 for a stable fault, nan for friction with a state: see `moment_of`.
+
+        The paper's nh³Δτ is that of a fault on which friction loses all that it can.
+        """
+        return self.moment_of(self.rest_slip)
 
     @property
     def magnitude(self) -> float:
-        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity without a stress drop, nan as `seismic_moment`."""
+        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity for a stable fault, nan as `seismic_moment`."""
         return magnitude(self.seismic_moment)
 
     def moment_of(self, slip: float) -> float:

@@ -57,7 +57,8 @@ def uncontrolled(comparison: "Compared") -> Any:
     rate.plot(run.time / divisor, run.slip_rate, color=NATURAL)
     rate.set_ylabel("slip rate [m/s]")
     rate.set_xlabel(f"time [{name}]")
-    return finish(drawing, f"{fault.name} without control: magnitude {fault.magnitude:.2f}", [run])
+    event = f"magnitude {fault.magnitude:.2f}" if fault.seismic_moment > 0 else "no earthquake"
+    return finish(drawing, f"{fault.name} without control: {event}", [run])
 
 
 def end(*runs: "Run") -> float:

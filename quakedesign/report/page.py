@@ -92,7 +92,8 @@ def answer(comparison: "Compared") -> list[str]:
             title = entry.design.title
             proved[title] = f"{entry.guaranteed.peak_slip_rate:.3g} m/s ({title})"
             covers = entry.guaranteed.covers
-    faster = {e.design.title: e.design.other_step for e in designed if e.design.title in proved and e.design.other_step}
+    others = ((e.design.title, e.design.other_step_first) for e in designed)
+    faster = {title: said for title, said in others if said and title in proved}
     lines += [f"{title}: {said}" for title, said in faster.items()]
     if proved:
         lines.append(
@@ -118,7 +119,7 @@ def _natural(comparison: "Compared") -> str:
     fault, run = comparison.fault, comparison.uncontrolled
     if isinstance(run, StateRun):
         return cycle_sentence(run)
-    size = f" of magnitude {fault.magnitude:.2f}" if run.outcome.kind == "earthquake" and fault.stress_drop > 0 else ""
+    size = f" of magnitude {fault.magnitude:.2f}" if run.outcome.kind == "earthquake" and fault.seismic_moment > 0 else ""
     rate = run.outcome.peak_slip_rate
     return f"Without control: {run.outcome.kind}{size}" + ("" if rate is None else f", slip rate up to {rate:.3g} m/s")
 

@@ -4,7 +4,7 @@ from fractions import Fraction
 from math import isfinite
 from typing import Any
 
-from quakedesign.bounds import LowerBound
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.guarantee import task_of
 from quakedesign.certificates.impossibility import longest_reaction
 from quakedesign.errors import ParameterError, UnsupportedError
@@ -33,7 +33,7 @@ def fault_dict(fault: Fault) -> dict[str, Any]:
         "assumed": list(fault.assumed),
         "natural_frequency": fault.natural_frequency,
         "damping_ratio": fault.damping_ratio,
-        "seismic_moment": _known(fault.seismic_moment),
+        "seismic_moment": _known(fault.seismic_moment) or None,
         "magnitude": _known(fault.magnitude),
         "rest_slip": _known(fault.rest_slip),
         "unstable": model.unstable,
@@ -89,11 +89,12 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
     """Whether T_s is short enough for the instability, and which one would be."""
     if adequacy.adequate_step is None:
         return f"T_s = {adequacy.step:.4g} s: nothing grows between two samples"
+    pole = f"at most {UpperBound(adequacy.pole):.4g}" if adequacy.over_box else f"{adequacy.pole:.4g}"
     where = "over the uncertainty box" if adequacy.over_box else "of the nominal fault"
     longest = LowerBound(Fraction(adequacy.adequate_step)).quantity("s")
     judged = "is adequate" if adequacy.adequate else "is LONGER than a rule of thumb for the instability allows"
     return (
-        f"T_s = {adequacy.step:.4g} s {judged}: times the unstable pole, {adequacy.pole:.4g} 1/s {where}, it is "
+        f"T_s = {adequacy.step:.4g} s {judged}: times the unstable pole, {pole} 1/s {where}, it is "
         f"{adequacy.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
         f"{'' if adequacy.adequate else '; guarantee says whether something is proved at this T_s all the same'}"
     )
@@ -161,8 +162,8 @@ def _event(fault: Fault) -> list[str]:
     if fault.friction.state_names:
         depends = "stress drop, magnitude and slip of an event depend on its history"
         return [f"{depends}: simulate a cycle (simulate --start late)", task]
-    magnitude = f"{fault.magnitude:.2f}" if fault.stress_drop > 0 else "none (no stress drop)"
+    moment = f"seismic moment {fault.seismic_moment:.4g} N·m, magnitude {fault.magnitude:.2f}"
     return [
-        f"seismic moment {fault.seismic_moment:.4g} N·m, magnitude {magnitude}",
+        moment if fault.seismic_moment > 0 else "no earthquake, so no seismic moment and no magnitude",
         f"next rest slip {fault.rest_slip:.4g} m, {task}{beyond_rest(fault)}",
     ]

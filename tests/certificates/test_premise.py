@@ -23,6 +23,23 @@ def test_what_is_required_is_rounded_up_and_what_is_certified_down():
     assert type(premise(0.5, 1.0).required) is type(premise(0.5, 1.0).ratio) is UpperBound
 
 
+@pytest.mark.parametrize(
+    ("required", "certified", "sides"),
+    [
+        (F(3353, 2353), F(57, 40), ("1.425 m/s", "1.425 m/s")),
+        (F(14245, 10000), F(14246, 10000), ("1.4245 m/s", "1.4246 m/s")),
+        (F(14245, 10000), F(14244, 10000), ("1.425 m/s", "1.424 m/s")),
+        (F(1, 3), F(1, 3) + F(1, 10**9), ("0.333333334 m/s", "0.333333334 m/s")),
+        (F(1, 3), F(1, 3) + F(1, 10**90), ("0.3334 m/s", "no less")),
+        (F(10**400, 3), F(10**401), ("3.334e+399 m/s", "1e+401 m/s")),
+    ],
+)
+def test_what_holds_is_seen_to_hold(required, certified, sides):
+    one = premise(required, certified)
+    assert one.sides == sides
+    assert one.holds is (required <= certified)
+
+
 def test_a_premise_is_about_a_proof_and_no_measurement_unless_told():
     assert premise(1.0, 2.0).holds
     assert not premise(1.0, 2.0).measured

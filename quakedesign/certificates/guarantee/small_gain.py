@@ -82,7 +82,7 @@ from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Any
 
-from quakedesign.bounds import UpperBound
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee.flow_norms import flow_norms
 from quakedesign.certificates.guarantee.inputs import (
@@ -309,6 +309,6 @@ def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoGuara
     (name, share), whole = max(alone.items(), key=lambda item: item[1]), UpperBound(small_gain)
     what = _WORDS.get(name, _LEFT_OUT)
     return NoGuarantee(
-        reason=f"small gain {whole:.3g}, which must be below 1: the {what} alone makes {UpperBound(share):.2g}",
+        reason=f"small gain {whole:.3g}, which must be below 1: the {what} alone makes {LowerBound(share):.3g}",
         small_gain=whole,
     )

@@ -193,7 +193,8 @@ def guarantee(
             return found
         ramp = above(found.needs / held.pump.rate * _RAMP_ROOM)
         if ramp > longest:
-            return found
+            late = held.pump.too_slow(UpperBound(found.needs), longest)
+            return replace(found, reason=late) if late else found
         found = _proved(task, replace(held, ramp=ramp), slow_gain)
     return found
 

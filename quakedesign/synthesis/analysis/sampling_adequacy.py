@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from quakedesign.certificates.sectors import sectors
+from quakedesign.certificates.guarantee import task_of
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.symbolic import derive
@@ -98,10 +98,10 @@ def _box_poles(fault: Fault) -> list[complex]:
         When no finite range of s is found, or friction has a state.
     """
     fault.require_memoryless("the range of unstable poles")
-    needed = sectors(fault)
+    task = task_of(fault)
     poles = []
-    for slope in map(float, needed.slip):
-        for damping in map(float, needed.rate):
+    for slope in map(float, task.slip_chord):
+        for damping in map(float, task.rate_chord):
             root = cmath.sqrt(damping**2 + 4 * slope)
             poles += [(-damping + root) / 2, (-damping - root) / 2]
     return poles
