@@ -28,8 +28,9 @@ def outcome_sentence(run: Trajectory) -> str:
     outcome = run.outcome
     if outcome.peak_slip_rate is None:
         return f"{outcome.kind} at {run.events['diverged']:.4g} s"
+    over = f"; its numbers overflow at {run.events['diverged']:.4g} s" if "diverged" in run.events else ""
     opened = f" at {run.events['opening']:.4g} s (p >= σ')" if outcome.kind == "opened" else ""
-    return f"{outcome.kind}{opened}: peak slip rate {outcome.peak_slip_rate:.3g} m/s, {_beside_natural(run)}"
+    return f"{outcome.kind}{opened}: peak slip rate {outcome.peak_slip_rate:.3g} m/s, {_beside_natural(run)}{over}"
 
 
 def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:

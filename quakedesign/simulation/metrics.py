@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+_FASTEST = 1e6  # m/s: far above an earthquake, and below what a plant reaches whose motion overflows
 EVENTS = ("diverged", "opening", "reverse_slip", "stick")
 
 
@@ -15,7 +16,7 @@ def _figure(unit: str) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metrics:
-    """Figures of one run; those that do not apply, and all of a diverged run, are None.
+    """Figures of one run; those that do not apply are None, and all of a diverged run but its peak.
 
     All but `peak_slip_rate`, `max_h_rate` and the two extreme pressures are taken over t > settled_from.
 
@@ -133,7 +134,9 @@ def metrics(
     signals = list(further)
     kind = ActuatorMetrics if signals else StickMetrics if sticks else Metrics
     if watched["diverged"] >= 0:
-        return kind(settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
+        peak = watched["peak_slip_rate"]  # of a plant that stays finite where the numbers of its law overflow
+        known = {"peak_slip_rate": peak} if peak <= _FASTEST else {}
+        return kind(**known, settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
     figures = _whole_run(watched, step) | _settled(watched) | _ranges(watched, signals) if controlled else {}
     figures["peak_slip_rate"] = watched["peak_slip_rate"]
     if sticks:

@@ -7,6 +7,7 @@ from typing import Any
 from quakedesign.fault import Fault
 
 KINDS = ("tracked", "slow slip", "earthquake", "diverged", "opened")
+HARMLESS = ("tracked", "slow slip")
 EARTHQUAKE_SHARE = 0.1
 """Of the natural peak: a run that goes faster than its reference by this share or more is an earthquake."""
 TRACKED_SHARE = 0.01
@@ -24,7 +25,7 @@ class Outcome:
     kind : str
         One of `KINDS`.
     peak_slip_rate : float or None
-        Largest |x2| of the whole run [m/s]; None for a run that diverged.
+        Largest |x2| of the whole run [m/s], or until the numbers of its law overflow; None where those of the plant do.
     share_of_natural : float or None
         The same over the peak of the natural earthquake [-]; None also for a fault that has none.
     """
@@ -36,7 +37,7 @@ class Outcome:
     @property
     def harmless(self) -> bool:
         """Whether the run neither is an earthquake nor diverges nor opens the fault."""
-        return self.kind in ("tracked", "slow slip")
+        return self.kind in HARMLESS
 
     def to_dict(self) -> dict[str, Any]:
         """Keys of DESIGN.md."""
@@ -49,12 +50,12 @@ class OutcomeCriterion:
 
     In this order, a run is
 
-    - ``diverged``, or ``opened``, if that event happened;
+    - ``diverged``, if the motion of the plant overflows; ``opened``, if that event happened;
     - ``tracked``, if it has a controller, its slip error never exceeds 2 % of the target slip (over the time in which
       errors count), and its slip rate never exceeds the largest of the reference by more than 1 % of the natural peak
       (over the whole run);
     - an ``earthquake``, if its slip rate exceeds that of the reference by 10 % of the natural peak or more at any time;
-    - ``slow slip`` otherwise.
+    - ``slow slip`` otherwise, or ``diverged`` if the numbers of its law overflow, after which nothing is known.
 
     A stable fault has no natural earthquake. What it is compared with instead is the speed at which its own spring and
     mass would swing through the whole target slip, ω_n·d_max; friction with a state always with its `dynamic_rate`.
@@ -98,7 +99,7 @@ class OutcomeCriterion:
         Parameters
         ----------
         peak_slip_rate : float or None
-            [m/s].
+            [m/s]; None where the motion of the plant overflows.
         max_slip_error : float or None
             [m]; where none counts, because the run is too short, the slip rate alone decides.
         events : mapping of str to float
@@ -106,10 +107,11 @@ class OutcomeCriterion:
         followed : bool
             Whether there was a controller, and so a reference to follow.
         """
-        if "diverged" in events or peak_slip_rate is None:
+        if peak_slip_rate is None:
             return Outcome(kind="diverged", peak_slip_rate=None, share_of_natural=None)
         share = peak_slip_rate / self.natural_peak if self.natural_peak else None
         kind = "opened" if "opening" in events else self._kind(peak_slip_rate, max_slip_error or 0.0, followed)
+        kind = "diverged" if "diverged" in events and kind in HARMLESS else kind
         return Outcome(kind=kind, peak_slip_rate=peak_slip_rate, share_of_natural=share)
 
     def _kind(self, peak_slip_rate: float, slip_error: float, followed: bool) -> str:

@@ -2,13 +2,17 @@
 
 import json
 from dataclasses import replace
+from fractions import Fraction as F
 from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy as sp
 
 from quakedesign.controllers import control_law, published
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.loop import LinearLaw, SampledController
+from quakedesign.report.outcomes import outcome_sentence
 from quakedesign.simulation import Outcome, OutcomeCriterion, memoryless_earthquake, natural_earthquake, simulate
 from quakedesign.simulation.campaign import SampleResult, campaign_problem
 from quakedesign.simulation.campaign.result import Campaign
@@ -35,6 +39,9 @@ CRITERION = OutcomeCriterion(natural_peak=0.5, inertial_rate=1.0, reference_rate
         (0.126, 0.0, {"opening": 1.0}, "opened"),
         (0.9, 0.0, {"opening": 1.0}, "opened"),
         (None, None, {"opening": 1.0, "diverged": 2.0}, "diverged"),
+        (0.9, None, {"diverged": 2.0}, "earthquake"),
+        (0.9, None, {"opening": 1.0, "diverged": 2.0}, "opened"),
+        (0.126, None, {"diverged": 2.0}, "diverged"),
     ],
 )
 def test_a_tenth_of_the_natural_peak_beyond_the_reference_is_an_earthquake_a_hundredth_is_not_tracked(
@@ -107,6 +114,35 @@ def test_a_loop_that_diverges_or_opens_says_so():
     sooner = simulate(REAL, law, scheme="explicit", duration=run.events["opening"] + 1)
     assert "diverged" not in sooner.events
     assert sooner.outcome.kind == "opened"
+
+
+class Clipped(SampledController):
+    """A law that cuts off its pressure itself and does not tell its states."""
+
+    def pressure(self, signals):
+        return sp.Max(-300000, sp.Min(300000, super().pressure(signals)))
+
+
+def doubling(push):
+    """Law of samples that asks for z Pa, z doubled at every sample from one metre of slip error on."""
+    law = LinearLaw(states=("z",), update=((F(2),),), measured=((F(push), F(0)),), output=(F(1),), feedback=(F(0), F(0)))
+    return Clipped(law=law, step=F("0.184"))
+
+
+@pytest.mark.parametrize(("push", "kind"), [("1e12", "earthquake"), ("-1e12", "diverged")])
+def test_an_earthquake_stays_one_where_the_numbers_of_the_law_overflow(push, kind):
+    """What doubles is beyond 1e100 after 2^303, and the fault feels 0.3 MPa: pushed on it runs, held back it rests."""
+    run = simulate(REAL, doubling(push), duration=100.0, initial_slip=1e-3, plant="coulomb")
+    assert run.outcome.kind == kind
+    assert 290 < run.events["diverged"] / 0.184 < 340
+    assert run.outcome.peak_slip_rate == run.metrics.peak_slip_rate
+    peak = run.outcome.peak_slip_rate
+    assert (peak > 0.1 * natural_peak(REAL)) is (kind == "earthquake")
+    assert run.outcome.share_of_natural == peak / natural_peak(REAL)
+    assert peak >= run.slip_rate.max() * (1 - 1e-9)
+    assert run.metrics.max_pressure is None
+    assert f"{kind}: peak slip rate" in outcome_sentence(run)
+    assert outcome_sentence(run).endswith(f"its numbers overflow at {run.events['diverged']:.4g} s")
 
 
 def test_every_file_of_a_run_holds_its_outcome():

@@ -23,7 +23,7 @@ NOT_COMPARED = ("settled_from", "steps", "seconds")
 
 @dataclass(frozen=True, kw_only=True)
 class SampleResult:
-    """What is known of a sample that has been run; a diverged one has events, but no figures.
+    """What is known of a sample that has been run; a diverged one has events, and its peak slip rate at most.
 
     Attributes
     ----------

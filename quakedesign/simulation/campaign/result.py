@@ -242,7 +242,7 @@ class Campaign:
 
 def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
     """Names of the metrics that any of the results has, in order."""
-    return tuple(dict.fromkeys(name for result in results for name in result.figures))
+    return tuple(dict.fromkeys(name for result in results if not result.diverged for name in result.figures))
 
 
 def require_metric(metric: str, known: Sequence[str]) -> None:
@@ -259,7 +259,7 @@ def require_metric(metric: str, known: Sequence[str]) -> None:
 
 def badness(result: SampleResult, metric: str) -> float:
     """Value of a metric, or its negative where less is worse; infinite for a diverged sample, or one too large."""
-    if metric not in result.figures:
+    if result.diverged or metric not in result.figures:
         return math.inf
     value = result.figures[metric]
     return -value if metric in _LESS_IS_WORSE else value
