@@ -13,8 +13,9 @@ SOURCE, HEADER = "controller.c", "controller.h"
 _WIDTH = 110
 _USE = """
 Call controller_reset once, and controller_step every CONTROLLER_STEP seconds: it reads CONTROLLER_MEASUREMENTS
-numbers, updates CONTROLLER_MEMORY numbers, and writes the fluid pressure [Pa] to hold until the next call (zero-order
-hold). The reference of the fault is computed from the number of calls. The functions keep nothing between calls but the
+numbers and the pressure [Pa] that was applied since the last call, updates CONTROLLER_MEMORY numbers, and writes the
+fluid pressure [Pa] to hold until the next call (zero-order hold). Where pump or valve limit the pressure, tell it what
+was applied: the law does not wind up then, as in simulate --saturation; else give a null pointer. The reference of the fault is computed from the number of calls. The functions keep nothing between calls but the
 memory they are given, allocate nothing, and may be called from several threads with different memories. Numbers that
 are not finite are not caught: check measurement and pressure.
 """
@@ -28,7 +29,7 @@ class ControllerStep:
     Attributes
     ----------
     function : casadi.Function
-        (measurement, memory) → memory, pressure [Pa].
+        (measurement, applied pressure since the last sample [Pa], memory) → memory, pressure [Pa].
     measurement : mapping of str to str
         Unit of every measured signal, in order.
     start : mapping of str to float
@@ -86,7 +87,13 @@ def source_text(exported: ControllerStep, header: str) -> str:
     generator = ca.CodeGenerator("sampled_step.c", {"with_export": False})
     generator.add(exported.function)
     start = ",\n".join(f"    {value!r}" for value in exported.start.values())
-    return generator.dump() + c_file("controller.c", header=header, start=start, **_sizes(exported.function))
+    return generator.dump() + c_file(
+        "controller.c",
+        header=header,
+        start=start,
+        held=list(exported.start).index("held_0"),
+        **_sizes(exported.function),
+    )
 
 
 def _sizes(function: Any) -> dict[str, int]:

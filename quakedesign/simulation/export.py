@@ -22,6 +22,7 @@ from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.run import library_versions
 
 FILES = (HEADER, SOURCE, UNIT)
+HELD = "held_0"  # of the memory: the pressure of the sample before
 _TOLD = ("gains", "sampling")  # in other words
 
 
@@ -160,17 +161,25 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     values = [0.0] * len(loop.integrals) + list(numbers.values())
     free = [ca.SX.sym(name) for name in names]
     after = _after(loop, scheme, ca.SX.sym("sample"), ca.vertcat(ca.SX.sym("x", 2), *free), step)
-    changing = [not ca.is_equal(after[i], symbol) for i, symbol in enumerate(free)]
+    changing = [names[i] == HELD or not ca.is_equal(after[i], symbol) for i, symbol in enumerate(free)]
     start = {"sample": 0.0} | {n: v for n, v, c in zip(names, values, changing, strict=True) if c}
+    count = len(loop.integrals)
+    winding = {"push": 0.0} | {f"before_{name}": 0.0 for name in names[:count]} if count else {}
+    start |= winding
     memory, measurement = ca.SX.sym("memory", len(start)), ca.SX.sym("measurement", measured)
-    entries = iter(ca.vertsplit(memory))
+    applied, entries = ca.SX.sym("applied"), iter(ca.vertsplit(memory))
     counter = next(entries)
     own = [next(entries) if c else ca.SX(v) for v, c in zip(values, changing, strict=True)]
+    push, *before = entries if count else (None,)
+    asked, own[names.index(HELD)] = own[names.index(HELD)], applied
+    for i in range(count):  # as `Sampled` does at the sample itself, where it knows the limit
+        own[i] = ca.if_else((asked - applied) * push > 0, before[i], own[i])
     state = ca.vertcat(measurement, ca.SX(2 - measured, 1), *own)
     moved = _after(loop, scheme, counter, state, step)
     later = [counter + 1, *(moved[i] for i, c in enumerate(changing) if c)]
+    later += [scheme.push(loop, counter, state, step), *own[:count]] if count else []
     outputs = ca.cse([ca.vertcat(*later), scheme.pressure(loop, counter, state, step)])
-    return ca.Function("sampled_step", [measurement, memory], outputs), start
+    return ca.Function("sampled_step", [measurement, applied, memory], outputs), start
 
 
 def _uses_rate(function: Any) -> bool:

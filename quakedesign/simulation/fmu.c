@@ -132,7 +132,7 @@ EXPORTED fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real step, fmi
   for (i = 0; i < CONTROLLER_MEASUREMENTS; ++i)
     if (!isfinite(state->signals[i])) return refuse(unit, "the measurement must be finite");
   for (; state->start + state->samples * CONTROLLER_STEP < now + step - EARLY; ++state->samples)
-    controller_step(state->signals, state->memory, &state->signals[PRESSURE]);
+    controller_step(state->signals, 0, state->memory, &state->signals[PRESSURE]);
   state->time = now + step;
   return isfinite(state->signals[PRESSURE]) ? fmi2OK : refuse(unit, "the pressure is not finite");
 }

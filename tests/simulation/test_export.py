@@ -84,7 +84,7 @@ def compiled(folder, *flags):
     call = [*command, "controller.c", "-o", "controller.so", "-lm"]
     subprocess.run(call, cwd=folder, check=True, capture_output=True)
     library = ctypes.CDLL(str(folder / "controller.so"))
-    library.controller_step.argtypes, library.controller_step.restype = [Numbers] * 3, None
+    library.controller_step.argtypes, library.controller_step.restype = [Numbers] * 4, None
     library.controller_reset.argtypes, library.controller_reset.restype = [Numbers], None
     return library
 
@@ -94,15 +94,15 @@ def pointer(array):
 
 
 def python_step(found):
-    """The step in Python on fixed arrays: measurement, memory before, memory after, pressure, and a call."""
-    measurement, memory = np.zeros(len(found.measurement)), np.zeros(len(found.start))
+    """The step in Python on fixed arrays: measurement, applied pressure, memory, memory after, pressure, and a call."""
+    measurement, applied, memory = np.zeros(len(found.measurement)), np.zeros(1), np.zeros(len(found.start))
     after, pressure = np.zeros_like(memory), np.zeros(1)
     buffer, evaluate = found.function.buffer()
-    for i, array in enumerate((measurement, memory)):
+    for i, array in enumerate((measurement, applied, memory)):
         buffer.set_arg(i, array.data)
     for i, array in enumerate((after, pressure)):
         buffer.set_res(i, array.data)
-    return measurement, memory, after, pressure, evaluate, buffer
+    return measurement, applied, memory, after, pressure, evaluate, buffer
 
 
 def test_a_law_of_the_slip_alone_is_told_the_slip_alone():
@@ -120,16 +120,18 @@ def test_c_and_python_agree_bit_for_bit_over_random_steps(case, tmp_path):
     own, answer = np.zeros(len(found.start)), np.zeros(1)
     library.controller_reset(pointer(own))
     assert list(own) == list(found.start.values())
-    measurement, memory, after, pressure, evaluate, _ = python_step(found)
+    measurement, applied, memory, after, pressure, evaluate, _ = python_step(found)
     memory[:] = own
     random = np.random.default_rng(7)
     signals = random.normal(size=(steps, len(measurement))) * [1e-3, 1e-2][: len(measurement)]
     signals[random.random(steps) < 0.05] = 0.0  # kinks too
-    arguments = pointer(measurement), pointer(own), pointer(answer)
+    arguments = pointer(own), pointer(answer)
+    told = np.where(random.random(steps) < 0.5, 1.0, random.uniform(0.5, 1.0, steps))
     different = 0
-    for row in signals:
+    for share, row in zip(told, signals, strict=True):
         measurement[:] = row
-        library.controller_step(*arguments)
+        applied[0] = share * answer[0]
+        library.controller_step(pointer(measurement), None if share == 1 else pointer(applied), *arguments)
         evaluate()
         memory[:] = after
         different += answer.tobytes() != pressure.tobytes() or own.tobytes() != after.tobytes()
@@ -137,6 +139,37 @@ def test_c_and_python_agree_bit_for_bit_over_random_steps(case, tmp_path):
     assert np.isfinite(own).all()
     assert own[0] == steps
     assert abs(answer[0]) > 0
+
+
+def asked_along(found, run, least=-np.inf, largest=np.inf):
+    """Pressures of the exported step along a run, cut off by a pump that tells it what it applied."""
+    measurement, applied, memory, after, pressure, evaluate, _ = python_step(found)
+    memory[:] = list(found.start.values())
+    pressures = []
+    for slip, rate in zip(run.slip, run.slip_rate, strict=True):
+        measurement[:] = (slip, rate)[: len(measurement)]
+        evaluate()
+        memory[:] = after
+        applied[0] = np.clip(pressure[0], least, largest)
+        pressures.append(applied[0])
+    return pressures
+
+
+@pytest.mark.parametrize("case", ["observer", "sampled", "elqr", "cta", "cta implicit", "dia compensated"])
+def test_a_step_that_is_told_what_a_pump_applied_winds_up_no_more_than_in_simulate(case):
+    controller, scheme, _ = CASES[case]
+    found = controller_step(LAB, controller, step=1e-3, scheme=simulation_scheme(scheme))
+    around = {"step": 1e-3, "method": "rk4", "duration": 0.2, "samples": 200, "compiled": False}
+    free = simulate(LAB, controller, scheme=simulation_scheme(scheme), **around)
+    most = float(np.abs(free.pressure).max()) / 4
+    pump = Actuator(stages=(Saturation(lowest=-most, highest=most),))
+    run = simulate(LAB, controller, scheme=simulation_scheme(scheme, actuator=pump), **around)
+    pressures = asked_along(found, run, -most, most)
+    assert run.pressure == pytest.approx(pressures, rel=1e-9, abs=1e-9 * most)
+    assert np.sum(np.abs(pressures) == most) > 5
+    untold, cut = asked_along(found, run), np.clip(asked_along(found, run), -most, most)
+    assert max(np.abs(untold)) > most
+    assert not np.allclose(cut, run.pressure, atol=1e-6 * most) or case not in ("sampled", "elqr")
 
 
 @pytest.mark.parametrize(
@@ -157,14 +190,7 @@ def test_the_exported_step_decides_as_the_controller_of_the_simulated_loop(case)
         samples=200,
         compiled=False,
     )
-    measurement, memory, after, pressure, evaluate, _ = python_step(found)
-    memory[:] = list(found.start.values())
-    pressures = []
-    for slip, rate in zip(run.slip, run.slip_rate, strict=True):
-        measurement[:] = (slip, rate)[: len(measurement)]
-        evaluate()
-        memory[:] = after
-        pressures.append(pressure[0])
+    pressures = asked_along(found, run)
     assert run.pressure == pytest.approx(pressures, rel=1e-9, abs=1e-9 * max(np.abs(pressures)))
     assert len(set(pressures)) > 50
 

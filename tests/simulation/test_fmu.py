@@ -38,7 +38,7 @@ def pressures(found, measured):
     """Pressures that the step in Python asks for at every sample [Pa]."""
     memory, asked = list(found.start.values()), []
     for row in measured:
-        memory, pressure = found.function(row, memory)
+        memory, pressure = found.function(row, asked[-1] if asked else 0.0, memory)
         asked.append(float(pressure))
     return asked
 

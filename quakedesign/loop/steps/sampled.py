@@ -33,6 +33,7 @@ class Sample:
     noise: list[Any]
     clock: list[Any]
     flow: list[Any]
+    push: Any
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,6 +97,10 @@ class Sampled(Scheme, Decided):
         """See `Scheme.pressure`."""
         sample = self._sample(loop, counter, state, step)
         return self.actuator.flow(sample.numbers, sample.flow, self._sections(sample)[0][0])[1]
+
+    def push(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+        """Which way ξ moves the pressure at a sample (SX): it stays where a limit keeps the pressure from going there."""
+        return self._sample(loop, counter, state, step).push
 
     def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:
         """See `Scheme.outputs`."""
@@ -190,7 +195,7 @@ class Sampled(Scheme, Decided):
         winds = excess * push > 0
         integrals = [ca.if_else(winds, before[i], after[i]) for i in range(count)]
         memory = [own[i] for i in range(self.own_size)]
-        found = Sample(part["held"][0], held, integrals, part["flowing"], memory, kept, noise, [], part["flow"])
+        found = Sample(part["held"][0], held, integrals, part["flowing"], memory, kept, noise, [], part["flow"], push)
         return self._if_now(found, ca.vertsplit(before) if count else [], part) if self.clock else found
 
     def _if_now(self, sample: Sample, integrals: list[Any], part: dict[str, list[Any]]) -> Sample:

@@ -165,9 +165,9 @@ def test_campaigns_exports_and_python_control_run_it_as_simulate_does():
     response = control.input_output_response(system, 0.184 * np.arange(len(found.time)), told)
     assert np.allclose(response.outputs, found.pressure, rtol=1e-9, atol=1e-6)
     step = controller_step(REAL, law)
-    memory, pressures = list(step.start.values()), []
+    memory, pressures, pressure = list(step.start.values()), [], 0.0
     for slip, rate in zip(found.slip, found.slip_rate, strict=True):
-        memory, pressure = step.function([slip, rate], memory)
+        memory, pressure = step.function([slip, rate], pressure, memory)
         pressures.append(float(pressure))
     assert (step.step, step.facts["weight"]) == (0.184, "0.35")
     assert np.allclose(pressures, found.pressure, rtol=1e-9, atol=1e-6)
