@@ -96,8 +96,8 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         often += f" to {loop['longest']} s, each time anew" if "longest" in loop else ""
         when = f"{often}, {loop['delay']} s late, lag {loop['lag']} s"
         when += f", rock of distance^2/diffusivity = {loop['diffusion']} s" if "diffusion" in loop else ""
-    kind = f"any acceleration of at most {lower(task.amplitude)} m/s^2"
-    if task.change is not None:
+    kind = f"any acceleration of at most {lower(task.amplitude)} m/s^2" if task.amplitude else "none (amplitude 0)"
+    if task.change is not None and task.amplitude:
         kind += f" that starts at 0 and changes by at most {lower(task.change)} m/s^3"
     implicit = " and an implicit step" if "root" in loop else ""
     alone = "root" not in loop and not any(line[1] != "0" for line in (*loop["measured"], loop["feedback"]))

@@ -97,7 +97,9 @@ def entries(document: dict[str, Any]) -> list[str]:
     """
     parts = {key: unnamed(value) for key, value in document.items() if key not in ("format", "kind")}
     claims = parts.pop("claims")
-    bounds = (f"{name} {(lower if name.startswith('least') else upper)(Fraction(claims[name]), 6)}" for name in sorted(claims))
+    bounds = (
+        f"{name} {(lower if name.startswith('least') else upper)(Fraction(claims[name]), 6)}" for name in sorted(claims)
+    )
     canonical = json.dumps(parts, sort_keys=True, separators=(",", ":"))
     return [
         "entries, in SI units of FORMAT.md; ~ is rounded to nearest, claims outward:",

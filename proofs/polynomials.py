@@ -160,9 +160,19 @@ def prove_squares(value: Any, statement: Statement) -> list[str]:
     for cofactor, equality in zip(cofactors, statement.equalities, strict=True):
         add_product(total, cofactor, equality)
     check_identity(statement.multiplier, statement.polynomial, total, "sos identity")
-    empty = all(not any(exponents) and number < 0 for exponents, number in statement.polynomial.items())
-    more = ["the polynomial is a negative number: the set is empty"] if statement.polynomial and empty else []
+    more = ["about nothing: the set is empty"] if is_empty(statement) else []
     return ["conclusion: the polynomial is >= 0 on the set (the degree of the identity is not verified)", *more]
+
+
+def is_empty(statement: Statement) -> bool:
+    """Tell whether the set of a proved statement is seen to have no point, by signs and even exponents."""
+    one = {(0,) * len(statement.variables)}
+    turned = [{exponents: -number for exponents, number in entry.items()} for entry in statement.equalities]
+    below = [*statement.inequalities, *statement.equalities, *turned]
+    below += [statement.polynomial] if set(statement.polynomial) == one else []
+    signs = ({number < 0 for number in entry.values()} == {True} for entry in below)
+    even = (not any(power % 2 for exponents in entry for power in exponents) for entry in below)
+    return any(s and e and one <= set(entry) for s, e, entry in zip(signs, even, below, strict=True))
 
 
 # ---------------------------------------------------------------- a point

@@ -385,13 +385,16 @@ def statement(
     peak = fault.rate * power_of_e(claims["log_rate"])
     needed = fault.stiffness * fault.distance / fault.box["coefficient"][0]
     at = {"in the fault": claims["push"], "at the valve": claims["asked"]}
+    stress = f"any shear stress of at most {lower(fault.stress)} Pa" if fault.stress else "none (stress 0)"
+    empty = [] if fault.distance else ["about nothing: the reference goes 0 m, which takes no time"]
     return [
+        *empty,
         f"fault {ascii(fault.name)[1:-1]} (a name; the data in the file are what counts), "
         f"{'regularised ' * fault.regularised}rate-and-state friction with "
         f"the {'slip' if fault.slips else 'ageing'} law, "
         f"with inertia, every constant {', '.join(ranges)}; {cells} cells",
         f"law with {len(loop['states'])} states of the slip alone, {when}{off}",
-        f"disturbance: any shear stress of at most {lower(fault.stress)} Pa; from steady sliding at "
+        f"disturbance: {stress}; from steady sliding at "
         f"{exact(fault.rate)} m/s over {lower(fault.distance)} m{along}; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(peak)} m/s: |ln(slip rate/first rate)| <= "
         f"{upper(claims['log_rate'])}",

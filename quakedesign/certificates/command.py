@@ -124,7 +124,8 @@ def statement(certificate: Certificate) -> list[str]:
     lines.append(f"domain: {loop.domain}; states with weights: {weights}")
     lines.append(", ".join(f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()))
     lines += [
-        f"{name} in [{low}, {high}] is the positive square root of {of}" for name, (of, (low, high)) in loop.roots.items()
+        f"{name} in [{low}, {high}] is the positive square root of {of}"
+        for name, (of, (low, high)) in loop.roots.items()
     ]
     lines += [f"argument of a nested power: {lift} = {written(terms)}" for lift, terms in loop.lifts.items()]
     lines += [f"{state}' = {written(terms)}" for state, terms in loop.field.items()]

@@ -119,7 +119,9 @@ def _natural(comparison: "Compared") -> str:
     fault, run = comparison.fault, comparison.uncontrolled
     if isinstance(run, StateRun):
         return cycle_sentence(run)
-    size = f" of magnitude {fault.magnitude:.2f}" if run.outcome.kind == "earthquake" and fault.seismic_moment > 0 else ""
+    size = (
+        f" of magnitude {fault.magnitude:.2f}" if run.outcome.kind == "earthquake" and fault.seismic_moment > 0 else ""
+    )
     rate = run.outcome.peak_slip_rate
     return f"Without control: {run.outcome.kind}{size}" + ("" if rate is None else f", slip rate up to {rate:.3g} m/s")
 

@@ -335,7 +335,9 @@ def test_another_disturbance_takes_the_place_of_a_stress_and_a_stress_that_of_an
     assert load_fault(path, disturbance="3 kPa").disturbance.stresses == ("amplitude",)
 
 
-@pytest.mark.parametrize(("stress", "density"), [("2 kPa", "2500"), ("-0.35 bar", "2617.3"), ("0 Pa", "3"), ("7 Pa", "0.3")])
+@pytest.mark.parametrize(
+    ("stress", "density"), [("2 kPa", "2500"), ("-0.35 bar", "2617.3"), ("0 Pa", "3"), ("7 Pa", "0.3")]
+)
 def test_a_stress_is_written_as_one_and_read_again(stress, density):
     text = edited(AMPLITUDE, f'constant = "{stress}"').replace("2500 kg", f"{density} kg")
     fault = parse_fault(text, "own.toml")

@@ -166,6 +166,52 @@ def test_long_lists_are_counted_and_still_tell_files_apart(many):
             assert entry_lines(other) == entries(other), path
 
 
+def on(inequalities=(), equalities=(), squares=(), polynomial=None):
+    """x >= 0, as c(-1 - x²) + (c + x + c x²) on the set of the first inequality for c = 1."""
+    plain = {"product": [], "basis": [[0], [1]], "gram": ["1", "1/2", "1"]}
+    document = {"format": 1, "variables": ["x"], "polynomial": polynomial or {"1": "1"},
+                "inequalities": [*inequalities], "equalities": [*equalities], "products": [[], [0]][: 1 + len(squares)],
+                "degree": 2, "multiplier": {"0": "1"}}  # fmt: skip
+    cofactors = [{"0": "1"}] * len(equalities)
+    return document | {"sos": {"squares": [plain, *squares], "cofactors": cofactors, "multiplier": []}}
+
+
+ON_FIRST = {"product": [0], "basis": [[0]], "gram": ["1"]}
+ABOUT_NOTHING = "about nothing: the set is empty"
+SETS = [
+    (on([{"0": "-1", "2": "-1"}], squares=[ON_FIRST]), True),
+    (on(equalities=[{"0": "-1", "2": "-1"}]), True),
+    (on([{"0": "1", "2": "-1"}], squares=[ON_FIRST], polynomial={"0": "2", "1": "1"}), False),
+    (on([{"2": "-1"}], squares=[ON_FIRST], polynomial={"0": "1", "1": "1"}), False),
+    (on([{"0": "-1", "1": "-1"}], squares=[ON_FIRST], polynomial={"2": "1"}), False),
+]
+
+
+@pytest.mark.parametrize(("document", "empty"), SETS)
+def test_a_proof_on_a_set_without_points_says_so(document, empty, tmp_path):
+    for verdict, said in (standalone(document) or ("", []), package(document, tmp_path) or ("", [])):
+        if verdict:
+            assert (verdict, ABOUT_NOTHING in said) == ("proved", empty)
+        else:
+            assert not empty
+
+
+def test_a_guarantee_without_disturbance_or_distance_says_so():
+    still = GUARANTEES.changed(GUARANTEES.HELD, (("disturbance", "amplitude"), "0"))
+    claims = dict.fromkeys(GUARANTEES.CLAIMS, F(1))
+    said = CHECK.beside("guarantee").statement(still, GUARANTEES.checker.read_task(still), claims, F(1, 3))
+    assert "disturbance: none (amplitude 0); from rest" in "".join(said)
+    assert "without disturbance" in read_guarantee(still).sentence()
+    sliding = CHECK.beside("slow_sliding")
+    for distance, stress in (("0", "1"), ("1", "0"), ("1", "1")):
+        given = changed(changed(SLIDING, ("reference", "distance"), distance), ("stress",), stress)
+        bounds = {name: F(value) for name, value in given["claims"].items()}
+        text = " ".join(sliding.statement(given, sliding.read_fault(given), bounds, 1, F(1, 2)))
+        sentence = read_guarantee(given).sentence()
+        assert ("about nothing" in text, "about nothing" in sentence) == (distance == "0",) * 2
+        assert ("none (stress 0)" in text, "without disturbance" in sentence) == (stress == "0",) * 2
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["guarantee_lab-fault", "sliding_crustal-patch"])
 def test_a_stored_guarantee_with_another_number_is_refused_or_says_so(name, tmp_path):

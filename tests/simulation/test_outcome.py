@@ -125,7 +125,8 @@ class Clipped(SampledController):
 
 def doubling(push):
     """Law of samples that asks for z Pa, z doubled at every sample from one metre of slip error on."""
-    law = LinearLaw(states=("z",), update=((F(2),),), measured=((F(push), F(0)),), output=(F(1),), feedback=(F(0), F(0)))
+    fed, none = ((F(push), F(0)),), (F(0), F(0))
+    law = LinearLaw(states=("z",), update=((F(2),),), measured=fed, output=(F(1),), feedback=none)
     return Clipped(law=law, step=F("0.184"))
 
 

@@ -34,7 +34,8 @@ def test_the_pole_is_that_of_the_steepest_friction_at_the_largest_effective_stre
     assert found.over_box
     exact = growing(slope, REAL.specific_damping)
     assert exact * (1 - 1e-9) <= found.pole <= exact * 1.0005  # the chords of a guarantee, not looser ones
-    assert f"times the unstable pole, at most {math.ceil(found.pole * 1e4) / 1e4:g} 1/s over" in sampling_sentence(found)
+    pole = math.ceil(found.pole * 1e4) / 1e4
+    assert f"times the unstable pole, at most {pole:g} 1/s over" in sampling_sentence(found)
     assert found.adequate
     assert "T_s = 0.184 s is adequate: " in sampling_sentence(found)
     assert "guarantee" not in sampling_sentence(found)

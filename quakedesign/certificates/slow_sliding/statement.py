@@ -105,9 +105,12 @@ class SlidingGuarantee:
         task, held, claims = self.task, self.held, self.claims
         ratio = UpperBound(exponential(claims.log_rate))
         (low, high), (least, largest) = self.pressures, self.valve_pressures
+        empty = "" if task.distance else "about nothing, as the reference goes 0 m, which takes no time: "
+        under = f"for every shear stress disturbance of at most {LowerBound(task.stress).quantity('Pa')}"
+        under = under if task.stress else "without disturbance"
         return (
-            f"from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, for every shear stress disturbance "
-            f"of at most {LowerBound(task.stress).quantity('Pa')}, {_along(task)}{_box(task)}: the slip rate never "
+            f"{empty}from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, "
+            f"{under}, {_along(task)}{_box(task)}: the slip rate never "
             f"exceeds {ratio:.4g} V = {self.peak_slip_rate:.3g} m/s {self.lasts}, the slip stays within "
             f"{claims.slip_error:.3g} m of it, the pressure in the fault between {low.quantity('Pa')} and "
             f"{high.quantity('Pa')}, at the valve between {least.quantity('Pa')} and {largest.quantity('Pa')} "

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
+from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.polynomial_files import save
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares, holds
 from quakedesign.sos.exact.statement import Statement
@@ -59,11 +60,15 @@ class Answer:
 
     @property
     def set_is_empty(self) -> bool:
-        """Whether a negative number is proved to be non-negative on the set, which then has no point."""
-        polynomial = self.statement.polynomial
-        return (
-            self.verdict is Positivity.SOS and not any(map(any, polynomial)) and any(c < 0 for c in polynomial.values())
-        )
+        """Whether a set is seen to have no point, so that a proof on it is about nothing.
+
+        A negative number is proved to be non-negative on it, an inequality has negative coefficients and even exponents
+        alone with a constant among them, or an equality has such coefficients of one sign.
+        """
+        asked = self.statement
+        below = [*asked.inequalities, *asked.equalities, *(_negated(h) for h in asked.equalities)]
+        constant = [p for p in (asked.polynomial,) if not any(map(any, p))]
+        return self.verdict is Positivity.SOS and any(_is_below_zero(p) for p in (*constant, *below))
 
     def check(self) -> bool:
         """Whether the proof decides the statement, in exact arithmetic and without a solver.
@@ -87,3 +92,13 @@ class Answer:
             When nothing was decided, or the proof is too large for the format.
         """
         save(self.statement, self.proof, path)
+
+
+def _negated(polynomial: Polynomial) -> Polynomial:
+    return {exponents: -c for exponents, c in polynomial.items()}
+
+
+def _is_below_zero(polynomial: Polynomial) -> bool:
+    """Whether all coefficients are negative, that of 1 among them, and all exponents even."""
+    even = all(x % 2 == 0 for exponents in polynomial for x in exponents)
+    return even and any(not any(e) for e in polynomial) and all(c < 0 for c in polynomial.values())

@@ -42,7 +42,7 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
     if multiplier != "1":
         lines.append(f"multiplied by {multiplier}")
     lines += [*_reason(answer), *filter(None, [answer.remark])]
-    lines += ["the set is empty: a negative number is not negative on it"] if answer.set_is_empty else []
+    lines += ["about nothing: the set is empty"] if answer.set_is_empty else []
     if verbose:
         lines += [f"Gram matrices {when} reduction: {_sizes(sizes)}" for when, sizes in answer.blocks.items()]
     lines.append(f"{answer.seconds:.2f} s; checked in exact arithmetic")
