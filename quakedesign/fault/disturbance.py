@@ -18,7 +18,7 @@ STRESSES = ("constant", "amplitude")
 
 
 def acceleration(quantity: Any, authority: Fraction, name: str) -> tuple[float, bool]:
-    """Value [m/s²], and whether it was given as a stress, of a text such as ``"1e-4 m/s^2"``, or of a shear stress on a fault such as ``"35 kPa"``.
+    """Value [m/s²] of a text such as ``"1e-4 m/s^2"``, or of a shear stress such as ``"35 kPa"``; whether it was that.
 
     A stress τ accelerates a fault by τA/m: rounded up in size, so that what is proved of the float is so of the stress.
 

@@ -170,7 +170,7 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     applied, entries = ca.SX.sym("applied"), iter(ca.vertsplit(memory))
     counter = next(entries)
     own = [next(entries) if c else ca.SX(v) for v, c in zip(values, changing, strict=True)]
-    push, *before = entries if count else (None,)
+    push, *before = entries if count else (ca.SX(0),)
     asked, own[names.index(HELD)] = own[names.index(HELD)], applied
     for i in range(count):  # as `Sampled` does at the sample itself, where it knows the limit
         own[i] = ca.if_else((asked - applied) * push > 0, before[i], own[i])

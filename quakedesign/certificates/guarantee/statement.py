@@ -187,14 +187,14 @@ def guarantee(
         )
     if held.pump is None or held.pump.rate is None or held.ramp:
         return _proved(task, held, slow_gain)
-    found, longest = _proved(task, replace(held, ramp=_FIRST * held.step), slow_gain), held.longest_ramp
+    ramp, longest = _FIRST * held.step, held.longest_ramp
+    found = _proved(task, replace(held, ramp=ramp), slow_gain)
     for _ in range(_RAMPS):
-        if isinstance(found, Guarantee) or found.needs is None:
-            return found
-        ramp = above(found.needs / held.pump.rate * _RAMP_ROOM)
-        if ramp > longest:
-            late = held.pump.too_slow(UpperBound(found.needs), longest)
-            return replace(found, reason=late) if late else found
+        if isinstance(found, Guarantee) or found.needs is None or ramp == longest:
+            break
+        if slow := held.pump.too_slow(UpperBound(found.needs), longest):
+            return replace(found, reason=slow)
+        ramp = min(above(found.needs / held.pump.rate * _RAMP_ROOM), longest)
         found = _proved(task, replace(held, ramp=ramp), slow_gain)
     return found
 

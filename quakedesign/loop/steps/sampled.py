@@ -99,7 +99,7 @@ class Sampled(Scheme, Decided):
         return self.actuator.flow(sample.numbers, sample.flow, self._sections(sample)[0][0])[1]
 
     def push(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
-        """Which way ξ moves the pressure at a sample (SX): it stays where a limit keeps the pressure from going there."""
+        """Which way ξ moves the pressure at a sample (SX): ξ stays where a limit keeps the pressure from that."""
         return self._sample(loop, counter, state, step).push
 
     def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:

@@ -135,12 +135,15 @@ def design_held(
 
 def _with_noise(without: Guarantee, noise: Mapping[str, Fraction]) -> Guarantee | NoGuarantee:
     """What a law that is proved without noise comes to with it: no small gain depends on noise."""
-    found = best_guarantee(without.task, replace(without.held, **noise))  # type: ignore[arg-type]
+    held = replace(without.held, **noise)  # type: ignore[arg-type]
+    found = best_guarantee(without.task, held)
     if isinstance(found, Guarantee):
         return found
+    anyhow = guarantee(without.task, held)  # with an input gain that may jump, which noise does not move
+    why = anyhow.reason if isinstance(anyhow, NoGuarantee) and anyhow.small_gain is None else "nothing is proved"
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     said = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
-    return replace(found, reason=f"with {said} {found.reason}; without it a law is proved")
+    return replace(found, reason=f"with {said} {why}; without it a law is proved")
 
 
 @dataclass(frozen=True)

@@ -63,3 +63,14 @@ def test_behind_a_lag_the_pressure_at_the_valve_counts():
         del raw["claims"][name]
     with pytest.raises(CertificateError, match="a pump behind which there is a lag or rock needs claims of it"):
         parse_guarantee(json.dumps(raw))
+
+
+@pytest.mark.parametrize(("rate", "slow"), [("2e5", True), ("1e9", False)])
+def test_a_pump_is_blamed_for_what_it_does_not_do_within_a_whole_period(rate, slow):
+    """From one sample to the next the loop asks for some MPa; 0.2 MPa/s for T_s = 184 ms makes 37 kPa of them."""
+    known = stored()
+    found = guarantee(known.task, replace(known.held, pump=Pump(rate=F(rate))))
+    assert isinstance(found, NoGuarantee) is slow
+    if slow:
+        step, said = known.held.step, found.reason
+        assert said.endswith(f"which a pump of 200 kPa/s does not make in {LowerBound(step).quantity('s')}")

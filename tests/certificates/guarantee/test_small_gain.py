@@ -112,7 +112,17 @@ def test_a_loop_through_the_implicit_step_can_fail_by_itself():
     assert isinstance(found, NoGuarantee)
     assert found.small_gain >= 1
     assert found.reason.startswith("small gain")
-    assert found.reason.endswith("the range of the implicit step's slope alone makes 1.1")
+    assert found.reason.endswith("the range of the implicit step's slope alone makes 1.08")  # 0.4/2/0.184
+
+
+@pytest.mark.parametrize("share", ["4129/10", "1001/1000", "4126/10", "98765"])
+def test_no_share_is_more_than_the_whole(share):
+    """Of the whole an upper bound is said, of the share a lower one."""
+    one = gains(acceleration=(F(share) / TASK.half_ranges["slip_error"], 0, 0), drift=(0, 0, 0))
+    found = bounds_from(TASK, one, None, STEP)
+    whole, part = (F(text.split()[-1].rstrip(",")) for text in
+                   (found.reason.split(", which")[0], found.reason))  # fmt: skip
+    assert F(99, 100) * whole <= part <= F(share) <= whole
 
 
 def test_a_small_gain_of_one_proves_nothing():

@@ -11,6 +11,7 @@ import pytest
 
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee, task_of
+from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.controllers import published
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import ParameterError
@@ -18,11 +19,13 @@ from quakedesign.fault import load_fault
 from quakedesign.synthesis import Design
 from quakedesign.synthesis.guaranteed import Answer, design_held, worst_found
 from quakedesign.synthesis.guaranteed.adversary import WorstFound
-from quakedesign.synthesis.guaranteed.design import first_held
+from quakedesign.synthesis.guaranteed.design import _with_noise, first_held
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(attacker)
+
+PROOFS = Path(__file__).parents[3] / "proofs" / "certificates"
 
 # loop: fault, T_s, objective, largest certified slip-rate error [m/s], largest certified slip error [m]
 ROWS = {
@@ -233,3 +236,20 @@ def test_the_worst_found_with_stick_is_no_less_than_the_attacker_s(row):
     largest, _ = attacker.run(held, 40, 24, courses(held, 24, 500, 6, 40), 500, back=back)
     assert largest[1].max() <= found.slip_rate_error <= claim.claims.slip_rate_error
     assert largest[0].max() <= found.slip_error <= claim.claims.slip_error
+
+
+NOISES = [({"slip_noise": "1e-6"}, True), ({"slip_noise": "5", "rate_noise": "1/10"}, False)]
+
+
+@pytest.mark.parametrize(("noise", "proved"), NOISES)
+def test_noise_is_blamed_for_what_it_does_to_a_law_that_is_proved_without(noise, proved):
+    """No small gain of a linear law depends on noise: what it does is to open the fault."""
+    without = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
+    bounds = {name: F(bound) for name, bound in noise.items()}
+    found = _with_noise(without, bounds)
+    assert isinstance(found, Guarantee) is proved
+    if proved:
+        assert found.held.noise == bounds | {"rate_noise": F(0)} or found.held.noise == bounds
+        return
+    assert found.reason.startswith("with slip noise of 5 m and rate noise of 0.1 m/s the pressure may rise to ")
+    assert found.reason.endswith(": the fault may open; without it a law is proved")
