@@ -25,6 +25,7 @@ from quakedesign.simulation import simulate as run_loop
 from quakedesign.studies.estimation import differentiator_premise
 from quakedesign.studies.on_trajectory import certified_bound, trajectory_premise
 from quakedesign.synthesis import answer, design
+from quakedesign.synthesis.guaranteed.compensated import recovered
 
 PUBLISHED, DESIGNED, CONTINUOUS = ("published",), ("designed",), ("continuous",)
 
@@ -68,7 +69,7 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
     CertificateError
         When the file cannot be read, is about something else, or does not hold.
     UnsupportedError
-        For a sliding mode.
+        For a sliding mode whose gains cannot be read off its implicit step.
     """
     claim = load_guarantee(path)
     if isinstance(claim, ContinuousPeaks) or isinstance(claim, SlidingGuarantee) != bool(fault.friction.state_names):
@@ -81,7 +82,8 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
             f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
             f"{'; '.join(apart)}. Give the fault that it is about, or prove a new one with guarantee."
         )
-    controller = claim.controller
+    sliding = isinstance(claim, Guarantee) and claim.held.law.root is not None
+    controller = recovered(claim).limited if sliding else claim.controller
     if claim.check() is not Verdict.PROVED:
         raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
     return Choice(controller=controller, claim=claim)

@@ -6,13 +6,15 @@ import os
 import subprocess
 from dataclasses import replace
 from fractions import Fraction as F
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from quakedesign.certificates.guarantee.files import load_guarantee
 from quakedesign.controllers import published
 from quakedesign.controllers.feed_forward import feed_forward
-from quakedesign.errors import OutputError, ParameterError
+from quakedesign.errors import OutputError, ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.loop import (
     ErrorPrediction,
@@ -32,6 +34,8 @@ from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, 
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import simulate
 from quakedesign.simulation.export import controller_step, export_controller
+from quakedesign.studies.single import certified_choice
+from quakedesign.synthesis.guaranteed.compensated import recovered
 
 LAB = load_fault("lab-fault")
 PUBLISHED = published("lab-fault")
@@ -272,3 +276,41 @@ def test_nothing_is_left_of_a_failed_export(tmp_path, monkeypatch):
 def test_what_no_controller_can_do_is_refused(settings, named):
     with pytest.raises(ParameterError, match=named):
         controller_step(LAB, PUBLISHED["cta"], **settings)
+
+
+STORED = Path(__file__).parents[2] / "proofs" / "certificates" / "guarantee_cta_real-fault.json"
+
+
+def test_a_sliding_mode_of_a_certificate_is_exported_and_asks_for_what_is_proved():
+    """Near the reference its step is deadbeat, w = -e1/T_s, so that the matrices of the file tell every pressure."""
+    real = load_fault("real-fault")
+    claim, chosen = load_guarantee(STORED), certified_choice(real, STORED)
+    found, law, step = controller_step(real, chosen.controller), claim.held.law, float(claim.held.step)
+    matrices = (law.update, law.measured, law.output, law.feedback)
+    update, fed, output, feedback = (np.array(rows, dtype=float) for rows in matrices)
+    random = np.random.default_rng(3)
+    slips, rates = random.uniform(-1e-6, 1e-6, 50), random.uniform(-1e-5, 1e-5, 50)
+    shape = np.polynomial.Polynomial([float(c) for c in claim.task.shape])
+    end = float(claim.task.operation_time)
+    z, memory, pressure = np.array([rates[0], 0.0, 0.0]), list(found.start.values()), 0.0
+    for i, (slip, rate) in enumerate(zip(slips, rates, strict=True)):
+        seen = np.array([slip, rate, -slip / step])
+        told = (slip + 0.785 * shape(i * step / end), rate + 0.785 * shape.deriv()(i * step / end) / end)
+        memory, pressure = found.function(told, pressure, memory)
+        assert float(pressure) == pytest.approx(output @ z + feedback @ seen, rel=1e-6, abs=1e-3)
+        z = update @ z + fed @ seen
+
+
+def test_gains_of_another_step_are_not_read_off():
+    claim = load_guarantee(STORED)
+    first, *rest = claim.held.law.root.pull
+    nested = replace(first, argument=(first,))
+    for law in (
+        replace(claim.held.law, root=replace(claim.held.law.root, pull=(nested, *rest))),
+        replace(claim.held.law, root=replace(claim.held.law.root, pull=tuple(rest))),
+        replace(claim.held.law, update=((F(0), F(0), F(1, 9)), *claim.held.law.update[1:])),
+        replace(claim.held.law, feedback=(*claim.held.law.feedback[:2], F(0))),
+    ):
+        with pytest.raises(UnsupportedError, match="read off the implicit step of a 2-CTA"):
+            recovered(replace(claim, held=replace(claim.held, law=law)))
+    assert recovered(claim).weight == F(7, 20)

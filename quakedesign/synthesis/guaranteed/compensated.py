@@ -12,7 +12,7 @@ from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.guarantee.sector import holds
-from quakedesign.controllers import Sampling, SlidingMode
+from quakedesign.controllers import Sampling, SlidingMode, control_law
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.fault.checks import require_ordinary
 from quakedesign.loop import ImplicitRoot, Power
@@ -174,6 +174,40 @@ def design_compensated(
     except UnsupportedError as error:
         return Compensation(controller=law, found=NoGuarantee(reason=str(error), small_gain=None))
     return Compensation(controller=law, found=compensated(task, law, weight, authority, step, **around))
+
+
+def recovered(found: Guarantee) -> Compensation:
+    """The sliding mode whose implicit step a guarantee is about, its gains read off the step; of 2-CTA alone.
+
+    Raises
+    ------
+    UnsupportedError
+        For the step of another law, whose gains stand inside of powers.
+    """
+    held, law, root = found.held, found.held.law, found.held.law.root
+    refusal = UnsupportedError(
+        "gains are read off the implicit step of a 2-CTA in the scheme compensated. Received a certificate of another "
+        "law. Take the controller of its design, or its gains, scale, weight and authority in that scheme."
+    )
+    if root is None or len(law.measured) != 3 or not (law.feedback[2] > 0 and 0 < law.measured[2][1] <= 1):
+        raise refusal
+    gain, weight = 1 / law.feedback[2], law.measured[2][1]
+    authority = gain / held.step
+    one = control_law("cta").from_values(("1",) * 4, divisor=authority)
+    units = implicit_pull(one, held.step, authority)
+    if [(t.exponent, t.argument) for t in units] != [(t.exponent, t.argument) for t in root.pull]:
+        raise refusal
+    sizes = [sum(t.factor) / sum(unit.factor) for t, unit in zip(root.pull, units, strict=True)]
+    doubled = {name: replace(one, gains={**one.gains, name: Fraction(2)}) for name in one.gains}
+    pulls = {name: implicit_pull(other, held.step, authority) for name, other in doubled.items()}
+    gains = {name: sizes[next(i for i, t in enumerate(pulls[name]) if t != units[i])] for name in one.gains}
+    settings = ("weight", weight), ("authority", authority)
+    sampling = Sampling(step=held.step, scheme=GUARANTEED, settings=settings, **held.path)
+    controller = replace(one, gains=gains, sampling=sampling)
+    again = replace(root, pull=implicit_pull(controller, held.step, authority))
+    if compensated_law(again, weight, gain) != law:
+        raise refusal
+    return Compensation(controller=controller, found=found)
 
 
 def _settings(law: SlidingMode) -> dict[str, Fraction]:
