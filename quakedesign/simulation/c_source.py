@@ -16,7 +16,8 @@ Call controller_reset once, and controller_step every CONTROLLER_STEP seconds: i
 numbers and the pressure [Pa] that was applied since the last call, updates CONTROLLER_MEMORY numbers, and writes the
 fluid pressure [Pa] to hold until the next call (zero-order hold). Where pump or valve limit the pressure, tell it what
 was applied: the law does not wind up then, as in simulate --saturation; else give a null pointer. The reference of
-the fault is computed from the number of calls. The functions keep nothing between calls but the memory they are given, allocate nothing, and may be called from several threads with different memories. Numbers that
+the fault is computed from the number of calls. The functions keep nothing between calls but the memory they are given,
+allocate nothing, and may be called from several threads with different memories. Numbers that
 are not finite are not caught: check measurement and pressure.
 """
 _COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and link with -lm."

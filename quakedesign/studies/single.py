@@ -82,8 +82,10 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
             f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
             f"{'; '.join(apart)}. Give the fault that it is about, or prove a new one with guarantee."
         )
-    sliding = isinstance(claim, Guarantee) and claim.held.law.root is not None
-    controller = recovered(claim).limited if sliding else claim.controller
+    if isinstance(claim, Guarantee) and claim.held.law.root is not None:
+        controller: Controller = recovered(claim).limited
+    else:
+        controller = claim.controller
     if claim.check() is not Verdict.PROVED:
         raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
     return Choice(controller=controller, claim=claim)

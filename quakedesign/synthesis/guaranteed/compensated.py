@@ -12,7 +12,8 @@ from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.guarantee.sector import holds
-from quakedesign.controllers import Sampling, SlidingMode, control_law
+from quakedesign.controllers import Sampling, SlidingMode
+from quakedesign.controllers.cta import ContinuousTwisting
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.fault.checks import require_ordinary
 from quakedesign.loop import ImplicitRoot, Power
@@ -193,11 +194,11 @@ def recovered(found: Guarantee) -> Compensation:
         raise refusal
     gain, weight = 1 / law.feedback[2], law.measured[2][1]
     authority = gain / held.step
-    one = control_law("cta").from_values(("1",) * 4, divisor=authority)
+    one = ContinuousTwisting.from_values(("1",) * 4, divisor=authority)
     units = implicit_pull(one, held.step, authority)
     if [(t.exponent, t.argument) for t in units] != [(t.exponent, t.argument) for t in root.pull]:
         raise refusal
-    sizes = [sum(t.factor) / sum(unit.factor) for t, unit in zip(root.pull, units, strict=True)]
+    sizes = [t.factor[0] / unit.factor[0] for t, unit in zip(root.pull, units, strict=True)]
     doubled = {name: replace(one, gains={**one.gains, name: Fraction(2)}) for name in one.gains}
     pulls = {name: implicit_pull(other, held.step, authority) for name, other in doubled.items()}
     gains = {name: sizes[next(i for i, t in enumerate(pulls[name]) if t != units[i])] for name in one.gains}
