@@ -122,7 +122,6 @@ def answer(
         return Answer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None))
     wanted = Wanted(gains=gains, objective=objective, scheme=scheme, measured=measured, around=around)
     given = method_of(law).sampled(fault, task, law, period, wanted)
-    given = given if given.shorter is None else replace(given, asked_step=period)
     longest = max(period, around.get("longest_step", period))
     slow = "" if gains else too_slow(task, rational(fault.effective_normal_stress), longest, late)
     if not slow or given.proved:

@@ -109,7 +109,10 @@ class StateFeedback(Method[ExtendedLQR]):
         if isinstance(found, Guarantee) or wanted.around.get("longest_step"):
             return attacked(fault, found)
         longest = longest_step(task, step, most=step, **told)
-        return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest, wanted.objective))
+        if longest is None:
+            return Answer(fault=fault, found=found)
+        shorter = design_at(task, longest, wanted.objective)
+        return Answer(fault=fault, found=found, shorter=shorter, asked_step=step)
 
 
 def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:

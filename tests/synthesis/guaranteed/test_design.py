@@ -16,10 +16,11 @@ from quakedesign.controllers import published
 from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.synthesis import Design
+from quakedesign.synthesis import Design, answer
 from quakedesign.synthesis.guaranteed import Answer, design_held, worst_found
 from quakedesign.synthesis.guaranteed.adversary import WorstFound
 from quakedesign.synthesis.guaranteed.design import _with_noise, first_held
+from quakedesign.synthesis.methods import state_feedback
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -253,3 +254,19 @@ def test_noise_is_blamed_for_what_it_does_to_a_law_that_is_proved_without(noise,
         return
     assert found.reason.startswith("with slip noise of 5 m and rate noise of 0.1 m/s the pressure may rise to ")
     assert found.reason.endswith(": the fault may open; without it a law is proved")
+
+
+def test_the_first_words_are_that_nothing_is_guaranteed_at_the_step_that_was_asked_for(monkeypatch):
+    """Where a design for a shorter one is: it comes second."""
+    shorter = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
+    none = NoGuarantee(reason="small gain 2", small_gain=None)
+    monkeypatch.setattr(state_feedback, "design_held", lambda *_, **__: none)
+    monkeypatch.setattr(state_feedback, "longest_step", lambda *_, **__: shorter)
+    monkeypatch.setattr(state_feedback, "design_at", lambda *_: shorter)
+    found = answer(load_fault("real-fault"), step=F("0.5"))
+    assert not found.proved
+    assert found.lines()[:2] == [
+        "not guaranteed at T_s = 0.5 s: small gain 2", f"with T_s = 0.184 s: {shorter.sentence()}"
+    ]  # fmt: skip
+    monkeypatch.setattr(state_feedback, "longest_step", lambda *_, **__: None)
+    assert answer(load_fault("real-fault"), step=F("0.5")).lines()[0] == "none: small gain 2"
