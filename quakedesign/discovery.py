@@ -1,16 +1,23 @@
 """What stands one a file in a folder, found by looking into it; and what users add, found by its module."""
 
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from importlib import import_module
 from inspect import isabstract, isclass
 from pkgutil import iter_modules
+from traceback import walk_tb
 from typing import Any, TypeVar, cast
 
-from quakedesign.errors import UnknownNameError, require_known
+from quakedesign.errors import QuakedesignError, UnknownNameError, UserCodeError, require_known
 from quakedesign.text import shown
 
 Kind = TypeVar("Kind")
+_allowed: ContextVar[bool] = ContextVar("allowed", default=False)
+_imported: set[str] = set()
+"""Modules of the user's, of which a class was named."""
+_OURS = {__name__.partition(".")[0], *sys.stdlib_module_names}
 
 
 def discovered(package: str, kind: type, shared: Collection[str] | None = None) -> dict[str, Any]:
@@ -38,7 +45,39 @@ def discovered(package: str, kind: type, shared: Collection[str] | None = None) 
     return kinds
 
 
-def named(name: str, known: Mapping[str, type[Kind]], kind: type, what: str) -> type[Kind]:
+def allow_code(allowed: bool) -> None:
+    """Let files name code as ``module:Class`` from here on, or no longer; not unless the user asks for it."""
+    _allowed.set(allowed)
+
+
+@contextmanager
+def user_code() -> Iterator[None]:
+    """Turn whatever code of the user's raises into one error, but for interruptions and refusals of quakedesign.
+
+    Raises
+    ------
+    UserCodeError
+    """
+    try:
+        yield
+    except (KeyboardInterrupt, MemoryError, QuakedesignError):
+        raise
+    except BaseException as error:
+        if (module := _raised_by(error)) is None:
+            raise
+        raise UserCodeError(f"{module} fails with {type(error).__name__}: {error}. Mend its code.") from error
+
+
+def _raised_by(error: BaseException) -> str | None:
+    """Module of the user's through which an error came; some module where it is no `Exception`, as none of ours is."""
+    through = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
+    others = None if isinstance(error, Exception) else "a module of the user's"
+    return next((module for module in reversed(through) if module in _imported), others)
+
+
+def named(
+    name: str, known: Mapping[str, type[Kind]], kind: type, what: str, *, in_file: bool = False, code: bool = False
+) -> type[Kind]:
     """Class of a name, or of the user's own: ``module:Class`` of a module that can be imported from here.
 
     Parameters
@@ -50,6 +89,10 @@ def named(name: str, known: Mapping[str, type[Kind]], kind: type, what: str) -> 
         What a class of the user's own derives from.
     what : str
         For the message.
+    in_file : bool
+        The name stands in a file, which may come from anybody: it imports nothing unless code is allowed.
+    code : bool
+        The caller allows it, as `allow_code` does for a whole command.
 
     Raises
     ------
@@ -61,11 +104,20 @@ def named(name: str, known: Mapping[str, type[Kind]], kind: type, what: str) -> 
     module, own, attribute = name.partition(":")
     if not own:
         require_known(name, known, what, UnknownNameError)
+    if in_file and not (code or _allowed.get()):
+        raise UnknownNameError(
+            f"{what} in a file must be one of {', '.join(known)}. Received {shown(name)}, which runs code of that "
+            "module. If you trust it, add --allow-code, in Python allow_code=True."
+        )
+    if "__main__" in module.split("."):
+        raise UnknownNameError(f"{what} must not be of a program. Received {shown(name)}. Name a module without main.")
     if "" not in sys.path:  # a script that is installed does not look where it is started
         sys.path.append("")
     try:
         found: Any = getattr(import_module(module), attribute)
-    except Exception as error:
+    except (KeyboardInterrupt, MemoryError):
+        raise
+    except BaseException as error:  # of code of the user's: SystemExit would decide the exit code
         raise UnknownNameError(
             f"{what} must be module:Class of a module that can be imported. Received {shown(name)}, which fails with "
             f"{type(error).__name__}: {error}. Start where the module lies, or put it on PYTHONPATH."
@@ -75,4 +127,5 @@ def named(name: str, known: Mapping[str, type[Kind]], kind: type, what: str) -> 
             f"{what} must be a class with a name that derives from {kind.__name__} and leaves nothing abstract. "
             f"Received {shown(name)}. Complete it."
         )
+    _imported.update(base.__module__ for base in found.__mro__ if base.__module__.partition(".")[0] not in _OURS)
     return cast(type[Kind], found)

@@ -43,6 +43,10 @@ class UnknownNameError(QuakedesignError, KeyError):
         return str(self.args[0])
 
 
+class UserCodeError(QuakedesignError, RuntimeError):
+    """Code of the user's that raises what is no refusal of quakedesign, `SystemExit` among it."""
+
+
 class UnsupportedError(QuakedesignError, NotImplementedError):
     """An expression or model for which no method is known."""
 

@@ -1,7 +1,9 @@
 """Laws and friction of a user's own go through the same calls as those of the package."""
 
+import re
 import sys
 from fractions import Fraction as F
+from pathlib import Path
 
 import own_parts
 import pytest
@@ -9,9 +11,11 @@ import pytest
 import quakedesign as qd
 from quakedesign.certificates import Verdict
 from quakedesign.certificates.premises import Premise
+from quakedesign.cli import app, main
 from quakedesign.controllers import control_law, family
-from quakedesign.errors import CertificateError, UnknownNameError, UnsupportedError
+from quakedesign.errors import CertificateError, UnknownNameError, UnsupportedError, UserCodeError
 from quakedesign.fault import friction_law, parse_fault
+from quakedesign.fault.template import fault_toml, template
 from quakedesign.loop.schemes import simulation_scheme
 from quakedesign.symbolic.friction_bounds import friction_bounds
 from quakedesign.synthesis import answer, assess
@@ -99,10 +103,131 @@ def test_a_run_names_ones_own_law():
 
 
 def test_friction_of_ones_own_stands_in_a_file():
-    fault = parse_fault(TEXT, "own.toml")
+    fault = parse_fault(TEXT, "own.toml", allow_code=True)
     assert fault.friction == own_parts.Hyperbolic(residual=0.2, drop=0.1, critical_slip=0.2)
     assert qd.derive(fault).unstable
     assert friction_bounds(fault.friction).slip_slope == F(1, 2)
+
+
+def test_the_file_of_such_a_fault_is_read_as_the_same_fault():
+    fault = parse_fault(TEXT, "own.toml", allow_code=True)
+    assert parse_fault(fault_toml(fault), "again", allow_code=True).friction == fault.friction
+
+
+ENDS = """
+import sys
+from own_parts import Hyperbolic, PID
+open("ran", "a").close()
+class Exits(Hyperbolic):
+    def coefficient(self, slip, rate, *state):
+        sys.exit(0)
+class Fails(Hyperbolic):
+    def coefficient(self, slip, rate, *state):
+        raise RuntimeError("no")
+class ExitsEarly(Hyperbolic):
+    def __post_init__(self):
+        raise SystemExit(0)
+class Bare(Hyperbolic):
+    @property
+    def bounds(self):
+        raise BaseException("bare")
+class ExitsLaw(PID):
+    def pressure(self, signals):
+        sys.exit(0)
+"""
+PROVED = Path(__file__).parents[1] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"
+
+
+@pytest.fixture
+def code(tmp_path, monkeypatch):
+    """Folder of modules that end the process, in which a program is started."""
+    monkeypatch.chdir(tmp_path)
+    Path("ends.py").write_text(ENDS, encoding="utf-8")
+    Path("exits.py").write_text("open('ran', 'a').close(); raise SystemExit(0)", encoding="utf-8")
+    yield tmp_path
+    for name in ("ends", "exits"):
+        sys.modules.pop(name, None)
+
+
+def answered(*arguments):
+    with pytest.raises(SystemExit) as stop:
+        main([*arguments])
+    return stop.value.code
+
+
+def with_law(name):
+    Path("own.toml").write_text(TEXT.replace("own_parts:Hyperbolic", name), encoding="utf-8")
+    return "own.toml"
+
+
+# Commands that search are refused for their faults before; they take the file as `limits` does.
+READING = [("fault", "FILE"), ("derive", "FILE"), ("check", str(PROVED), "--fault", "FILE"), ("simulate", "FILE"),
+           ("design", "FILE"), ("guarantee", "FILE"), ("limits", "FILE"), ("campaign", "FILE", "--samples", "1"),
+           ("sampling", "FILE"), ("export", "FILE"), ("scale", "real-fault", "FILE"), ("compare", "FILE"),
+           ("certify", "elqr", "FILE", "--gains", "1", "1", "1", "1"), ("synthesise", "elqr", "FILE"),
+           ("guarantee", "lab-fault", "FILE"), ("identify", "no.csv", "--fault", "FILE")]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", READING, ids=" ".join)
+@pytest.mark.parametrize("law", ["ends:Exits", "exits:X", "os.path:join", "venv.__main__:x"])
+def test_no_command_runs_code_that_a_file_names(command, law, code, capsys):
+    path = with_law(law)
+    assert answered(*(path if word == "FILE" else word for word in command)) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.count("\n")) == ("", 1)
+    assert not (code / "ran").exists()
+    if command[0] == "fault":
+        assert "add --allow-code, in Python allow_code=True" in said.err
+        with pytest.raises(UnknownNameError, match="allow_code=True"):
+            qd.load_fault(path)
+
+
+@pytest.mark.parametrize("law", ["Exits", "Fails", "ExitsEarly", "Bare"])
+def test_code_that_is_allowed_does_not_decide_the_exit_code(law, code, capsys):
+    path = with_law(f"ends:{law}")
+    assert answered("fault", path, "--quiet", "--allow-code") == 2
+    assert re.fullmatch(r"quakedesign: .*ends fails with \w+: .*Mend its code\.\n", capsys.readouterr().err)
+    assert answered("fault", path, "--quiet") == 2, "what one call allows, the next does not"
+    assert "add --allow-code" in capsys.readouterr().err
+
+
+def test_a_module_that_exits_is_one_error(code, capsys):
+    path = with_law("exits:X")
+    with pytest.raises(UnknownNameError, match="SystemExit: 0"):
+        qd.load_fault(path, allow_code=True)
+    for line in (("fault", path, "--allow-code"), ("check", str(PROVED), "--fault", path, "--allow-code")):
+        assert answered(*line) == 2
+        assert "fails with SystemExit: 0" in capsys.readouterr().err
+    with pytest.raises(UserCodeError, match="ends fails with SystemExit"):
+        qd.load_fault(with_law("ends:ExitsEarly"), allow_code=True)
+
+
+def test_a_law_that_is_typed_and_exits_is_one_error(code, capsys):
+    line = ("simulate", "lab-fault", "--controller", "ends:ExitsLaw", "--gains", "1", "1", "1", "--duration", "1")
+    assert answered(*line) == 2
+    assert "ends fails with SystemExit: 0" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["venv.__main__:x", "__main__:Controller", "quakedesign.__main__:main"])
+def test_programs_are_no_modules_of_laws(name, code):
+    with pytest.raises(UnknownNameError, match="must not be of a program"):
+        control_law(name)
+    with pytest.raises(UnknownNameError, match="must not be of a program"):
+        qd.load_fault(with_law(name), allow_code=True)
+
+
+def test_every_command_takes_the_option():
+    names = [name for name in app if not name.startswith("-")]
+    assert all(any("--allow-code" in a.names for a in app[n].assemble_argument_collection()) for n in names)
+
+
+def test_pages_say_that_files_run_no_code():
+    folder = Path(__file__).parents[1]
+    for page in ("README.md", "docs/howto/own_friction_law.md", "docs/reference/fault_file.md"):
+        text = (folder / page).read_text(encoding="utf-8")
+        assert "--allow-code" in text
+        assert "allow_code=True" in text
+    assert "--allow-code" in template()
 
 
 @pytest.mark.parametrize(

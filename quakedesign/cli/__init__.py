@@ -26,6 +26,7 @@ from quakedesign.cli import (
     synthesis,
 )
 from quakedesign.cli.shared import app, typed
+from quakedesign.discovery import user_code
 from quakedesign.errors import QuakedesignError
 from quakedesign.interruption import ending
 from quakedesign.text import one_line
@@ -64,7 +65,7 @@ def main(arguments: list[str] | None = None) -> None:
         _without_warnings()
     try:
         typed(sys.argv[1:] if arguments is None else arguments)
-        with ending():
+        with ending(), user_code():
             code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.exit(code if isinstance(code, int) else 0)
     except QuakedesignError as error:

@@ -67,18 +67,25 @@ class Output:
         What to say on stderr while it works: info for every step, debug for all progress.
     no_cache
         Neither take nor keep what searches find, compiled code and long runs; as QUAKEDESIGN_CACHE=off.
+    allow_code
+        Let fault files name friction of your own as module:Class, whose module is run. Only for files that you trust.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
     quiet: Annotated[bool, Parameter(negative="")] = False
     log_level: Literal["warning", "info", "debug"] = "warning"
     no_cache: Annotated[bool, Parameter(negative="")] = False
+    allow_code: Annotated[bool, Parameter(negative="")] = False
 
     def __post_init__(self) -> None:
         if self.no_cache:
             from quakedesign.cache import switch_off
 
             switch_off()
+        if self.allow_code:
+            from quakedesign.discovery import allow_code
+
+            allow_code(True)
         if (self.quiet, self.log_level) != (False, "warning"):
             hush(quiet=self.quiet, level=self.log_level)
 

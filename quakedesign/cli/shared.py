@@ -17,6 +17,7 @@ from cyclopts import App
 from rich.console import Console
 from rich.text import Text
 
+from quakedesign.discovery import allow_code
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.output import require_room
 from quakedesign.text import in_lines, visible
@@ -27,8 +28,9 @@ _typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
 
 
 def typed(arguments: Sequence[str]) -> None:
-    """Keep what was typed, for `command_line`, and speak until `hush` is called."""
+    """Keep what was typed, for `command_line`; speak until `hush` is called, and run no code that files name."""
     _typed.set(tuple(arguments))
+    allow_code(False)
     hush(quiet=False, level="warning")
 
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from quakedesign.discovery import user_code
 from quakedesign.errors import ParameterError, ScenarioError
 from quakedesign.fault.checks import Problems, is_ordinary, require_name, require_positive
 from quakedesign.fault.defaults import completed
@@ -33,7 +34,9 @@ _STILL = (
 )
 
 
-def load_fault(source: str | Path, *, box: str | None = None, disturbance: str | None = None) -> Fault:
+def load_fault(
+    source: str | Path, *, box: str | None = None, disturbance: str | None = None, allow_code: bool = False
+) -> Fault:
     """Fault from a preset's name or the path of a TOML file.
 
     Parameters
@@ -45,6 +48,8 @@ def load_fault(source: str | Path, *, box: str | None = None, disturbance: str |
     disturbance : str, optional
         Amplitude in place of the file's: an acceleration, or a shear stress on the fault, such as ``"35 kPa"``, that
         its own area and mass make one.
+    allow_code : bool
+        Whether the file may name a friction law ``module:Class`` of the user's own, whose module is imported and run.
 
     Returns
     -------
@@ -60,7 +65,7 @@ def load_fault(source: str | Path, *, box: str | None = None, disturbance: str |
     UnitError, ParameterError
         For a wrong unit or an unphysical value.
     """
-    fault = parse_fault(source_text(source), str(source))
+    fault = parse_fault(source_text(source), str(source), allow_code=allow_code)
     fault = fault.with_box(box) if box else fault
     if disturbance is None:
         return fault
@@ -74,8 +79,8 @@ def load_fault(source: str | Path, *, box: str | None = None, disturbance: str |
     return fault.with_disturbance(changed)
 
 
-def parse_fault(text: str, name: str) -> Fault:
-    """Fault from the text of a TOML file; `name` names it in messages, all errors in one. Raises as `load_fault`."""
+def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
+    """Fault from the text of a TOML file; `name` names it in messages, all errors in one. See `load_fault`."""
     if len(text) > LARGEST_FILE:
         raise ScenarioError(f"{name}: a fault file must be at most 64 KiB. Received {len(text)} characters.")
     try:
@@ -83,19 +88,19 @@ def parse_fault(text: str, name: str) -> Fault:
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{name} is not valid TOML: {error}. Compare with a preset.") from None
     problems = Problems()
-    fault: Fault = _fault(Table(raw, problems), problems)
+    fault: Fault = _fault(Table(raw, problems), problems, allow_code)
     problems.refuse(name)
     return fault
 
 
-def _fault(table: Table, problems: Problems) -> Any:
+def _fault(table: Table, problems: Problems, allow_code: bool) -> Any:
     """Fault of a whole file; there are problems where it is None."""
     parts: dict[str, Any] = {"name": table.text("name"), "source": _NO_SOURCE}
     if "source" in table.entries:
         parts["source"] = table.text("source")
     for key, unit in PLANT.items():
         parts |= table.quantities({key: unit}, optional=key in OPTIONAL)
-    parts["friction"] = _friction(table.table("friction"), problems)
+    parts["friction"] = _friction(table.table("friction"), problems, allow_code)
     task = _task(table.table("task", optional=True), problems)
     parts["disturbance"] = _disturbance(table.table("disturbance", optional=True), problems, _authority(parts))
     parts["box"] = _box(table, problems)
@@ -112,14 +117,14 @@ def _fault(table: Table, problems: Problems) -> Any:
     return None
 
 
-def _friction(table: Table | None, problems: Problems) -> Any:
+def _friction(table: Table | None, problems: Problems, allow_code: bool) -> Any:
     name = table.text("law") if table else None
     if table is None or name is None:
         if table:
             table.say_missing()
         return None
-    with problems.collected():
-        law = friction_law(name)
+    with problems.collected(), user_code():
+        law = friction_law(name, in_file=True, allow_code=allow_code)
         quantities = law.quantities()
         optional = {f.name for f in fields(law) if f.default is not MISSING}  # type: ignore[arg-type]
         read: dict[str, Any] = {}

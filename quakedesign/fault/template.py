@@ -60,7 +60,7 @@ _LEFT_OUT = {
 def fault_toml(fault: Fault) -> str:
     """Text of a TOML file that `load_fault` reads as this fault, every number in SI units and nothing left out."""
     named: dict[str, Mapping[str, Any]] = {
-        "friction": {"law": fault.friction.name} | _law_values(fault.friction),
+        "friction": {"law": _law_name(type(fault.friction))} | _law_values(fault.friction),
         "task": _values(fault.reference, TASK) | {"sampling_time": f"{fault.sampling_time!r} s"},
         "disturbance": _values(fault.disturbance, DISTURBANCE) | _stresses(fault),
         "uncertainty": {key: float(getattr(fault.box, key)) for key in WIDTHS},
@@ -73,6 +73,11 @@ def fault_toml(fault: Fault) -> str:
     for table, entries in named.items():
         lines += ["", f"[{table}]", *_entries(entries)]
     return "\n".join(lines) + "\n"
+
+
+def _law_name(law: type[FrictionLaw]) -> str:
+    """Name of a law in a file: of one of the user's own, where it is defined."""
+    return law.name if law in friction_laws().values() else f"{law.__module__}:{law.__qualname__}"
 
 
 def _values(part: object, units: Mapping[str, str]) -> dict[str, Any]:
@@ -144,6 +149,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
         '# uncertainty = "paper"',
         "",
         f"[friction]  # {_first(friction)}",
+        '# A law of your own, "module:Class", runs its code: such a file is read with --allow-code alone.',
         f"law = {_written(law)}  # or {', '.join(sorted(set(friction_laws()) - {law}))}",
         *_asked(units_of(friction), _described(friction), _optional(friction)),
         "",

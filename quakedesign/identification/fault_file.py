@@ -18,6 +18,7 @@ from shlex import quote
 from quakedesign.errors import RecordError
 from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox
 from quakedesign.fault.defaults import beyond_rates, mean_rate, sliding_step, step_assumed
+from quakedesign.fault.friction import friction_laws
 from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.fault.template import fault_toml
 from quakedesign.identification.result import Estimate, Identification
@@ -184,7 +185,8 @@ def _moved(law: FrictionLaw, moved: FrictionLaw) -> list[str]:
 def next_command(identification: Identification, path: str | Path) -> str:
     """The command that designs for a fault file of a record, for all constants that the record allows."""
     spread = "" if covers(identification.law) else f" --spread {_spread(identification)}"
-    return f"quakedesign design {quote(str(path))}{spread}"
+    code = "" if type(identification.law) in friction_laws().values() else " --allow-code"
+    return f"quakedesign design {quote(str(path))}{spread}{code}"
 
 
 def _at_rate_of(fault: Fault, law: FrictionLaw) -> FrictionLaw:

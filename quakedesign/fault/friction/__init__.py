@@ -18,15 +18,23 @@ def friction_laws() -> dict[str, type[FrictionLaw]]:
     return discovered(__name__, FrictionLaw, shared=("base", "weakening"))
 
 
-def friction_law(name: str) -> type[FrictionLaw]:
+def friction_law(name: str, *, in_file: bool = False, allow_code: bool = False) -> type[FrictionLaw]:
     """Friction law of a given name, or of the user's own as ``module:Class``.
+
+    Parameters
+    ----------
+    name : str
+    in_file : bool
+        The name stands in a file: it may be one of the package only, unless code is allowed.
+    allow_code : bool
+        Whether it is.
 
     Raises
     ------
     UnknownNameError
         When there is none.
     """
-    return named(name, friction_laws(), FrictionLaw, "friction law")
+    return named(name, friction_laws(), FrictionLaw, "friction law", in_file=in_file, code=allow_code)
 
 
 check_arguments(__name__)
