@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import ClassVar
 
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import float_above, float_below
+from quakedesign.rationals import exact_text, float_above, float_below
 
 _SPEC = re.compile(
     r"(?P<align>.?[<>^])?(?P<sign>[-+ ]?)(?P<width>([1-9]\d*)?)(\.(?P<digits>\d+))?(?P<kind>[eEfFgG%]?)", re.ASCII
@@ -33,7 +33,7 @@ class Bound(Fraction):
     @property
     def exact(self) -> str:
         """The number itself, p/q."""
-        return str(Fraction(self))
+        return exact_text(Fraction(self))
 
     def quantity(self, unit: str, digits: int = 3) -> str:
         """Text with a unit and its engineering prefix, such as ``20.1 MPa``.

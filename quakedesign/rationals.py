@@ -108,6 +108,17 @@ def to_sympy(value: Fraction) -> "sp.Rational":
     return sp.Rational(value.numerator, value.denominator)
 
 
+def exact_text(value: Any) -> str:
+    """A rational as p/q, or p, whatever its length: ``str`` refuses more than 4300 digits, `Decimal` none.
+
+    What is no rational of Python is written by ``str``.
+    """
+    if not isinstance(value, Rational):
+        return str(value)
+    numerator, denominator = (str(Decimal(int(part))) for part in (value.numerator, value.denominator))
+    return numerator if denominator == "1" else f"{numerator}/{denominator}"
+
+
 def float_above(value: Fraction) -> float:
     """Float at or just above a rational, infinite above the largest."""
     try:

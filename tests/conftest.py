@@ -11,6 +11,8 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ["QUAKEDESIGN_CACHE"] = "off"  # tests compute, and leave the cache of the user alone
 
+sys.set_int_max_str_digits(640)  # so that an exact number that is written by `str` is found by a shorter one
+
 import pytest
 from hypothesis import settings
 

@@ -132,3 +132,20 @@ def test_an_enclosure_still_contains_what_it_encloses_when_printed():
     assert str(Enclosure.of(F(1), F(1))) == "1 to 1"
     with pytest.raises(ParameterError, match="from low to high"):
         Enclosure.of(F(1), F(0))
+
+
+def whole(text):
+    """Whole number of its digits, a few at a time."""
+    value = 0
+    for part in (text[i : i + 100] for i in range(0, len(text), 100)):
+        value = value * 10 ** len(part) + int(part)
+    return value
+
+
+@pytest.mark.parametrize("number", [F(10**5000 + 1, 3), F(-7, 10**9656 + 1), F(10**5000), F(0)], ids=[1, 2, 3, 4])
+def test_a_number_of_any_length_is_written(number):
+    """A small gain of 10^96564 ended in a defect, at Python's limit of 4300 digits."""
+    text = UpperBound(number).exact
+    numerator, _, denominator = text.removeprefix("-").partition("/")
+    assert F(whole(numerator), whole(denominator or "1")) == abs(number)
+    assert text.startswith("-") == (number < 0)

@@ -11,6 +11,7 @@ from quakedesign.certificates.claim import Equilibrium, Evidence, Loop, Witness
 from quakedesign.certificates.term_files import LIMITS, read_terms, texts
 from quakedesign.errors import CertificateError, UnsupportedError
 from quakedesign.input import read_text
+from quakedesign.rationals import exact_text
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.exact.strict import (
     LARGEST_FILE,
@@ -195,7 +196,7 @@ def _plain(certificate: Evidence) -> dict[str, Any]:
         "constants": texts(loop.constants),
         "states": dict(loop.states),
         "domain": loop.domain,
-        "uncertain": {name: [str(low), str(high)] for name, (low, high) in loop.uncertain.items()},
+        "uncertain": {name: list(map(exact_text, (low, high))) for name, (low, high) in loop.uncertain.items()},
         "roots": {name: [of, str(low), str(high)] for name, (of, (low, high)) in loop.roots.items()},
         "lifts": {lift: plain(terms) for lift, terms in loop.lifts.items()},
         "field": {state: plain(terms) for state, terms in loop.field.items()},
@@ -233,7 +234,7 @@ def _condition(square: Square, variables: int) -> int | None:
 
 def _plain_square(square: Square, variables: int) -> dict[str, Any]:
     times = [int(i in square.product) for i in range(variables)]
-    return {"times": times, "basis": [list(b) for b in square.basis], "gram": [str(v) for v in square.gram]}
+    return {"times": times, "basis": [list(b) for b in square.basis], "gram": list(map(exact_text, square.gram))}
 
 
 def save_certificate(certificate: Evidence, path: str | Path) -> None:

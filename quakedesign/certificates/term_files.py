@@ -5,6 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates.claim import Loop
+from quakedesign.rationals import exact_text
 from quakedesign.sos.exact.strict import listed, need, read_rational
 from quakedesign.symbolic.terms import Term
 
@@ -52,4 +53,4 @@ def _factor(raw: Any, powers: Sequence[str]) -> tuple[str, Fraction, str]:
 
 def texts(values: Mapping[str, Fraction]) -> dict[str, str]:
     """Numbers by name."""
-    return {name: str(v) for name, v in values.items()}
+    return {name: exact_text(v) for name, v in values.items()}

@@ -7,7 +7,7 @@ from functools import reduce
 from math import lcm
 
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import rational
+from quakedesign.rationals import exact_text, rational
 
 _WORKING_DIGITS = 60
 
@@ -90,7 +90,7 @@ class Radical:
             return f"{self.decimal(digits):.{digits}g}"
         rounded = self.decimal(17).normalize()
         if Fraction(rounded) != self.fraction:
-            return str(self.fraction)
+            return exact_text(self.fraction)
         return f"{rounded:f}" if -7 <= rounded.adjusted() <= 17 else str(rounded)
 
     def __float__(self) -> float:

@@ -10,7 +10,7 @@ from flint import arb, ctx
 
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
-from quakedesign.rationals import end_of, rational
+from quakedesign.rationals import end_of, fraction_of, rational, to_sympy
 from quakedesign.symbolic import plant, state_plant
 from quakedesign.symbolic.balls import Box, enclose
 from quakedesign.symbolic.equilibrium import operating_rate
@@ -156,7 +156,7 @@ def _interval(pressure: Pressure, fault: Fault) -> Interval:
 
 def _ranges(fault: Fault, pressure: Interval, uncertain: bool) -> dict[sp.Symbol, Interval]:
     """Range of effective stress, stiffness, damping and authority."""
-    values = {s: Fraction(str(v)) for s, v in plant.plant_values(fault).items()}
+    values = {s: fraction_of(v) for s, v in plant.plant_values(fault).items()}
     stress = values.pop(sigma)
     box = fault.box
     widths = {k_hat: box.stiffness, eta_hat: box.damping, N_hat: box.authority}
@@ -170,17 +170,17 @@ def _condition(
     parameters: Mapping[sp.Symbol, sp.Rational],
     ranges: Mapping[sp.Symbol, Interval],
 ) -> Condition:
-    fixed = {s: sp.Rational(str(low)) for s, (low, high) in ranges.items() if low == high}
+    fixed = {s: to_sympy(low) for s, (low, high) in ranges.items() if low == high}
     names = {s: sp.sympify(v).subs(parameters) for s, v in slopes.items() if s in expression.free_symbols}
     parts = _parts(expression.subs({s: v for s, v in slopes.items() if v == 0}))
     terms = [t.subs(names).subs(fixed) for t in parts]
     if all(t.is_Rational for t in terms):
-        values = [Fraction(str(t)) for t in terms]
+        values = [fraction_of(t) for t in terms]
         size = sum(abs(v) for v in values)
         exact = sum(values, start=Fraction(0)) / size if size else Fraction(0)
         return Condition(expression=expression, margin=(exact, exact), exact=True)
     inserted = [t.subs(slopes) for t in parts]
-    points = {s: (Fraction(str(v)), Fraction(str(v))) for s, v in parameters.items()}
+    points = {s: (fraction_of(v), fraction_of(v)) for s, v in parameters.items()}
     try:
         margin = _enclosed(inserted, {**points, **ranges})
     except UnsupportedError:  # a parameter as exponent, say: with its number there may be an enclosure

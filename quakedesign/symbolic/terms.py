@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.errors import CertificateError
+from quakedesign.rationals import exact_text
 
 Factor = tuple[str, Fraction, str]
 """State, exponent, kind: ``s`` for ⌈x⌋^a, ``a`` for |x|^a."""
@@ -31,7 +32,9 @@ class Term:
 
 def plain(terms: Iterable[Term]) -> list[Any]:
     """Terms as JSON can hold them: numbers as texts."""
-    return [[str(t.coefficient), list(t.parameters), [[s, str(e), k] for s, e, k in t.factors]] for t in terms]
+    return [
+        [exact_text(t.coefficient), list(t.parameters), [[s, exact_text(e), k] for s, e, k in t.factors]] for t in terms
+    ]
 
 
 def collected(terms: Iterable[Term], states: Sequence[str]) -> tuple[Term, ...]:
@@ -79,7 +82,7 @@ def _written_size(term: Term) -> str:
     kinds = {"s": "SignedPower", "a": "AbsolutePower"}
     powers = [s if kind == "s" and e == 1 else f"{kinds[kind]}({s}, {e})" for s, e, kind in term.factors]
     numerator, denominator = abs(term.coefficient.numerator), term.coefficient.denominator
-    factors = [*([str(numerator)] if numerator != 1 else []), *term.parameters, *powers] or ["1"]
+    factors = [*([exact_text(numerator)] if numerator != 1 else []), *term.parameters, *powers] or ["1"]
     return "*".join(factors) + (f"/{denominator}" if denominator != 1 else "")
 
 

@@ -390,3 +390,38 @@ def test_no_law_is_designed_for_intervals_that_no_controller_could_wait_for(call
     code, out, _ = call("lab-fault", "--step", "1 ms", "--longest-step", "2 s", "--json")
     assert (code, json.loads(out)["verdict"]) == (1, "undecided")
     assert "no controller whatever" in json.loads(out)["reason"]
+
+
+@pytest.mark.slow
+def test_a_small_gain_of_any_length_is_an_answer(tmp_path, capsys):
+    """A mass that is tiny against its damping: 10^96564, which Python does not write at once."""
+    path = tmp_path / "digits.toml"
+    path.write_text(TINY_MASS, encoding="utf-8")
+    with pytest.raises(SystemExit) as stop:
+        main(["guarantee", str(path), "--json"])
+    assert stop.value.code == 1
+    assert json.loads(capsys.readouterr().out)["verdict"] != "proved"
+
+
+TINY_MASS = """
+name = "tiny-mass"
+density = "0.00371319 kg/m^3"
+shear_modulus = "23.0998 GPa"
+length = "0.000490848 km"
+damping = "6.98887e+09 kg/s"
+effective_normal_stress = "50 MPa"
+uncertainty = "ten-percent"
+[friction]
+law = "exponential-slip-weakening"
+residual = 4.242158124781814e-08
+drop = 0.08992276392074365
+critical_slip = "276.35 mm"
+[task]
+target_slip = "27.3375 mm"
+operation_time = "132.194 hour"
+sampling_time = "168.833 ms"
+[disturbance]
+amplitude = "0.0215774 m/s^2"
+frequency = "0.973285 rad/s"
+slip_growth = "1.51141e-06 1/s^2"
+"""

@@ -27,6 +27,7 @@ from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.loop import ContinuousLaw, ImplicitRoot, LinearLaw, Power
 from quakedesign.loop.implicit_root import MOST_TERMS
 from quakedesign.output import write_whole
+from quakedesign.rationals import exact_text
 from quakedesign.sos.exact.strict import (
     headed,
     listed,
@@ -117,7 +118,7 @@ def read_guarantee(raw: Any) -> Claim:
 
 
 def _exactly(value: Any, names: Iterable[str]) -> dict[str, str]:
-    return {name: str(getattr(value, name)) for name in names}
+    return {name: exact_text(getattr(value, name)) for name in names}
 
 
 def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
@@ -446,14 +447,14 @@ def _rest(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def _root_document(root: ImplicitRoot) -> dict[str, Any]:
-    return {"pull": _sum_document(root.pull), "slopes": texts(root.slopes), "remainder": str(root.remainder)}
+    return {"pull": _sum_document(root.pull), "slopes": texts(root.slopes), "remainder": exact_text(root.remainder)}
 
 
 def _sum_document(terms: tuple[Power, ...]) -> list[dict[str, Any]]:
     return [
         {
             "factor": texts(term.factor),
-            "power": str(term.exponent),
+            "power": exact_text(term.exponent),
             "of": term.argument if isinstance(term.argument, str) else _sum_document(term.argument),
         }
         for term in terms

@@ -12,6 +12,7 @@ from typing import Any, NoReturn, cast
 
 from quakedesign.errors import CertificateError
 from quakedesign.output import write_whole
+from quakedesign.rationals import exact_text
 
 LARGEST_FILE = 4 << 20
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -152,7 +153,7 @@ def read_names(raw: Any, what: str, limit: int) -> tuple[str, ...]:
 
 def texts(values: Iterable[Fraction]) -> list[str]:
     """Rationals as they stand in files."""
-    return [str(v) for v in values]
+    return [exact_text(v) for v in values]
 
 
 def read_rationals(raw: Any, what: str, limit: int) -> dict[str, Fraction]:
@@ -197,7 +198,7 @@ def read_polynomial(raw: Any, what: str, variables: int | None, limit: int) -> d
 
 def polynomial_text(polynomial: Any) -> dict[str, str]:
     """Inverse of `read_polynomial`."""
-    return {",".join(map(str, e)): str(c) for e, c in polynomial.items()}
+    return {",".join(map(str, e)): exact_text(c) for e, c in polynomial.items()}
 
 
 def write_readable(path: str | Path, written: str, load: Callable[[str], Any]) -> None:

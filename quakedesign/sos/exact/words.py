@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 
+from quakedesign.rationals import exact_text
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.polynomial import Polynomial, evaluate
 from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares
@@ -17,7 +18,7 @@ def polynomial_words(polynomial: Polynomial, variables: Sequence[str]) -> str:
     parts = []
     for e, c in sorted(polynomial.items(), key=lambda item: (sum(item[0]), item[0]), reverse=True):
         powers = [n if x == 1 else f"{n}^{x}" for n, x in zip(variables, e, strict=True) if x]
-        number = str(abs(c)) if abs(c) != 1 or not powers else ""
+        number = exact_text(abs(c)) if abs(c) != 1 or not powers else ""
         parts.append((" - " if c < 0 else " + ") + "*".join(filter(None, [number, *powers])))
     text = "".join(parts) or "0"
     return text[3:] if text.startswith(" + ") else text.replace(" - ", "-", 1)
@@ -66,7 +67,7 @@ def statement_words(answer: Answer) -> list[str]:
 def _reason(answer: Answer) -> list[str]:
     proof, asked = answer.proof, answer.statement
     if isinstance(proof, SumOfSquares):
-        digits = max((len(str(q)) for s in proof.squares for q in s.gram), default=1)
+        digits = max((len(exact_text(q)) for s in proof.squares for q in s.gram), default=1)
         count = sum(len(s.basis) for s in proof.squares)
         return [
             f"a sum of {count} square{'s' * (count != 1)} with rational coefficients of at most {digits} characters"
@@ -77,7 +78,7 @@ def _reason(answer: Answer) -> list[str]:
             f"{len(proof.values)} values is non-negative on all of them and negative here"
         ]
     if isinstance(proof, Point):
-        point = ", ".join(f"{n} = {v}" for n, v in zip(asked.variables, proof.coordinates, strict=True))
+        point = ", ".join(f"{n} = {exact_text(v)}" for n, v in zip(asked.variables, proof.coordinates, strict=True))
         return [f"negative at {point}", f"value {_shown(_value(answer, proof))}"]
     return ["neither a rational proof nor a rational refutation was found; this says nothing about the polynomial"]
 
@@ -89,7 +90,7 @@ def _value(answer: Answer, point: Point) -> Fraction:
 def _shown(value: Fraction) -> str:
     """A number as it is, or six digits of it on its upper side where it is long."""
     if length(value) < 1000:
-        return _short(str(value))
+        return _short(exact_text(value))
     upwards = Context(prec=6, rounding=ROUND_CEILING)
     return f"at most {upwards.divide(Decimal(value.numerator), Decimal(value.denominator))}"
 

@@ -14,7 +14,7 @@ from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak
 from quakedesign.fault import Fault
 from quakedesign.loop import LinearLaw, RestLimit
 from quakedesign.loop.sensing.differences import least_bound
-from quakedesign.rationals import float_above
+from quakedesign.rationals import exact_text, float_above
 from quakedesign.sos.exact.strict import texts
 from quakedesign.synthesis.guaranteed.adversary import WorstFound, worst_found
 from quakedesign.synthesis.guaranteed.compensated import Compensation
@@ -236,12 +236,12 @@ def _limit(limit: SmallestPeak | None) -> dict[str, str | None] | None:
 
 def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
     names = ("width", "per_slip", "resolution")
-    return None if limit is None else {name: str(getattr(limit, name)) for name in names}
+    return None if limit is None else {name: exact_text(getattr(limit, name)) for name in names}
 
 
 def _law(law: LinearLaw) -> dict[str, Any]:
     root = law.root
-    lines = {} if root is None else {"slopes": texts(root.slopes), "remainder": str(root.remainder)}
+    lines = {} if root is None else {"slopes": texts(root.slopes), "remainder": exact_text(root.remainder)}
     matrices = {name: [texts(row) for row in getattr(law, name)] for name in ("update", "measured")}
     rows = {name: texts(getattr(law, name)) for name in ("output", "feedback", "applied")}
     return {**lines, "states": list(law.states), **matrices, **rows}

@@ -20,6 +20,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.certificates import Verdict
+from quakedesign.rationals import exact_text
 from quakedesign.synthesis.linear.analysis.inverse_optimality_problem import Question, refutes
 from quakedesign.synthesis.linear.analysis.inverse_optimality_search import bound_of, candidates, near, propose
 from quakedesign.synthesis.linear.plant.problem import LinearProblem, Scales
@@ -68,7 +69,7 @@ class InverseOptimality:
         return {
             "verdict": str(self.verdict),
             "reason": self.reason,
-            "P": [[str(v) for v in row] for row in self.P] if self.P else None,
+            "P": [[exact_text(v) for v in row] for row in self.P] if self.P else None,
             "frequency": self.frequency,
         }
 
