@@ -1,6 +1,7 @@
 """What the public names of a room are called with: every argument is of the type that its annotation says."""
 
 import ast
+import operator
 import sys
 import types
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -79,8 +80,14 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(function)
     def checking(*positional: Any, **named: Any) -> Any:
-        for name, value in _given(function, positional, named).items():
+        given = _given(function, positional, named)
+        for name, value in given.items():
             _require(function, name, value)
+        converted = {name: new for name, value in given.items() if (new := _plain(function, name, value)) is not value}
+        if converted:
+            bound = _signature(function).bind(*positional, **named)
+            bound.arguments.update(converted)
+            return function(*bound.args, **bound.kwargs)
         return function(*positional, **named)
 
     checking.checks_arguments = True  # type: ignore[attr-defined]
@@ -235,6 +242,43 @@ def _test_of_class(hint: type) -> Callable[[Any], bool]:
     return test
 
 
+def _plain(function: Callable[..., Any], name: str, value: Any) -> Any:
+    """A number as Python has it: extended ones of NumPy crash the libraries that compute with them.
+
+    What is a number but no `float` or `int` becomes a float where nothing but floats is wanted.
+    """
+    if type(value) in _PLAIN:
+        return value
+    default, _, several = _wanted(function, name)
+    if several is None and isinstance(value, Real) and _is_float_alone(_hint(function, name)):
+        return float(value)
+    return _native(value) if value is not default else value
+
+
+_PLAIN = (float, int, str, bool, type(None))
+
+
+@cache
+def _is_float_alone(hint: Any) -> bool:
+    return {part for part in _parts(hint) if part in _NUMBERS} == {"float"}
+
+
+def _native(value: Any) -> Any:
+    """Numbers of NumPy as those of Python, also in tuples, lists and dictionaries; long floats as floats."""
+    if hasattr(value, "dtype") and hasattr(value, "item"):
+        if getattr(value, "ndim", 0):
+            return value if value.dtype.kind != "f" or value.dtype.itemsize <= 8 else value.astype(float)
+        kind = {"f": float, "i": int, "u": int, "b": bool}.get(value.dtype.kind)
+        return value if kind is None or isinstance(value, kind) else kind(value)
+    if type(value) in (tuple, list):
+        native = [_native(entry) for entry in value]
+        return value if all(map(operator.is_, native, value)) else type(value)(native)
+    if type(value) is dict:
+        native = [_native(entry) for entry in value.values()]
+        return value if all(map(operator.is_, native, value.values())) else dict(zip(value, native, strict=True))
+    return value
+
+
 def _is_float(value: Any) -> bool:
     try:
         float(value)
@@ -267,6 +311,8 @@ def _is_one(value: Any, origin: type) -> bool:
         return True
     if issubclass(origin, Mapping):
         return isinstance(value, Mapping)
+    if getattr(value, "ndim", 1) == 0 or bool(getattr(value, "mask", None) is not None and value.mask.any()):
+        return False  # an array of NumPy that is one number, or lacks some
     listed = hasattr(value, "__len__") and hasattr(value, "__getitem__") and not isinstance(value, Mapping)
     return isinstance(value, origin) or (issubclass(origin, Sequence) and listed)
 

@@ -183,3 +183,46 @@ def test_of_a_wrong_run_nothing_else_is_said(tmp_path):
     run = qd.simulate(LAB, qd.published("lab-fault")["elqr"], scheme="explicit", duration=0.01)
     with pytest.raises(ParameterError, match=r"path of Recording.save must be a text or a Path. Received 3"):
         run.save(3)
+
+
+NUMBERS = [
+    np.longdouble("0.001"),
+    np.float32(0.001),
+    np.float16(0.001),
+    Fraction(1, 1000),
+    sp.Rational(1, 1000),
+    sp.Float(0.001),
+]
+
+
+@pytest.mark.parametrize("number", [*NUMBERS, np.int64(0), np.longdouble(0)], ids=lambda number: type(number).__name__)
+def test_whatever_number_is_given_python_computes_with_its_float(number):
+    """A long float of NumPy ended the process: where C computes, it is a float of Python before."""
+    as_float = qd.to_statespace(LAB, float(number))
+    assert np.array_equal(qd.to_statespace(LAB, number).A, as_float.A)
+    loops = [qd.loop_transfer(LAB, qd.published("lab-fault")["elqr"], at=at) for at in (number, float(number))]
+    assert np.array_equal(loops[0].A, loops[1].A)
+    assert type(dataclasses.replace(LAB.reference, target_slip=number or 1.0).target_slip) is float
+
+
+def test_numbers_in_collections_are_those_of_python():
+    plain = ExtendedLQR.from_values((1.0, 2.0, 3.0, 4.0))
+    long = [np.longdouble(i) for i in (1, 2, 3, 4)]
+    for values in (long, tuple(long), np.array(long), np.array([1, 2, 3, 4]), np.arange(1, 5, dtype=np.float32)):
+        assert ExtendedLQR.from_values(values) == plain
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.array(0.5),
+        np.ma.masked,
+        np.ma.array([1.0, 2, 3, 4], mask=[0, 1, 0, 0]),
+        np.ma.arange(2.0).sum(),
+        np.float64(1),
+    ],
+    ids=["0-d", "masked", "partly masked", "sum", "number"],
+)
+def test_one_number_and_masked_ones_are_no_collection(values):
+    with pytest.raises(ParameterError, match="values of Law.from_values must be a tuple"):
+        ExtendedLQR.from_values(values)

@@ -15,6 +15,7 @@ from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.checks import require_finite
 from quakedesign.loop.actuators import Actuator, Delay
 from quakedesign.simulation.interop import to_iosystem
+from quakedesign.text import shown
 
 _GAINS = np.exp(np.linspace(0, math.log(1e4), 1000)[1:])  # factors among which the end of stability is looked for
 _FREQUENCIES = 5000
@@ -140,16 +141,21 @@ def loop_margins(loop: Any) -> LoopMargins:
 
     Parameters
     ----------
-    loop : control.StateSpace
+    loop : control.StateSpace or control.TransferFunction
         L, with one input and one output and negative feedback.
 
     Raises
     ------
     ParameterError
-        For a loop with more than one input or output.
+        For anything else, such as a loop with more than one input or output.
     """
     import control
 
+    if not isinstance(loop, control.StateSpace | control.TransferFunction):
+        raise ParameterError(
+            f"loop must be a StateSpace or TransferFunction of python-control. Received {shown(loop)}. "
+            "Use loop_transfer."
+        )
     if (loop.ninputs, loop.noutputs) != (1, 1):
         raise ParameterError(
             f"loop must have one input and one output. Received {loop.ninputs} and {loop.noutputs}. Choose one of each."

@@ -40,8 +40,10 @@ class Setting:
         if isinstance(samples, bool) or not isinstance(samples, int) or samples < 1:
             raise ParameterError(f"samples must be a whole number of at least 1. Received {samples!r}.")
         start = min(task, length) / 4 if settled_from is None else settled_from
-        if not (math.isfinite(start) and start >= 0):
-            raise ParameterError(f"settled_from must be a time of at least 0 s. Received {start!r} s.")
+        if not 0 <= start < length:
+            raise ParameterError(
+                f"settled_from must be from 0 to below the duration, {length!r} s. Received {start!r} s."
+            )
         return cls(pace, steps, samples, float(start))
 
 

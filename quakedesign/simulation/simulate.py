@@ -13,6 +13,7 @@ from quakedesign.loop.actuators import Actuator
 from quakedesign.loop.schemes import Scheme, own_way
 from quakedesign.loop.sensing import Sensor, Transducer
 from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator
+from quakedesign.simulation.integrators.adaptive import require_tolerance
 from quakedesign.simulation.loading import Load
 from quakedesign.simulation.memoryless_earthquake import natural_peak
 from quakedesign.simulation.outcome import OutcomeCriterion
@@ -135,6 +136,7 @@ def simulate(
             "a tide, a sliding variation and a transducer alone need friction with a state. Received "
             f"{fault.friction.name}. Give a load, a variation or a measurement."
         )
+    require_tolerance(rtol)
     scheme, step, own = own_way(controller, scheme, step, "continuous")
     step, own = by_no_clock(controller, scheme, step, own)
     setting = Setting.of(fault, step, duration, samples, settled_from)

@@ -103,6 +103,12 @@ def test_a_loop_of_two_signals_has_no_margins():
         qd.loop_margins(qd.to_statespace(REAL))
 
 
+@pytest.mark.parametrize("loop", [None, 1.0, "L", np.eye(2), REAL, LAW, control.frd([1], [1])])
+def test_what_is_no_loop_has_no_margins(loop):
+    with pytest.raises(ParameterError, match="loop must be a StateSpace or TransferFunction"):
+        qd.loop_margins(loop)
+
+
 def test_a_law_of_samples_meets_a_fault_that_is_held():
     design = qd.design(REAL, "elqr")
     loop = qd.loop_transfer(REAL, design.controller)

@@ -227,3 +227,16 @@ def test_the_published_gains_give_the_papers_errors(law, bounds):
     figures = simulate(REAL, published("real-fault")[law]).metrics.to_dict()
     for name, (low, high) in bounds.items():
         assert low < figures[name] < high
+
+
+@pytest.mark.parametrize("rtol", [math.nan, math.inf, 0.0, -1e-9, 1e300])
+def test_a_tolerance_means_something_with_every_method(rtol):
+    for method in ("dormand-prince", "cvodes"):
+        with pytest.raises(ParameterError, match="rtol must be between"):
+            simulate(LAB, duration=0.01, method=method, rtol=rtol)
+
+
+@pytest.mark.parametrize("begin", [math.nan, -1.0, 0.02, 1e300, math.inf])
+def test_errors_count_from_a_time_of_the_run(begin):
+    with pytest.raises(ParameterError, match="settled_from must be from 0 to below the duration"):
+        simulate(LAB, duration=0.02, settled_from=begin)

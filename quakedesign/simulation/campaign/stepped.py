@@ -49,6 +49,9 @@ class SteppedProblem(Problem):
         loop: Any = loop_class(self.plant)(self.fault, self.controller, load=self.load, factors=varied.values)
         return Recorder(loop, reseeded(self.scheme, sample.noise_seed), self.setting.step, initial)
 
+    def __post_init__(self) -> None:
+        loop_class(self.plant)
+
     def start(self, sample: Sample) -> "np.ndarray":
         """See `Problem.start`."""
         return np.array(self.recorder(sample).start(self.setting.settled_from))
