@@ -11,11 +11,10 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ["QUAKEDESIGN_CACHE"] = "off"  # tests compute, and leave the cache of the user alone
 
-sys.set_int_max_str_digits(640)  # so that an exact number that is written by `str` is found by a shorter one
-
 import pytest
 from hypothesis import settings
 
+sys.set_int_max_str_digits(640)  # so that an exact number that is written by `str` is found by a shorter one
 settings.register_profile("reproducible", derandomize=True, print_blob=True, deadline=None)
 settings.load_profile("reproducible")
 

@@ -224,5 +224,5 @@ def test_numbers_in_collections_are_those_of_python():
     ids=["0-d", "masked", "partly masked", "sum", "number"],
 )
 def test_one_number_and_masked_ones_are_no_collection(values):
-    with pytest.raises(ParameterError, match="values of Law.from_values must be a tuple"):
+    with pytest.raises(ParameterError, match=r"values of Law\.from_values must be a tuple"):
         ExtendedLQR.from_values(values)
