@@ -5,6 +5,7 @@ import os
 import sys
 
 from quakedesign.interruption import ending, leave
+from quakedesign.streams import has_room, lack_memory, lacks_memory, open_all, widen
 
 _OBJECTS = 100_000
 """How many are made between two searches for garbage: libraries make as many when they load, and none is garbage."""
@@ -14,9 +15,16 @@ def main() -> None:
     """Run the command line; an interruption is one line from the first import on."""
     gc.set_threshold(_OBJECTS, *gc.get_threshold()[1:])
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # matrices are small: threads of linear algebra only wait for another
+    open_all()
+    widen()
     try:
         with ending(process=True):
-            _run()
+            try:
+                _run()
+            except Exception as error:
+                if not lacks_memory(error):
+                    raise
+                lack_memory()
     except SystemExit as end:
         leave(end.code)
         raise
@@ -28,6 +36,8 @@ def _run() -> None:
 
         if print_overview():
             sys.exit(0)
+    if not has_room():
+        lack_memory()
     from quakedesign.cli import main as run
 
     run()

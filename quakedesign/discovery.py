@@ -71,7 +71,8 @@ def user_code() -> Iterator[None]:
 def _raised_by(error: BaseException) -> str | None:
     """Module of the user's through which an error came; some module where it is no `Exception`, as none of ours is."""
     through = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
-    others = None if isinstance(error, Exception) else "a module of the user's"
+    by_others = isinstance(error, Exception) or not _imported or through[-1].startswith("rich.")  # of a closed pipe
+    others = None if by_others else "a module of the user's"
     return next((module for module in reversed(through) if module in _imported), others)
 
 

@@ -2,9 +2,31 @@
 
 import os
 import stat
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from quakedesign.errors import QuakedesignError
+
+_MOST_DOTS = 400
+"""In a line of TOML: memory and time for a key of n parts grow as n²."""
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Entries of a TOML file of some 64 KiB.
+
+    Raises
+    ------
+    ValueError
+        When it is no TOML, nested too deeply, or has a key of more than 400 parts.
+    """
+    for number, line in enumerate(text.split("\n"), start=1):
+        if line.count(".") > _MOST_DOTS:
+            raise ValueError(f"a line may have at most {_MOST_DOTS} dots, line {number} has {line.count('.')}")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("its values are nested too deeply") from None
 
 
 def read_text(path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError]) -> str:

@@ -2,11 +2,11 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from quakedesign.errors import OutputError
-from quakedesign.temporary import ASIDE, is_temporary, sweep, temporary_folder
+from quakedesign.temporary import ASIDE, is_temporary, lock_of, sweep, temporary_folder, unlock
 
 _placed = [0]
 _LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for what goes beside
@@ -35,6 +35,59 @@ def require_room(path: Path) -> None:
         ) from None
 
 
+_held: list[tuple[Path, Path, int | None]] = []
+"""Folders that this command writes, with their locks."""
+
+
+def hold(folder: Path, *, make: bool = False) -> bool:
+    """Refuse a folder that another command writes, and keep it from others until `release`; False if it is held.
+
+    Parameters
+    ----------
+    folder : Path
+    make : bool
+        Make the folders above it where there are none.
+
+    Raises
+    ------
+    OutputError
+    """
+    place = Path(os.path.realpath(folder))
+    if any(place == held for held, _, _ in _held):
+        return False
+    try:
+        if make:
+            place.parent.mkdir(parents=True, exist_ok=True)
+        _held.append((place, *lock_of(place)))
+    except BlockingIOError:
+        raise OutputError(
+            f"{folder} must be written by one command at a time. Received one that another writes to. Wait for it, or "
+            "choose another folder."
+        ) from None
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written: {error.strerror}. Choose another folder.") from None
+    return True
+
+
+def release(folder: Path | None = None) -> None:
+    """Let others write a folder; every one, unless told."""
+    place = None if folder is None else Path(os.path.realpath(folder))
+    for entry in [entry for entry in _held if place in (None, entry[0])]:
+        _held.remove(entry)
+        unlock(*entry[1:])
+
+
+@contextmanager
+def sole_writer(folder: Path, *, make: bool = False) -> Iterator[None]:
+    """Hold a folder in a block, see `hold`."""
+    new = hold(folder, make=make)
+    try:
+        yield
+    finally:
+        if new:
+            release(folder)
+
+
 def number_placed() -> int:
     """How many files and folders this process has put in their places, that which it is about to put among them."""
     return _placed[0]
@@ -61,6 +114,28 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 
 @contextmanager
+def made_folder(folder: Path) -> Iterator[None]:
+    """Folder for files of a block, made with those above it; what was made goes again where the block fails.
+
+    Raises
+    ------
+    OutputError
+        When it cannot be made.
+    """
+    missing = [place for place in (folder, *folder.parents) if not os.path.lexists(place)]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException as error:
+        for place in missing:
+            with suppress(OSError):  # it holds something, or was never made
+                place.rmdir()
+        if isinstance(error, OSError) and not isinstance(error, OutputError):
+            raise OutputError(f"{folder} cannot be written: {error.strerror}. Choose another folder.") from None
+        raise
+
+
+@contextmanager
 def whole_folder(target: Path) -> Iterator[Path]:
     """Folder to fill that takes its place, and that of an earlier one, when the block ends without an error.
 
@@ -71,7 +146,7 @@ def whole_folder(target: Path) -> Iterator[Path]:
     """
     _require_name(target)
     try:
-        with temporary_folder(target.absolute().parent) as work:
+        with sole_writer(target), temporary_folder(target.absolute().parent) as work:
             new = work / "new"
             new.mkdir()
             yield new

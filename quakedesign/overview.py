@@ -41,7 +41,7 @@ def overview(width: int) -> Iterator[str]:
 
 def _width() -> int:
     """Columns of the terminal; 80 without one."""
-    if (given := os.environ.get("COLUMNS", "")).isdigit():
+    if (given := os.environ.get("COLUMNS", "")).isdecimal():
         return int(given)
     for stream in (0, 1, 2):
         try:

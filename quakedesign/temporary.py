@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
+from time import sleep
 
 if sys.platform != "win32":
     import fcntl
@@ -22,6 +23,7 @@ ASIDE = "aside"
 """What lies in this folder of a temporary folder has been moved there, and goes back where its place is empty."""
 
 _SWEPT = -1
+_TRIALS, _PAUSE = 10, 0.02  # s: a sweep holds a lock for less
 _mine: set[Path] = set()
 
 
@@ -41,6 +43,46 @@ def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
         _discard(folder)
         if lock is not None:
             os.close(lock)
+
+
+def lock_of(target: Path) -> tuple[Path, int | None]:
+    """Lock of a place until it is given back to `unlock`: a temporary folder beside it, and its descriptor.
+
+    Another command on another machine does not see it, and None stands for a file system without locks.
+
+    Raises
+    ------
+    BlockingIOError
+        When another process holds it, or this one.
+    """
+    place = Path(os.path.realpath(target))
+    folder = place.parent / f"{PREFIX}{sha256(os.fsencode(place.name)).hexdigest()[:16]}"
+    if folder in _mine:
+        raise BlockingIOError
+    for trial in range(_TRIALS):
+        try:
+            folder.mkdir(mode=0o700, exist_ok=True)
+            lock = _locked(folder)
+            if os.path.samestat(os.fstat(lock), os.stat(folder)):
+                _mine.add(folder)
+                return folder, lock
+            os.close(lock)
+        except BlockingIOError:  # held, or swept at this moment
+            if trial == _TRIALS - 1:
+                raise
+            sleep(_PAUSE)
+        except FileNotFoundError:
+            continue
+        except OSError:
+            break
+    return folder, None
+
+
+def unlock(folder: Path, lock: int | None) -> None:
+    """Give back what `lock_of` gave."""
+    if lock is not None:
+        _discard(folder)
+        os.close(lock)
 
 
 def is_temporary(path: Path) -> bool:

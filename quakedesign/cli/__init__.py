@@ -29,6 +29,8 @@ from quakedesign.cli.shared import app, typed
 from quakedesign.discovery import user_code
 from quakedesign.errors import QuakedesignError
 from quakedesign.interruption import ending
+from quakedesign.output import release
+from quakedesign.streams import lack_memory, lacks_memory
 from quakedesign.text import one_line
 
 __all__ = [
@@ -52,7 +54,7 @@ __all__ = [
 ]
 
 
-_PLACES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
+_PLACES = (errno.EBADF, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
 """What a disk refuses, as against a defect."""
 
 
@@ -76,6 +78,8 @@ def main(arguments: list[str] | None = None) -> None:
         sys.stderr.close()
         sys.exit(1)
     except Exception as error:
+        if lacks_memory(error):
+            lack_memory()
         if "QUAKEDESIGN_TRACEBACK" in os.environ:
             raise
         if isinstance(error, OSError) and error.errno in _PLACES:
@@ -84,6 +88,8 @@ def main(arguments: list[str] | None = None) -> None:
         defect = one_line(f"{type(error).__name__}: {error}")
         print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the place.", file=sys.stderr)
         sys.exit(3)
+    finally:
+        release()
 
 
 def _with_help(error: CycloptsError) -> str:

@@ -11,6 +11,7 @@ from quakedesign.cli.shared import app, console, progress
 from quakedesign.cli.state import SpreadOptions
 from quakedesign.errors import ParameterError
 from quakedesign.interruption import remedy
+from quakedesign.output import hold
 
 if TYPE_CHECKING:
     from quakedesign.simulation.campaign import Campaign, Problem
@@ -96,6 +97,7 @@ def campaign(
         **told,
     )
     folder = out or Path(f"quakedesign-{loaded.name}-campaign")
+    hold(folder, make=True)
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
     remedy(f"the same command goes on from {folder}")
     with progress() as tell:

@@ -17,6 +17,7 @@ from quakedesign.cli.option_values import (
 from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Formats, Output, Shaking
 from quakedesign.cli.shared import app, command_line, console, print_lines, progress
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.output import hold
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
@@ -189,6 +190,7 @@ def design(
     loaded, asked = options.asked(fault)
     folder = out or Path(f"quakedesign-{loaded.name}")
     prepare(folder, force=force)
+    hold(folder)
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.folder import write_folder
 

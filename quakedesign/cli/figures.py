@@ -5,6 +5,7 @@ from pathlib import Path
 from quakedesign.cli.design import DesignOptions, positive
 from quakedesign.cli.options import PLAIN, FaultName, Force, Formats, Output
 from quakedesign.cli.shared import app, command_line, console, print_json, print_lines, progress
+from quakedesign.output import hold
 
 _AS_USUAL = DesignOptions()
 
@@ -65,6 +66,7 @@ def figures(
     loaded, asked = options.asked(fault)
     folder = out or Path(f"quakedesign-{loaded.name}-figures")
     prepare(folder, force=force)
+    hold(folder)
     from quakedesign.report.comparison import designed_comparison
     from quakedesign.report.outcomes import run_sentences
     from quakedesign.report.paper_study import paper_study

@@ -9,6 +9,7 @@ from quakedesign.cli.option_values import Gains, Whole
 from quakedesign.cli.options import PLAIN, Force, Formats, Output, Scheduler
 from quakedesign.cli.shared import app, progress
 from quakedesign.errors import ParameterError
+from quakedesign.output import hold
 
 Numbers = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
 
@@ -75,6 +76,7 @@ def gain_map(
 
     folder = out or Path(f"quakedesign-map-{law}")
     prepare(folder, force=force)
+    hold(folder)
     if range is not None and len(range) != 4:
         raise ParameterError(f"range needs four numbers, two for each gain. Received {len(range)}.")
     base = gains or tuple(str(v) for v in family(law)[0].law.gains.values())

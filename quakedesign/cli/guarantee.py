@@ -22,7 +22,7 @@ from quakedesign.cli.option_values import (
 from quakedesign.cli.options import PLAIN, Box, DisturbanceClass, FaultName, Force, Output, Scheduler, Shaking
 from quakedesign.cli.shared import app, given, new_file, progress
 from quakedesign.errors import ParameterError, QuakedesignError
-from quakedesign.output import require_room
+from quakedesign.output import hold, made_folder, require_room
 from quakedesign.rationals import rational
 
 
@@ -221,6 +221,7 @@ def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | No
         new_file(out, "certificate file", force=force)
         return [out]
     require_room(out)
+    hold(out)
     files = [out / f"{name}-guarantee.json" for name in names]
     for path in (path for path in files if out.exists()):
         new_file(path, "certificate file", force=force)
@@ -235,6 +236,6 @@ def _facts(answer: Any, path: Path | None) -> dict[str, Any]:
         return {"verdict": "refused", "reason": str(answer), "certificate": None}
     written = path if answer.proved else None
     if written is not None:
-        written.parent.mkdir(parents=True, exist_ok=True)
-        save_guarantee(answer.found, written)
+        with made_folder(written.parent):
+            save_guarantee(answer.found, written)
     return {**answer.to_dict(), "certificate": written and str(written)}

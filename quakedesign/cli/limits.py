@@ -13,6 +13,7 @@ from quakedesign.cli.option_values import (
 )
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
 from quakedesign.cli.shared import app
+from quakedesign.output import hold
 from quakedesign.rationals import rational
 
 
@@ -78,6 +79,7 @@ def limits(
         from quakedesign.report.folder import prepare
 
         prepare(out, force=force)
+        hold(out)
     from quakedesign.report.figure_files import file_names
     from quakedesign.report.impossibility_table import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits

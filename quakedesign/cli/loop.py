@@ -20,6 +20,7 @@ from quakedesign.cli.options import (
 from quakedesign.cli.shared import app, console, given, new_file, print_lines, progress
 from quakedesign.cli.state import NO_STATE, StateOptions, changed_options, require_no_state_options, show_state_run
 from quakedesign.errors import ParameterError
+from quakedesign.output import hold
 
 _DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
 _BESIDE = ("scheme", "plant", "drift", "perturbation", "initial_slip", "initial_slip_rate", "weight", "authority")
@@ -191,6 +192,7 @@ def sampling(
     loaded.require_memoryless("a study of sampling")
     folder = out or Path(f"quakedesign-{loaded.name}-sampling")
     prepare(folder, force=force)
+    hold(folder)
     with progress() as tell:
         tell("gains", 0.0)
         law = (

@@ -1,6 +1,5 @@
 """Fault descriptions: TOML files with unit strings, checked at the boundary and turned into `Fault`."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, replace
 from fractions import Fraction
@@ -19,6 +18,7 @@ from quakedesign.fault.sources import LARGEST_FILE, source_text
 from quakedesign.fault.tables import Table
 from quakedesign.fault.uncertainty import UncertaintyBox, uncertainty_box
 from quakedesign.fault.units import si_value, units_of
+from quakedesign.input import parse_toml
 from quakedesign.rationals import rational
 
 PLANT = units_of(Fault)
@@ -84,8 +84,8 @@ def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
     if len(text) > LARGEST_FILE:
         raise ScenarioError(f"{name}: a fault file must be at most 64 KiB. Received {len(text)} characters.")
     try:
-        raw = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+        raw = parse_toml(text)
+    except ValueError as error:
         raise ScenarioError(f"{name} is not valid TOML: {error}. Compare with a preset.") from None
     problems = Problems()
     fault: Fault = _fault(Table(raw, problems), problems, allow_code)

@@ -195,6 +195,7 @@ def _record(name: str, given: dict[str, "np.ndarray"], normal_stress: float | No
         raise RecordError(
             f"time must ascend. Received {time[late[0] + 1]:.9g} s after {time[late[0]]:.9g} s. Sort the record."
         )
+    _require_sizes(given)
     friction, normal, unit = _friction(given, normal_stress)
     return Record(
         name=name,
@@ -205,6 +206,35 @@ def _record(name: str, given: dict[str, "np.ndarray"], normal_stress: float | No
         normal=normal,
         normal_unit=unit,
     )
+
+
+_DURATION, _PERIOD, _DISTANCE, _RATE = (1e-6, 1e12), (1e-9, 1e12), (1e-12, 1e6), (1e-15, 1e4)
+_SIZES = {"m/s": _RATE, "Pa": (1e-6, 1e15), "N": (1e-6, 1e15)}
+
+
+def _require_sizes(given: dict[str, "np.ndarray"]) -> None:
+    """Refuse sizes that no experiment has, as of a wrong unit: solvers of the fit fail on them.
+
+    Raises
+    ------
+    RecordError
+    """
+    time = given["time"]
+    if len(time) < 2:
+        return
+    lasting = float(np.ptp(time))
+    sizes = [("the duration", lasting, _DURATION, "s"), ("a sampling period", np.min(np.diff(time)), _PERIOD, "s")]
+    for name, column in given.items():
+        if COLUMNS[name] == "m":
+            sizes.append((f"the range of {name}", np.ptp(column), _DISTANCE, "m"))
+            sizes.append((f"the mean rate of {name}", np.ptp(column) / lasting, _RATE, "m/s"))
+        elif COLUMNS[name] in _SIZES:
+            sizes.append((f"the largest {name}", np.max(np.abs(column)), _SIZES[COLUMNS[name]], COLUMNS[name]))
+    for what, size, (least, largest), unit in sizes:
+        if size and not least <= size <= largest:
+            raise RecordError(
+                f"{what} must be from {least:g} to {largest:g} {unit}. Received {size:.3g} {unit}. Check the units."
+            )
 
 
 def _friction(given: dict[str, "np.ndarray"], stress: float | None) -> "tuple[np.ndarray, np.ndarray, str]":

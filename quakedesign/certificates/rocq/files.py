@@ -15,7 +15,7 @@ from quakedesign.certificates.rocq.loops import loop_theorems
 from quakedesign.certificates.rocq.multipliers import reason
 from quakedesign.certificates.witnesses import statement_of
 from quakedesign.errors import OutputError, UnsupportedError
-from quakedesign.output import write_whole
+from quakedesign.output import made_folder, sole_writer, write_whole
 from quakedesign.sos.exact.attraction import LyapunovProof
 from quakedesign.sos.exact.attraction_files import read as read_attraction_file
 from quakedesign.sos.exact.polynomial import evaluate
@@ -79,17 +79,17 @@ def write_rocq(paths: Iterable[Path], folder: Path, *, force: bool = False) -> d
                 f"file for coqc must be new. Received {target}, which exists. Give --force to replace it."
             )
         targets[path] = target
-    return {path: _written(path, target) for path, target in targets.items()}
-
-
-def _written(path: Path, target: Path) -> Path | str:
-    try:
-        text = rocq_text(read_json(path))
-    except UnsupportedError as error:
-        return str(error)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(target, text)
-    return target
+    written: dict[Path, Path | str] = {}
+    for path, target in targets.items():
+        try:
+            text = rocq_text(read_json(path))
+        except UnsupportedError as error:
+            written[path] = str(error)
+            continue
+        with made_folder(folder), sole_writer(folder):
+            write_whole(target, text)
+        written[path] = target
+    return written
 
 
 def module_name(stem: str) -> str:

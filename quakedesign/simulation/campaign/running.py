@@ -16,6 +16,7 @@ from quakedesign.executors import crew_of
 from quakedesign.fault import Fault
 from quakedesign.fault.checks import require_seed
 from quakedesign.loop.schemes import Scheme, own_way
+from quakedesign.output import sole_writer
 from quakedesign.rationals import rational
 from quakedesign.simulation.campaign.dispatch import dispatch
 from quakedesign.simulation.campaign.ledger import Ledger
@@ -178,8 +179,9 @@ def run_campaign(
     if metric is not None:
         require_metric(metric, problem.metrics)
     began = perf_counter()
-    ledger = Ledger.open(Path(folder), problem.inputs, renew=renew)
-    with temporary_folder() as private, crew_of(workers, scheduler, executor) as crew:
+    place = Path(folder)
+    with sole_writer(place, make=True), temporary_folder() as private, crew_of(workers, scheduler, executor) as crew:
+        ledger = Ledger.open(place, problem.inputs, renew=renew)
         runner = _Runner(problem, ledger, problem.program.compiled(private), crew, batch, tell)
         chosen = [problem.sample(i) for i in range(samples)]
         results = runner.results(chosen, list(map(str, range(samples))), "samples")

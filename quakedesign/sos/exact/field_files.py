@@ -1,11 +1,9 @@
 """A polynomial field and a Lyapunov function from a TOML file."""
 
-import tomllib
 from pathlib import Path
-from typing import Any
 
 from quakedesign.errors import PolynomialError
-from quakedesign.input import read_text
+from quakedesign.input import parse_toml, read_text
 
 _LARGEST = 1 << 16  # bytes
 
@@ -20,8 +18,8 @@ def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
     """
     content = read_text(path, "a field's file", largest=_LARGEST, refusal=PolynomialError)
     try:
-        raw: dict[str, Any] = tomllib.loads(content)
-    except (ValueError, RecursionError) as error:
+        raw = parse_toml(content)
+    except ValueError as error:
         reason = str(error).partition("\n")[0]
         raise PolynomialError(f"{path} must be TOML. Received: {reason}. Quote polynomials.") from None
     field, function = raw.get("field"), raw.get("V")

@@ -1,0 +1,80 @@
+"""What a process begins with: streams that may be closed, a width that may be absurd, memory that may not do."""
+
+import errno
+import io
+import os
+import sys
+from typing import NoReturn
+
+LACKS_MEMORY = 4
+"""Exit code of a command that ran out of memory: nothing is said about its question."""
+_NARROWEST, _WIDEST = 20, 1000  # columns; tables of help never end below 3, and fill the memory with blanks
+_LEAST = 300 * 2**20  # bytes of address space
+_SAID = ("cannot allocate memory", "failed to map", "out of memory", "can't start new thread", "std::bad_alloc")
+
+
+def open_all() -> None:
+    """Streams that were closed: nothing is read or told there, and what is written on stdout is an error.
+
+    Without it the next file that is opened takes their place.
+    """
+    for number, name, mode in ((0, "stdin", os.O_RDONLY), (1, "stdout", os.O_RDONLY), (2, "stderr", os.O_WRONLY)):
+        if getattr(sys, name) is None:
+            opened = os.open(os.devnull, mode)
+            if opened != number:
+                os.dup2(opened, number)
+                os.close(opened)
+            plain = open(number, "w" if number else "r", encoding="utf-8", closefd=False)
+            setattr(sys, name, _Closed() if name == "stdout" else plain)
+
+
+class _Closed(io.TextIOBase):
+    """What was closed when the process began."""
+
+    def write(self, _text: str) -> int:
+        raise OSError(errno.EBADF, "it is closed", "stdout")
+
+
+def widen() -> None:
+    """Take a terminal or ``COLUMNS`` of a width in which help can be laid out."""
+    given = os.environ.get("COLUMNS", "")
+    if given.isascii() and given.isdecimal():
+        columns = int(given[:9])
+    else:
+        os.environ.pop("COLUMNS", None)
+        try:
+            columns = os.get_terminal_size(1).columns or 80
+        except OSError:
+            return
+    if not _NARROWEST <= columns <= _WIDEST:
+        os.environ["COLUMNS"] = str(min(max(columns, _NARROWEST), _WIDEST))
+
+
+def has_room() -> bool:
+    """Whether the process may have what the libraries take when they load: OpenBLAS ends it with 1 otherwise."""
+    try:
+        import resource
+    except ImportError:
+        return True
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return limit == resource.RLIM_INFINITY or limit >= _LEAST
+
+
+def lack_memory() -> NoReturn:
+    """End a command for which there is too little memory."""
+    print("quakedesign: out of memory. Raise the limit, or make the problem smaller.", file=sys.stderr)
+    sys.exit(LACKS_MEMORY)
+
+
+def lacks_memory(error: BaseException | None) -> bool:
+    """Whether an error came of too little memory: libraries say so in words of their own, and while they load."""
+    while error is not None:
+        number = getattr(error, "errno", None)
+        if (
+            isinstance(error, MemoryError)
+            or number == errno.ENOMEM
+            or any(said in str(error).lower() for said in _SAID)
+        ):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
