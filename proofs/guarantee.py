@@ -119,7 +119,7 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         slip, rate = (lower(Fraction(document["start"][name])) for name in ("slip", "rate"))
         where = f"from |slip| <= {slip} m, |slip rate| <= {rate} m/s at first"
     return [
-        f"fault {ascii(task.name)[1:-1]} (a name; the data in the file are what counts), friction any function of "
+        f'fault "{ascii(task.name)[1:-1]}" (a name; the data in the file are what counts), friction any function of '
         + ("the slip alone" if task.steady_beta else "slip and slip rate")
         + " within its bounds and slopes, continued to negative slip rates, parameters constant",
         f"derived accelerations: of a slip error [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, of a slip-rate error "

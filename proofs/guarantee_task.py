@@ -12,7 +12,7 @@ from guarantee_reading import Row, keys, need, number, numbers, row
 
 MAX_DEGREE = 12
 HALVINGS = 7
-FAULT = re.compile(r"\w[\w .+-]{0,59}")
+FAULT = re.compile(r"\w[\w .-]{0,59}")
 
 
 def hull(values: Iterable[Fraction]) -> tuple[Fraction, Fraction]:
@@ -69,7 +69,10 @@ def read_task(document: dict[str, Any]) -> Task:
     parts = ("name", "density", "shear_modulus", "length", "damping", "normal_stress", "spreads", "friction")
     given = keys(document["fault"], "fault", *parts)
     name = given["name"]
-    need(type(name) is str and FAULT.fullmatch(name) is not None, "fault.name must be a short text")
+    need(
+        type(name) is str and FAULT.fullmatch(name) is not None,
+        "fault.name must be at most 60 letters, digits, spaces and _ . -",
+    )
     rho, modulus, size, eta, sigma = (number(given[k], f"fault.{k}") for k in parts[1:6])
     spread = numbers(given["spreads"], "spreads", "stiffness", "damping", "authority")
     mu = numbers(

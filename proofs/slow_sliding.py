@@ -80,7 +80,8 @@ def read_fault(document: dict[str, Any]) -> Fault:
     given = keys(raw, "fault", "name", *ROCK, *CONSTANTS, *told)
     need(given.get("state_law", "slip") == "slip", "state_law must be slip where it is told")
     need(given.get("regularised", True) is True, "regularised must be true where it is told")
-    need(type(given["name"]) is str and FAULT.fullmatch(given["name"]) is not None, "fault.name must be a short text")
+    named = type(given["name"]) is str and FAULT.fullmatch(given["name"]) is not None
+    need(named, "fault.name must be at most 60 letters, digits, spaces and _ . -")
     rho, modulus, size, eta = (number(given[name], name) for name in ROCK)
     box = {}
     for name in CONSTANTS:
@@ -389,7 +390,7 @@ def statement(
     empty = [] if fault.distance else ["about nothing: the reference goes 0 m, which takes no time"]
     return [
         *empty,
-        f"fault {ascii(fault.name)[1:-1]} (a name; the data in the file are what counts), "
+        f'fault "{ascii(fault.name)[1:-1]}" (a name; the data in the file are what counts), '
         f"{'regularised ' * fault.regularised}rate-and-state friction with "
         f"the {'slip' if fault.slips else 'ageing'} law, "
         f"with inertia, every constant {', '.join(ranges)}; {cells} cells",

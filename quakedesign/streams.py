@@ -9,7 +9,7 @@ from typing import NoReturn
 LACKS_MEMORY = 4
 """Exit code of a command that ran out of memory: nothing is said about its question."""
 _NARROWEST, _WIDEST = 20, 1000  # columns; tables of help never end below 3, and fill the memory with blanks
-_LEAST = 300 * 2**20  # bytes of address space
+_LEAST = 600 * 2**20  # bytes of address space
 _SAID = ("cannot allocate memory", "failed to map", "out of memory", "can't start new thread", "std::bad_alloc")
 
 

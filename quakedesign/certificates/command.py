@@ -1,6 +1,7 @@
 """Re-checking files for people: a verdict and what exactly was verified."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,7 +54,10 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
             return _running(raw, fault)
         if kind != LOOP:
             verdict_of, said = _attraction(raw) if kind == ATTRACTION else _polynomial(raw)
-            return verdict_of, said if fault is None else [*said, f"names no fault: nothing is said about {fault.name}"]
+            return verdict_of, said if fault is None else [
+                *said,
+                f'names no fault: nothing is said about "{fault.name}"',
+            ]
         certificate = Certificate.of(evidence_of(raw))
         verdict = certificate.check()
         more = certificates.covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []
@@ -70,11 +74,11 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     if claim.check() is not Verdict.PROVED:
         raise CertificateError("the claims do not follow from the loop and the fault's data")
     about = entry_lines(guarantee.guarantee_document(claim))
-    lines = [f"fault {claim.task.name}, by the data in the file", claim.sentence(), *about]
+    lines = [f'fault "{claim.task.name}", by the data in the file', claim.sentence(), *about]
     if fault is not None:
-        if claim.task != _task(claim, fault):
-            raise CertificateError(f"the data are not those of {fault.name}")
-        lines.append(f"the data are those of {fault.name}{_other_step(claim, fault)}")
+        if claim.task != replace(_task(claim, fault), name=claim.task.name):
+            raise CertificateError(f'the data are not those of "{fault.name}"')
+        lines.append(f'the data are those of "{fault.name}"{_other_step(claim, fault)}')
     return str(Verdict.PROVED), lines
 
 

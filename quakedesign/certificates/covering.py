@@ -32,7 +32,7 @@ def covers(certificate: Certificate, fault: Fault) -> list[str]:
     CertificateError
     """
     require_degree_of_slip(certificate.loop)
-    loop, said = certificate.loop, [f"covers {certificate.loop.law} on {fault.name}, box {fault.box.name}"]
+    loop, said = certificate.loop, [f'covers {certificate.loop.law} on "{fault.name}", box {fault.box.name}']
     if loop.domain == "reals":
         needed = sectors(fault)
         if loop.constants != {"b": needed.authority}:

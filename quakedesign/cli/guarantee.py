@@ -192,7 +192,7 @@ def guarantee(
     else:
         each = zip(faults, found, files, strict=True)
         facts = [{"fault": one.name} | _facts(proof, path) for one, proof, path in each]
-        lines = [f"{one.name}: {line}" for one, proof in zip(faults, found, strict=True) for line in _lines(proof)]
+        lines = [f'"{one.name}": {line}' for one, proof in zip(faults, found, strict=True) for line in _lines(proof)]
         output.show({"guarantees": facts, **said}, lines)
     return 0 if all(_proved(one) for one in found) else 1
 

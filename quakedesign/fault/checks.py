@@ -15,7 +15,7 @@ MOST_WORKERS = 256
 """Processes that one command may start."""
 
 _LARGEST = 1e40
-_NAME = re.compile(r"\w[\w .+-]{0,59}")
+_NAME = re.compile(r"\w[\w .-]{0,59}")
 _MOST_BYTES = 120  # files and folders are named after it, and a system gives them 255
 
 
@@ -170,6 +170,6 @@ def require_name(name: str) -> None:
     """
     if not isinstance(name, str) or not _NAME.fullmatch(name) or len(name.encode()) > _MOST_BYTES:
         raise ParameterError(
-            "name must be a text of at most 60 letters, digits, spaces and _ . + - (120 bytes in UTF-8), beginning "
+            "name must be a text of at most 60 letters, digits, spaces and _ . - (120 bytes in UTF-8), beginning "
             f"with a letter or digit. Received {shown(name)}."
         )

@@ -205,7 +205,7 @@ def fault_schema() -> dict[str, Any]:
     said = _described(Fault)
     widths = {key: {"type": "number", "description": said} for key, said in _WIDTHS_SAID.items()}
     properties = {
-        "name": {"type": "string", "description": "letters, digits, spaces and _ . + -"},
+        "name": {"type": "string", "description": "letters, digits, spaces and _ . -"},
         "source": {"type": "string", "description": said["source"]},
         **_quantities(PLANT, said),
         "uncertainty": {

@@ -48,7 +48,7 @@ def verdict_lines(judged: LinearVerdict) -> list[str]:
     gains = " ".join(f"{float(k):.6g}" for k in judged.controller.gains.values())
     optimal = {True: "yes", False: "no", None: "undecided"}[judged.facts["inverse_optimal"]]
     lines = [
-        f"{judged.analysis.verdict}: elqr {gains} on {fault.name}, box {fault.box.name}",
+        f'{judged.analysis.verdict}: elqr {gains} on "{fault.name}", box {fault.box.name}',
         *(f"  {line}" for line in margin_lines(judged.analysis)),
         f"  optimal for a Q that covers the uncertainty: {optimal} (the printed test: {tests['printed']['verdict']})",
         f"  {'; '.join(held_sentences(judged.held))}",

@@ -49,7 +49,7 @@ def test_a_proof_about_a_polynomial_says_nothing_about_a_fault(tmp_path):
     assert verdict == "proved"
     assert not any(line.endswith("exact arithmetic") for line in said)
     about = checked(path, "lab-fault")
-    assert about == ("proved", [*said, "names no fault: nothing is said about lab-fault"])
+    assert about == ("proved", [*said, 'names no fault: nothing is said about "lab-fault"'])
     raw = json.loads(path.read_text())
     first = next(iter(raw["polynomial"]))
     raw["polynomial"][first] = "7"
@@ -71,23 +71,23 @@ def test_a_guarantee_covers_the_fault_whose_data_it_has(monkeypatch, tmp_path):
     path = CERTIFICATES / "guarantee_real-fault.json"
     monkeypatch.setattr(Guarantee, "check", lambda self: Verdict.PROVED)
     verdict, said = checked(path)
-    assert (verdict, said[0]) == ("proved", "fault real-fault, by the data in the file")
+    assert (verdict, said[0]) == ("proved", 'fault "real-fault", by the data in the file')
     assert said[1].startswith("from rest, held over 0.184 s")
-    assert checked(path, "real-fault") == ("proved", [*said, "the data are those of real-fault, box paper"])
+    assert checked(path, "real-fault") == ("proved", [*said, 'the data are those of "real-fault", box paper'])
     slower = replace(load_fault("real-fault"), sampling_time=0.5)
     monkeypatch.setattr(
         "quakedesign.fault.load_fault", lambda name, **_: slower if name == "slower" else load_fault(name)
     )
-    told = "the data are those of real-fault, box paper; NOT at its T_s = 0.5 s, but at 0.184 s"
+    told = 'the data are those of "real-fault", box paper; NOT at its T_s = 0.5 s, but at 0.184 s'
     assert checked(path, "slower") == ("proved", [*said, told])
-    assert checked(path, "lab-fault") == ("invalid: the data are not those of lab-fault", [])
+    assert checked(path, "lab-fault") == ('invalid: the data are not those of "lab-fault"', [])
     raw = json.loads(path.read_text())
     raw["disturbance"]["change"] = "69/312500"
     (tmp_path / "slow.json").write_text(json.dumps(raw))
     assert checked(tmp_path / "slow.json", "real-fault")[0] == "proved"
     raw["disturbance"]["change"] = "7/31250"
     (tmp_path / "slow.json").write_text(json.dumps(raw))
-    assert checked(tmp_path / "slow.json", "real-fault")[0] == "invalid: the data are not those of real-fault"
+    assert checked(tmp_path / "slow.json", "real-fault")[0] == 'invalid: the data are not those of "real-fault"'
     monkeypatch.setattr(Guarantee, "check", lambda self: Verdict.UNDECIDED)
     expected = "invalid: the claims do not follow from the loop and the fault's data"
     assert checked(path) == (expected, [])

@@ -25,7 +25,7 @@ def test_a_linear_certificate_covers_a_fault_whose_ranges_it_holds_to_their_ends
     ranges = {name: ELQR.loop.uncertain[name] for name in ("s", "w", "beta")}
     needed = SimpleNamespace(authority=F(4, 1385), ranges=lambda: ranges)
     monkeypatch.setattr(covering, "sectors", lambda fault: needed)
-    assert covers(ELQR, LAB) == ["covers elqr on lab-fault, box paper"]
+    assert covers(ELQR, LAB) == ['covers elqr on "lab-fault", box paper']
     for name, (low, high) in ranges.items():
         for wrong in ((low + F(1, 10**12), high + 1), (low - 1, high - F(1, 10**12))):
             with pytest.raises(CertificateError, match=f"range of {name} does not cover lab-fault"):
@@ -54,7 +54,7 @@ def test_a_sliding_mode_s_certificate_says_which_scale_a_fault_needs(asked):
         covers(uncertain(other, beta=(F(1), F(2))), LAB)
     wide = uncertain(CTA, beta=(F(1), F(3, 2)), d=(F(-1, 5), F(1, 4)))
     assert covers(wide, LAB) == [
-        "covers cta on lab-fault, box paper",
+        'covers cta on "lab-fault", box paper',
         "|h'| <= 0.3334 m/s^3 along the reference needs a scale of at least 1.667",
     ]
     fault, divisor, errors = asked["rate"]

@@ -360,7 +360,7 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
     claims = dict(zip(CLAIMS, (F(1, 3), F(2, 3), F(1, 7), F(-1, 3), F(2, 3)), strict=True))
     raw = changed(HELD, (("loop", "delay"), "1/3"), (("loop", "lag"), "2/3"))
     assert checker.statement(raw, task, claims, F(1, 3)) == [
-        "fault a fault (a name; the data in the file are what counts), friction any function of slip and slip rate "
+        'fault "a fault" (a name; the data in the file are what counts), friction any function of slip and slip rate '
         "within its bounds and slopes, continued to negative slip rates, parameters constant",
         "derived accelerations: of a slip error [-0.3334, 0.6667] 1/s^2, of a slip-rate error less [-0.6667, 0.3334] "
         "1/s, of a pressure 0.6667 m^2/kg times [1, 0.3334]",
@@ -528,7 +528,7 @@ def test_the_slip_error_on_which_a_slow_gain_rests_stays_below_its_claim(monkeyp
         monkeypatch.setattr(checker, "bounds", lambda *given: asked.append(given) or ([slip, F(0), F(0)], F(1, 2)))
         return checker.verify(raw)[0]
 
-    first = "fault a fault (a name; the data in the file are what counts), friction any function of the slip alone "
+    first = 'fault "a fault" (a name; the data in the file are what counts), friction any function of the slip alone '
     first += "within its bounds and slopes, continued to negative slip rates, parameters constant"
     assert [verified(slow, F(999, 1000)), verified(steady, F(1))] == [first, first]
     assert [given[2:] for given in asked] == [(checker.Slow(3, F(1, 9)), F(1)), (None, F(1))]

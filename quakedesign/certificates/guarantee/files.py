@@ -53,7 +53,7 @@ _NOISE = ("slip", "rate")
 _LIMITS, _JITTER = ("least", "largest"), ("measured", "delay")
 _LAW = ("states", "measured", "output", "feedback")
 _MORE = {"root", "noise", "diffusion", "first", "jitter", "pump", "applied", "longest"}
-_FAULT = re.compile(r"\w[\w .+-]{0,59}")
+_FAULT = re.compile(r"\w[\w .-]{0,59}")
 _MOST_COEFFICIENTS = 13
 _MOST_STATES = 20
 _ZERO = Fraction(0)
@@ -263,7 +263,10 @@ def _claims(kind: type[_Claimed], raw: dict[str, Any]) -> _Claimed:
 
 def _name(fault: dict[str, Any]) -> str:
     name = fault["name"]
-    need(isinstance(name, str) and _FAULT.fullmatch(name) is not None, "name must be a short text")
+    need(
+        isinstance(name, str) and _FAULT.fullmatch(name) is not None,
+        "name must be at most 60 letters, digits, spaces and _ . -",
+    )
     return str(name)
 
 

@@ -492,9 +492,9 @@ def test_the_command_checks_files_and_compares_with_a_fault(tmp_path):
     save_guarantee(claim(), path)
     ((verdict, lines),) = check_files([path], "real-fault").values()
     assert verdict == "proved"
-    assert "the data are those of real-fault, box paper" in lines
+    assert 'the data are those of "real-fault", box paper' in lines
     ((verdict, _),) = check_files([path], "lab-fault").values()
-    assert verdict == "invalid: the data are not those of lab-fault"
+    assert verdict == 'invalid: the data are not those of "lab-fault"'
 
 
 def test_what_is_claimed_too_low_is_undecided_by_itself():
