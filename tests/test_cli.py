@@ -116,7 +116,7 @@ def test_the_designs_beat_the_published_gains_as_promised(main_job):
     assert [new[k]["run"]["scheme"] for k in ("cta", "dia", "elqr")] == ["compensated", "compensated", "explicit"]
     if name == "real-fault":  # what was asked for of the default designs, guaranteed and seen
         for law, seen in (("cta", cta), ("dia", dia), ("elqr", elqr)):
-            assert Fraction(new[law]["guaranteed"]["slip_rate_error"]) < 3e-4, law
+            assert Fraction(new[law]["guarantee"]["slip_rate_error"]) < 3e-4, law
             assert seen["max_slip_error"] <= 6e-6, law
             assert seen["max_slip_rate_error"] <= 4.5e-6, law
     assert {new[k]["verdict"] for k in new} == {"proved"}
@@ -129,7 +129,7 @@ def test_every_guarantee_is_said_first_and_holds_in_what_was_seen(main_job):
     for law, entry in results["controllers"].items():
         assert next(iter(entry)) == "guarantee"
         assert entry["class"] == "amplitude"
-        told, metrics = entry["guaranteed"], entry["metrics"]
+        told, metrics = entry["guarantee"], entry["metrics"]
         bounds = {name: Fraction(told[name]) for name in ("slip_error", "slip_rate_error")}
         for seen in (told["worst_found"], told["worst_found_with_stick"]):
             assert all(0 < seen[name] <= bound <= 3 * seen[name] for name, bound in bounds.items()), law

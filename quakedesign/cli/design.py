@@ -46,8 +46,8 @@ class DesignOptions:
         What the e-LQR that samples is told: slip-and-rate, or slip, from which it estimates the slip rate; with slip
         sliding modes are told both as they are.
     slip_noise
-        Bound of the error of the slip that designed laws are told, such as '1 um', in guarantees and runs. simulate
-        takes a standard deviation by this name.
+        Bound of the error of the slip that designed laws are told, such as '1 um', in guarantees and runs.
+        --slip-noise-deviation of simulate is a standard deviation.
     rate_noise
         The same of the slip rate.
     disturbance_class

@@ -46,7 +46,7 @@ class Surroundings:
         Of the rock between well and fault, such as '0.5 m^2/s'.
     slip_noise
         Bound of the error of the measured slip, whatever its course, such as '1 um'; q/2 for readings in steps of q.
-        simulate takes a standard deviation by this name.
+        --slip-noise-deviation of simulate is a standard deviation.
     rate_noise
         The same of the measured slip rate.
     initial_slip

@@ -127,7 +127,7 @@ class SensorOptions(EstimateOptions):
     ----------
     slip_noise
         Standard deviation of normal noise of the measured slip, such as '1 um': a third of the readings are off by
-        more. guarantee and design take a bound by this name.
+        more. --slip-noise is a bound, of guarantee and design.
     rate_noise
         The same of the slip rate, where it is measured, such as '1 um/s'.
     bandwidth
@@ -136,8 +136,8 @@ class SensorOptions(EstimateOptions):
         Steps in which that transducer reads, such as '0.15 um'.
     """
 
-    slip_noise: Metres = 0.0
-    rate_noise: MetresPerSecond = 0.0
+    slip_noise: Annotated[Metres, Parameter(name="--slip-noise-deviation")] = 0.0
+    rate_noise: Annotated[MetresPerSecond, Parameter(name="--rate-noise-deviation")] = 0.0
     bandwidth: Hertz | None = None
     slip_quantum: Metres = 0.0
 

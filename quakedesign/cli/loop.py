@@ -99,7 +99,10 @@ def simulate(
     proved, outside = None, list[str]()
     if chosen and chosen.claim:
         proved, outside = chosen.claim.sentence(), _outside(changed_options(simulate, options), chosen.claim.held)
-    answer = _answer(trajectory, loaded, premises) | {"guarantee": proved, "outside": outside}
+    answer = _answer(trajectory, loaded, premises) | {
+        "guarantee": {"sentence": proved} if proved else None,
+        "outside": outside,
+    }
     output.show(answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside)))
     return 0
 

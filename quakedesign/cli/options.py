@@ -186,7 +186,7 @@ class RunOptions:
     substeps
         Steps of the integrator per sample.
     drift
-        Velocity of the far end, such as '3 cm/year'.
+        Velocity of the far end, such as '3 cm/year'; unless given none, or of friction with a state the reference rate.
     perturbation
         Of the user's in m/s^2, added to the fault's own: an expression of slip, slip_rate and time.
     """
@@ -197,7 +197,7 @@ class RunOptions:
     step: Seconds | None = None
     duration: Seconds | None = None
     substeps: Whole = 1
-    drift: MetresPerSecond = 0.0
+    drift: MetresPerSecond | None = None
     perturbation: Push | None = None
 
     def way(self, law: "Controller | None", usual: str = "explicit") -> "tuple[Any, float | None, dict[str, Any]]":
@@ -210,7 +210,7 @@ class RunOptions:
         """What acts on the fault beside its own disturbance."""
         from quakedesign.simulation import Load, perturbation
 
-        return Load(drift=self.drift, perturbation=self.perturbation and perturbation(self.perturbation))
+        return Load(drift=self.drift or 0.0, perturbation=self.perturbation and perturbation(self.perturbation))
 
 
 @Parameter(name="*")

@@ -26,6 +26,7 @@ from quakedesign.output import write_whole
 from quakedesign.rationals import rational
 
 _DIGITS = 6
+_WIDEST_SPREAD = 0.99  # as it is rounded up to two digits and must stay below 1
 _WEAKENING = {"residual", "drop", "critical_slip"}
 _OF_TASK = ("target slip", "operation time")
 _RATE_AND_STATE = ("direct_effect", "evolution_effect", "critical_slip")
@@ -184,6 +185,10 @@ def _moved(law: FrictionLaw, moved: FrictionLaw) -> list[str]:
 
 def next_command(identification: Identification, path: str | Path) -> str:
     """The command that designs for a fault file of a record, for all constants that the record allows."""
+    if not covers(identification.law) and (vague := _too_vague(identification)):
+        return (
+            f"none that covers the record, which is too vague: {vague}. Measure more, or design for the best fit alone"
+        )
     spread = "" if covers(identification.law) else f" --spread {_spread(identification)}"
     code = "" if type(identification.law) in friction_laws().values() else " --allow-code"
     return f"quakedesign design {quote(str(path))}{spread}{code}"
@@ -260,7 +265,16 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
 
 
 def _ranges(identification: Identification) -> str:
+    if vague := _too_vague(identification):
+        return f"no --spread holds those of a, b and D_c, as the record is too vague: {vague}"
     return f"--spread {_spread(identification)} of design and guarantee holds those of a, b and D_c"
+
+
+def _too_vague(identification: Identification) -> str:
+    """Those of a, b and D_c that may be off by their whole value, which no spread below 1 covers."""
+    found = [identification.estimates[name] for name in _RATE_AND_STATE]
+    wide = [e for e in found if max(abs(e.least / e.value - 1), abs(e.most / e.value - 1)) >= _WIDEST_SPREAD]
+    return ", ".join(f"{e.name} from {e.least:.3g} to {e.most:.3g} {e.unit}".rstrip() for e in wide)
 
 
 def _spread(identification: Identification) -> str:

@@ -154,7 +154,7 @@ class Prediction:
 
 
 def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
-    """The e-LQR as it is sampled: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1⁺ = ξ1 + T_s·e1, ξ2⁺ = ξ2 + T_s·ξ1.
+    """The e-LQR as it is sampled: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1⁺ = ξ1 + T_s·e1, ξ2⁺ = ξ2 + T_s·ξ1 if k4 ≠ 0.
 
     Parameters
     ----------
@@ -172,6 +172,10 @@ def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
         raise ParameterError(f"gains of summed_integrals must be four. Received {len(gains)}. Give k1 to k4.")
     k1, k2, k3, k4 = gains
     zero, one = Fraction(0), Fraction(1)
+    if not k4:  # a PID, of which ξ2 is no part
+        return LinearLaw(
+            states=("xi1",), update=((one,),), measured=((step, zero),), output=(-k3,), feedback=(-k1, -k2)
+        )
     return LinearLaw(
         states=("xi1", "xi2"),
         update=((one, zero), (step, one)),

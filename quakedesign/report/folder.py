@@ -59,7 +59,7 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
                 told["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
             if entry.guaranteed is not None:
                 path = f"certificates/{entry.design.name}-guarantee.json"
-                told["guaranteed"]["certificate"] = path
+                told["guarantee"]["certificate"] = path
                 told["certificate"] = told["certificate"] or path
             for kind in entry.peaks:
                 told["peaks"][kind]["certificate"] = f"certificates/{entry.design.name}-peaks-{kind}.json"

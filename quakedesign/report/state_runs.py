@@ -101,7 +101,8 @@ def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
         f"|ln(V/V_r)| at most {found['max_log_rate']:.3g}, slip error at most {found['max_slip_error']:.3g} m",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law asks for at most "
         f"{found['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
-        proved_line(answer["guarantee"], answer["outside"]) or "no guarantee: what is said was seen in this run",
+        proved_line((answer["guarantee"] or {}).get("sentence"), answer["outside"])
+        or "no guarantee: what is said was seen in this run",
     ]
 
 

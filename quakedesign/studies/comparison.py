@@ -86,9 +86,8 @@ class Entry:
         """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None for what a report adds."""
         design = self.design
         return {
-            "guarantee": self.guarantee.sentence() if self.guarantee else None,
+            "guarantee": self.answer.to_dict() | {"certificate": None} if self.answer else None,
             "class": design.disturbance_class,
-            "guaranteed": self.answer.to_dict() | {"certificate": None} if self.answer else None,
             "outcome": self.run.outcome.to_dict() if self.run else None,
             "gains": {name: str(v) for name, v in design.gains.items()},
             "verdict": str(design.verdict),

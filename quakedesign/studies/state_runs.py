@@ -310,7 +310,7 @@ class HeldRun:
             "duration": float(run.time[-1]),
             "steps": len(run.time),
             "run": dict(run.provenance),
-            "guarantee": self.claim.sentence() if self.claim else None,
+            "guarantee": {"sentence": self.claim.sentence()} if self.claim else None,
             "outside": [],
         }
 

@@ -16,7 +16,7 @@ from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.executors import crew_or_here
 from quakedesign.fault import Fault
 from quakedesign.fault.units import exact_value
-from quakedesign.rationals import rational
+from quakedesign.rationals import exact_text, rational
 from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, OBJECTIVES, Answer
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer, answer_sliding
 from quakedesign.synthesis.methods.base import Wanted, method_of
@@ -151,7 +151,7 @@ def guarantee(
     controller: str | type[Controller] = "elqr",
     *,
     objective: str = "tracking",
-    gains: tuple[str, ...] = (),
+    gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]" = (),
     scheme: str | None = None,
     step: Quantity | None = None,
     measured: str = MEASURED[0],
@@ -174,8 +174,9 @@ def guarantee(
         ``elqr``, or a sliding mode, ``cta`` or ``dia``.
     objective : str
         Of a design: ``tracking``, or ``peak`` for the smallest proved slip-rate error.
-    gains : tuple of str
-        k1 to k4 of an e-LQR whose integrals are summed once per sample, base gains of a sliding mode; none to design.
+    gains : sequence or array of str, float or Fraction, optional
+        k1 to k4 of an e-LQR whose integrals are summed once per sample, base gains of a sliding mode; none to design. A
+        matrix of one row, as the K of ``control.dlqr``, is its row.
     scheme : str, optional
         As in `answer`.
     step : str, float or Fraction, optional
@@ -212,7 +213,7 @@ def guarantee(
         fault,
         controller=controller,
         objective=objective,
-        gains=gains,
+        gains=_listed(gains),
         scheme=scheme,
         step=None if step is None else exact_value(step, "s", "step"),
         measured=measured,
@@ -221,6 +222,20 @@ def guarantee(
         spread=exact_value(spread, "", "spread"),
         **exact_surroundings(saturation=saturation, withdrawal=withdrawal, rate_limit=rate_limit, **around),
     )()
+
+
+def _listed(gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]") -> tuple[str, ...]:
+    """Gains as exact texts.
+
+    Raises
+    ------
+    ParameterError
+    """
+    given: list[Any] = list(gains)
+    row = (
+        list(given[0]) if len(given) == 1 and not isinstance(given[0], str) and hasattr(given[0], "__len__") else given
+    )
+    return tuple(exact_text(rational(value, f"gain k{place}")) for place, value in enumerate(row, start=1))
 
 
 def exact_surroundings(

@@ -51,15 +51,18 @@ def test_a_file_holds_its_law_with_the_limit_at_rest_and_what_stands_around_it(f
 def test_it_runs_behind_its_lag_with_its_noise(file, capsys):
     code, out, _ = told(capsys, "simulate", "real-fault", "--certificate", file, *SHORT, "--json")
     answer = json.loads(out)
-    assert (code, answer["guarantee"]) == (0, CLAIM.sentence())
+    assert (code, answer["guarantee"]["sentence"]) == (0, CLAIM.sentence())
     assert (answer["run"]["step"], answer["run"]["actuator"]) == (0.15, "Lag(time_constant=0.02)")
     assert answer["run"]["measurement"] == "Measurement(slip_noise=1e-07, rate_noise=0.0, seed=0, bounded=True)"
     code, out, _ = told(
-        capsys, "simulate", "real-fault", "--certificate", file, *SHORT, "--slip-noise", "1 nm", "--lag", "0.1 s",
-        "--saturation", "20 MPa", "--json",
+        capsys, "simulate", "real-fault", "--certificate", file, *SHORT, "--slip-noise-deviation", "1 nm",
+        "--lag", "0.1 s", "--saturation", "20 MPa", "--json",
     )  # fmt: skip
     answer = json.loads(out)
-    assert (answer["guarantee"], answer["outside"]) == (CLAIM.sentence(), ["saturation", "lag", "slip_noise"])
+    assert (answer["guarantee"]["sentence"], answer["outside"]) == (
+        CLAIM.sentence(),
+        ["saturation", "lag", "slip_noise"],
+    )
     run = answer["run"]
     assert run["actuator"] == "Saturation(lowest=-20000000.0, highest=20000000.0), Lag(time_constant=0.1)"
     assert run["measurement"].startswith("Measurement(slip_noise=1e-09, ")

@@ -35,7 +35,7 @@ def told(capsys, *arguments):
 def test_it_runs_with_its_step_and_rock_under_all_the_stress_that_it_is_proved_for(capsys):
     code, out, err = told(capsys, "simulate", "crustal-patch", "--certificate", FILE, *SHORT, "--json")
     answer, held, stress = json.loads(out), CLAIM.held, float(CLAIM.task.stress)
-    assert (code, err, answer["guarantee"]) == (0, "", CLAIM.sentence())
+    assert (code, err, answer["guarantee"]["sentence"]) == (0, "", CLAIM.sentence())
     assert (answer["step"], answer["diffusion"]) == (float(held.step), float(held.diffusion))
     same = qd.simulate(CRUSTAL, CLAIM.controller, duration=3 * 3600.0, tide=Tide(amplitude=stress, period=TIDE))
     assert answer["metrics"]["max_asked"] == pytest.approx(float(np.max(np.abs(same.asked))), rel=1e-9)
@@ -53,7 +53,7 @@ def test_it_runs_with_its_step_and_rock_under_all_the_stress_that_it_is_proved_f
     [
         ((), []),
         (("--stress", "200 kPa"), ["stress"]),
-        (("--saturation", "1 MPa", "--slip-noise", "1 um", "--seed", "2"), ["saturation", "slip_noise"]),
+        (("--saturation", "1 MPa", "--slip-noise-deviation", "1 um", "--seed", "2"), ["saturation", "slip_noise"]),
     ],
 )
 def test_a_run_that_is_not_what_is_proved_says_so(capsys, more, outside):

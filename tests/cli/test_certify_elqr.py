@@ -108,8 +108,8 @@ def test_a_design_in_continuous_time_is_reported_with_its_peaks_and_without_a_gu
     code, said, _ = run(capsys, *arguments)
     found = json.loads(said)["controllers"]["elqr"]
     assert code == 0
-    assert found["guarantee"].startswith("none: ")
-    assert found["guaranteed"]["verdict"] == "undecided"
+    assert found["guarantee"]["sentence"].startswith("none: ")
+    assert found["guarantee"]["verdict"] == "undecided"
     assert set(found["gains"]) == {"k1", "k2", "k3", "k4"}
     peaks = found["peaks"]
     assert set(peaks) == {"amplitude", "rate"}
@@ -124,8 +124,8 @@ def test_a_design_is_reported_with_the_guarantee_of_the_loop_that_ran(capsys, tm
     found = json.loads(said)["controllers"]["elqr"]
     assert code == 0
     assert next(iter(found)) == "guarantee"
-    assert found["guarantee"].startswith("from rest, held over 0.001 s")
-    told, metrics = found["guaranteed"], found["metrics"]
+    assert found["guarantee"]["sentence"].startswith("from rest, held over 0.001 s")
+    told, metrics = found["guarantee"], found["metrics"]
     assert metrics["peak_slip_rate"] <= Fraction(told["peak_slip_rate"])
     assert Fraction(told["pressure"][0]) <= metrics["min_pressure"] < metrics["max_pressure"]
     assert metrics["max_pressure"] <= Fraction(told["pressure"][1])

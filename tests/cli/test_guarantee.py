@@ -224,8 +224,7 @@ def test_the_slip_alone_with_noise_and_its_file(call, tmp_path):
     found = json.loads(out)
     assert (code, found["verdict"]) == (0, "proved")
     assert (
-        "with the slip alone measured, with any noise of at most 1e-06 m in the measured slip, for"
-        in found["guarantee"]
+        "with the slip alone measured, with any noise of at most 1e-06 m in the measured slip, for" in found["sentence"]
     )
     assert (found["measured"], found["slip_noise"], found["rate_noise"]) == ("slip", "1/1000000", "0")
     assert F(139, 10**6) < F(found["limit"]["slip_rate_error"]) < F(found["slip_rate_error"]) <= F(4, 10**4)

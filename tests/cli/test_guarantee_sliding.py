@@ -176,7 +176,7 @@ def test_the_slip_law_is_proved_with_a_smaller_bound_of_the_slip_rate_than_is_tr
     assert (code, answer["verdict"]) == (0, "proved")
     assert Fraction(answer["stress"]) >= 14_000
     assert 0.05 < answer["worst_found"]["log_rate"] < float(Fraction(answer["log_rate"])) < 0.15
-    assert "state by the slip law" in answer["guarantee"]
+    assert "state by the slip law" in answer["sentence"]
     found = parse_guarantee((tmp_path / "g").read_text())
     assert found.task.state_law == "slip"
     assert found.check() is Verdict.PROVED

@@ -100,10 +100,10 @@ def test_people_see_the_units_of_what_flows(run):
 
 
 @pytest.mark.parametrize(("command", "kind", "other"), [
-    ("simulate", "Standard deviation of normal noise of the measured slip", "take a bound by this name"),
-    ("campaign", "Standard deviation of normal noise of the measured slip", "take a bound by this name"),
-    ("guarantee", "Bound of the error of the measured slip", "simulate takes a standard deviation by this name"),
-    ("design", "Bound of the error of the slip", "simulate takes a standard deviation by this name"),
+    ("simulate", "Standard deviation of normal noise of the measured slip", "--slip-noise is a bound"),
+    ("campaign", "Standard deviation of normal noise of the measured slip", "--slip-noise is a bound"),
+    ("guarantee", "Bound of the error of the measured slip", "--slip-noise-deviation of simulate"),
+    ("design", "Bound of the error of the slip", "--slip-noise-deviation of simulate"),
 ])  # fmt: skip
 def test_help_says_which_kind_of_number_noise_is(command, kind, other, capsys):
     with pytest.raises(SystemExit):
@@ -114,14 +114,23 @@ def test_help_says_which_kind_of_number_noise_is(command, kind, other, capsys):
 
 
 def test_noise_has_units_and_a_seed(run):
-    noisy = (*SHORT, "--slip-noise", "1 um", "--rate-noise", "1 mm/s", "--json")
+    noisy = (*SHORT, "--slip-noise-deviation", "1 um", "--rate-noise-deviation", "1 mm/s", "--json")
     found = {seed: strict(run(*noisy, "--seed", seed)[1]) for seed in ("0", "1")}
     assert "slip_noise=1e-06, rate_noise=0.001, seed=1" in found["1"]["run"]["measurement"]
     assert found["0"]["metrics"]["max_slip_error"] != found["1"]["metrics"]["max_slip_error"]
 
 
 def test_transducer_mean_and_differentiator_are_a_chain(run):
-    seen = ("--slip-noise", "0.1 um", "--bandwidth", "200 Hz", "--averaging", "3", "--differentiator-bound", "100")
+    seen = (
+        "--slip-noise-deviation",
+        "0.1 um",
+        "--bandwidth",
+        "200 Hz",
+        "--averaging",
+        "3",
+        "--differentiator-bound",
+        "100",
+    )
     answer = strict(run(*SHORT, *seen, "--json")[1])
     told = answer["run"]["measurement"]
     assert told.index("bandwidth=200.0") < told.index("Averaging(samples=3)")
@@ -140,7 +149,17 @@ def test_a_mean_goes_into_an_exported_controller(run, tmp_path):
 
 def test_a_campaign_takes_the_same_options(run, monkeypatch, tmp_path):
     monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
-    options = ("--saturation", "20 kPa", *ROCK, "--slip-noise", "1 um", "--feedforward", "nominal", "--drift", "1 um/s")
+    options = (
+        "--saturation",
+        "20 kPa",
+        *ROCK,
+        "--slip-noise-deviation",
+        "1 um",
+        "--feedforward",
+        "nominal",
+        "--drift",
+        "1 um/s",
+    )
     command = ("campaign", "lab-fault", "--samples", "3", "--duration", "50 ms", "--scale", "100", *options)
     code, out, _ = run(*command, "--rerun", "1", "--json")
     answer = strict(out)

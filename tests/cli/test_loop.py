@@ -66,7 +66,7 @@ def test_the_adaptive_method_and_a_perturbation_are_chosen(run):
 
 
 def test_a_differentiator_is_told_and_judged(run):
-    estimates = ("--differentiator-bound", "100", "--filter-order", "1", "--slip-noise", "1e-7")
+    estimates = ("--differentiator-bound", "100", "--filter-order", "1", "--slip-noise-deviation", "1e-7")
     code, out, _ = run(*SHORT, "--controller", "cta", "--scheme", "implicit", *estimates)
     answer = json.loads(out)
     assert code == 0
@@ -159,7 +159,7 @@ BAD = {
     "code as a perturbation": (*SHORT, "--perturbation", "__import__('os')"),
     "a rate that is not measured": (
         *(*SHORT, "--controller", "cta", "--scheme", "explicit"),
-        *("--rate-noise", "1e-3", "--differentiator-bound", "1"),
+        *("--rate-noise-deviation", "1e-3", "--differentiator-bound", "1"),
     ),
     "a filter without a differentiator": (*SHORT, "--controller", "cta", "--scheme", "explicit", "--filter-order", "1"),
     "options of the natural earthquake": ("simulate", "lab-fault", "--drift", "1e-9"),

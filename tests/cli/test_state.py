@@ -84,7 +84,10 @@ def test_a_locked_fault_starts_with_an_aged_state(capsys, patch):
     [
         (("--controller", "cta"), "no sliding mode"),
         (("--controller", "elqr", "--gains", "1", "2"), "designed gains"),
-        (("--controller", "elqr", "--rate-noise", "1 um/s"), "rate_noise: not for friction with a state with control"),
+        (
+            ("--controller", "elqr", "--rate-noise-deviation", "1 um/s"),
+            "rate_noise: not for friction with a state with control",
+        ),
         (("--controller", "elqr", "--storage", "1e-4 m^3/Pa"), "storage: not for friction with a state with control"),
         (("--controller", "elqr", "--start", "late"), "starts in steady sliding"),
         (("--controller", "elqr", "--drift", "1e-9"), "drift: not for friction with a state with control"),
@@ -149,7 +152,10 @@ def test_a_controlled_run_goes_through_pump_and_transducer(capsys, patch):
     found = json.loads(run(capsys, "simulate", patch, *given, *more)[1])
     assert (plain["stages"], found["stages"]) == ([], ["delay", "saturation"])
     assert plain["metrics"] != found["metrics"]
-    noisy = [json.loads(run(capsys, "simulate", patch, *given, "--slip-noise", "1 um", "--seed", s)[1]) for s in "01"]
+    noisy = [
+        json.loads(run(capsys, "simulate", patch, *given, "--slip-noise-deviation", "1 um", "--seed", s)[1])
+        for s in "01"
+    ]
     assert noisy[0]["metrics"] != noisy[1]["metrics"]
     told = run(capsys, "simulate", patch, *given[:-1], *more)[1]
     assert "through a delay, through a saturation" in told

@@ -78,7 +78,7 @@ def test_the_folder_holds_the_certificate_the_figures_and_the_keys_of_all_design
     elqr = found["controllers"]["elqr"]
     assert elqr["verdict"] == "proved"
     assert elqr["outcome"]["kind"] == "tracked"
-    assert elqr["guaranteed"]["stress"] == str(comparison.entries[0].guaranteed.task.stress)
+    assert elqr["guarantee"]["stress"] == str(comparison.entries[0].guaranteed.task.stress)
     assert parse_guarantee((folder / elqr["certificate"]).read_text()).claims == comparison.entries[0].guarantee.claims
     assert found["uncontrolled"]["cycle"] == {"recurrence_interval": None, "slip": None, "magnitude": None}
     assert set(found["not_applicable"]) == {"cta", "dia"}

@@ -179,6 +179,7 @@ class Answer:
             shorter = None if other is None else {"step": str(other.held.step), **other.claims.to_dict()}
             return {
                 "verdict": "undecided",
+                "sentence": self.found.sentence(),
                 "reason": self.found.reason,
                 "small_gain": None if gain is None else gain.exact,
                 "shorter": shorter,
@@ -187,7 +188,7 @@ class Answer:
         small = None if isinstance(bounds, NoGuarantee) else float_above(bounds.small_gain)
         return {
             "verdict": "proved",
-            "guarantee": self.found.sentence(),
+            "sentence": self.found.sentence(),
             **self.found.claims.to_dict(),
             "small_gain": small,
             "worst_found": self.worst and asdict(self.worst),

@@ -83,11 +83,11 @@ class SlidingAnswer:
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
         if not isinstance(self.found, SlidingGuarantee):
-            return {"verdict": "undecided", "reason": self.found.reason}
+            return {"verdict": "undecided", "sentence": self.found.sentence(), "reason": self.found.reason}
         held = self.found.held
         return {
             "verdict": "proved",
-            "guarantee": self.found.sentence(),
+            "sentence": self.found.sentence(),
             **self.found.to_dict(),
             **{name: str(getattr(held, name)) for name in ("step", "diffusion", "lag", "delay", "slip_noise")},
             "measured": "slip",
