@@ -2,7 +2,8 @@
 
 Usage: ``python proofs/check.py FILE...``. Every file gets one block: ``proved`` or ``refuted`` with the
 statement that was verified, or ``invalid`` with one reason. Exit code 0: all proved; 1: not all; 2: an
-argument cannot be read. The modules in `IMPORTS` must stand beside this file.
+argument cannot be read, or the verdict not be written; 4: out of memory. The modules in `IMPORTS` must
+stand beside this file.
 
 What has to be read: this file, exact_numbers.py, which reads files and computes, and what the kind of file imports.
 """
@@ -173,9 +174,12 @@ def report(name: str) -> int:
     """Check one file, print its block and return its exit code."""
     try:
         result = check(read_file(name))
-    except (Refused, MemoryError) as error:
-        print(f"{ascii(name)[1:-1]}: invalid: {str(error) or 'it needs too much memory'}")
+    except Refused as error:
+        print(f"{ascii(name)[1:-1]}: invalid: {error}")
         return 1
+    except MemoryError:  # nothing is said about the file
+        print(f"FILE must fit into memory. Received {name!a}. Raise the limit.", file=sys.stderr)
+        return 4
     except Outdated:
         expected = "FILE must be a proof, a refutation or of the kind guarantee"
         remedy = "Make the new file with quakedesign certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE"
@@ -200,9 +204,14 @@ def main(arguments: list[str]) -> int:
 
 if __name__ == "__main__":
     try:
+        if sys.stdout is None:
+            raise OSError("standard output is closed")
         code = main(sys.argv[1:])
         sys.stdout.flush()
     except BrokenPipeError:  # nobody reads on: no verdict was told
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
+    except OSError as error:  # no verdict was told either
+        print(f"The verdict must be written. Received: {error}. Redirect it.", file=sys.stderr)
+        os._exit(2)
     sys.exit(code)

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from quakedesign.errors import CertificateError, OutputError, ScenarioError
-from quakedesign.input import read_text
+from quakedesign.input import parse_toml, read_text
 from quakedesign.output import require_room
 
 
@@ -65,3 +65,19 @@ def test_the_longest_name_has_room_for_its_neighbours(tmp_path):
         with whole_folder(target) as partial:
             (partial / "file").write_text("x")
     assert [p.name for p in tmp_path.iterdir()] == [target.name]
+
+
+@pytest.mark.parametrize(
+    "text", ["a." * 32_000 + "a = 1", "[" + "a." * 32_000 + "a]", "x = {" + "a." * 32_000 + "a = 1}"]
+)
+def test_a_key_of_many_parts_is_refused_before_it_is_read(text):
+    """Memory grows as the square of the parts: 4.1 GB."""
+    with pytest.raises(ValueError, match=r"a line may have at most 400 dots, line 1 has 32000"):
+        parse_toml(text)
+
+
+def test_toml_is_read_as_the_standard_library_reads_it():
+    assert parse_toml("a.b = 1\n[c]\nd = '...'") == {"a": {"b": 1}, "c": {"d": "..."}}
+    for wrong in ("a =", "x = " + "[" * 5000):
+        with pytest.raises(ValueError, match=r".+"):
+            parse_toml(wrong)

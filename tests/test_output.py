@@ -1,9 +1,14 @@
 """Files and folders are written whole or not at all."""
 
+import errno
 import os
+import subprocess
+import sys
 
 import pytest
 
+from quakedesign import output
+from quakedesign.cli import main
 from quakedesign.errors import OutputError
 from quakedesign.output import whole_folder, write_whole
 
@@ -89,3 +94,51 @@ def test_a_folder_in_no_folder_is_one_clear_message(tmp_path):
         whole_folder(tmp_path / "nowhere" / "results"),
     ):
         pass
+
+
+HOLDING = """
+import sys
+from pathlib import Path
+from quakedesign.output import hold
+hold(Path(sys.argv[1]), make=True)
+print("held", flush=True)
+sys.stdin.readline()
+"""
+
+
+def test_a_folder_is_written_by_one_command_at_a_time(tmp_path):
+    """Two campaigns with --force into one folder had ended with files of both."""
+    place = tmp_path / "above" / "results"
+    other = subprocess.Popen([sys.executable, "-c", HOLDING, place], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    try:
+        assert other.stdout.readline() == b"held\n"
+        for spelling in (place, place.parent / ".." / "above" / "results"):
+            with pytest.raises(OutputError, match="must be written by one command at a time"):
+                output.hold(spelling)
+        with pytest.raises(OutputError, match="one command at a time"), output.whole_folder(place):
+            pass
+        with pytest.raises(SystemExit) as stop:
+            main(["campaign", "lab-fault", "--samples", "1", "--duration", "1", "--force", "--out", str(place)])
+        assert stop.value.code == 2
+        assert output.hold(place.with_name("another"))
+        output.release()
+    finally:
+        other.kill()
+        other.communicate()
+    assert output.hold(place), "a lock ends with its process"
+    assert not output.hold(place), "a command may hold what it holds"
+    output.release(place)
+    with output.whole_folder(place) as new:
+        (new / "a").touch()
+    assert [path.name for path in place.parent.iterdir()] == ["results"]
+
+
+def test_a_folder_that_was_made_for_files_goes_where_none_could_be_written(tmp_path):
+    with pytest.raises(OutputError, match="No space left"), output.made_folder(tmp_path / "a" / "b"):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert list(tmp_path.iterdir()) == []
+    with output.made_folder(tmp_path / "a" / "b"):
+        (tmp_path / "a" / "b" / "c").touch()
+    with pytest.raises(ValueError, match="other"), output.made_folder(tmp_path / "a" / "b"):
+        raise ValueError("other")
+    assert (tmp_path / "a" / "b" / "c").is_file()

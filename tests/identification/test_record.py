@@ -115,3 +115,38 @@ def test_friction_that_no_rock_has_is_refused_with_its_likely_cause(shear, norma
     path.write_text("time [s], load_point_displacement [um], shear_stress [MPa]\n" + f"0, 0, {shear}\n1, 1, {shear}\n")
     with pytest.raises(RecordError, match=re.escape(said)):
         read_record(path, normal_stress=si_value(normal, "Pa", "normal stress"))
+
+
+SCALED = [
+    ("time", 1e-300, "the duration must be from 1e-06"),
+    ("time", 1e30, "the duration must be from 1e-06"),
+    ("load_point_displacement", 1e30, "the range of load_point_displacement"),
+    ("load_point_displacement", 1e-300, "the range of load_point_displacement"),
+    ("load_point_displacement", 1e10, "the mean rate of load_point_displacement must be from 1e-15"),
+    ("normal_stress", 1e30, "the largest normal_stress"),
+]
+
+
+@pytest.mark.parametrize(("column", "factor", "said"), SCALED)
+def test_sizes_that_no_experiment_has_are_refused(column, factor, said, tmp_path):
+    """Rates of 1e24 m/s were accepted; times of 1e-300 s ended in the words of LAPACK."""
+    factors = dict.fromkeys(("time", "load_point_displacement", "shear_stress", "normal_stress"), 1.0) | {
+        column: factor
+    }
+    rows = [(0.001 * i, 1e-8 * i, 6e6, 1e7) for i in range(50)]
+    lines = [",".join(repr(v * f) for v, f in zip(row, factors.values(), strict=True)) for row in rows]
+    units = "time [s],load_point_displacement [m],shear_stress [Pa],normal_stress [Pa]"
+    path = tmp_path / "r.csv"
+    path.write_text("\n".join([units, *lines]), encoding="utf-8")
+    with pytest.raises(RecordError, match=said):
+        read_record(path)
+
+
+def test_the_same_record_is_read_in_its_own_units(tmp_path):
+    path = tmp_path / "r.csv"
+    rows = "\n".join(f"{0.001 * i},{1e-8 * i},6e6,1e7" for i in range(50))
+    path.write_text(f"time [s],load_point_rate [m/s],shear_stress [Pa],normal_stress [Pa]\n{rows}", encoding="utf-8")
+    assert len(read_record(path).time) == 50
+    path.write_text(path.read_text(encoding="utf-8").replace("4.9e-07", "1e24"), encoding="utf-8")
+    with pytest.raises(RecordError, match="the largest load_point_rate"):
+        read_record(path)

@@ -460,8 +460,9 @@ def test_memory_that_runs_out_says_nothing_about_the_claim(written, monkeypatch,
         raise MemoryError
 
     monkeypatch.setattr(checker, "check", fail)
-    assert checker.main([written({})]) == 1
-    assert capsys.readouterr().out.endswith("invalid: it needs too much memory\n")
+    assert checker.main([written({})]) == 4
+    said = capsys.readouterr()
+    assert (said.out, said.err.startswith("FILE must fit into memory.")) == ("", True)
 
 
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["-"], ["a", "-b"]])

@@ -14,6 +14,7 @@ import pytest
 
 from quakedesign.certificates.files import evidence_of, read_json
 from quakedesign.certificates.obligations import claimed, different
+from quakedesign.certificates.rocq import files as rocq_files
 from quakedesign.certificates.rocq import rocq_text, write_rocq
 from quakedesign.certificates.rocq.files import library, module_name, statement_text
 from quakedesign.certificates.rocq.integers import in_integers
@@ -386,3 +387,13 @@ def test_coqc_accepts_the_catalogue(path, tmp_path):
     code, out, err = compiled(text, tmp_path)
     assert (code, err) == (0, "")
     assert axioms_of(out) == (REALS if path.stem.startswith(("elqr", "motzkin")) else ANALYSIS)
+
+
+def test_a_full_disk_leaves_no_folder(tmp_path, monkeypatch):
+    def full(*_):
+        raise OutputError("no space")
+
+    monkeypatch.setattr(rocq_files, "write_whole", full)
+    with pytest.raises(OutputError, match="no space"):
+        write_rocq([CERTIFICATES / "super-twisting_1.5_1.1.json"], tmp_path / "a" / "b")
+    assert list(tmp_path.iterdir()) == []
