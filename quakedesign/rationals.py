@@ -133,6 +133,14 @@ def float_below(value: Fraction) -> float:
     return -float_above(-value)
 
 
+def shortly(value: Fraction | float) -> str:
+    """A number as floats are written, or six digits of one that no float holds."""
+    try:
+        return f"{float(value):.6g}"
+    except OverflowError:
+        return six_digits(Fraction(value))
+
+
 def six_digits(value: Fraction) -> str:
     """Six digits, to nearest, for people; Decimal has no largest number as floats have."""
     return f"{Decimal(value.numerator) / Decimal(value.denominator):.6g}"

@@ -1,6 +1,6 @@
 """Whatever is written into files, on the command line or into calls is answered, or refused in one line.
 
-A short profile runs by default, the long one, ten thousand examples together, is slow. Work is bounded by short
+A short profile runs by default, the long one, ten thousand commands and fifty thousand calls in one process, is slow. Work is bounded by short
 tasks; commands and functions that search for minutes are drawn with something wrong, which they have to refuse first.
 Commands and their options are those that the command line knows, functions, classes and methods those that are public.
 """
@@ -12,11 +12,12 @@ import inspect
 import io
 import json
 import pkgutil
+import resource
 import time
 import warnings
 from enum import Enum
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from inspect import Parameter, isabstract, isclass, isfunction, signature
 from pathlib import Path
@@ -32,13 +33,16 @@ import quakedesign as qd
 from quakedesign import sos
 from quakedesign.certificates.guarantee import Held, guarantee, task_of
 from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
+from quakedesign.certificates.guarantee.slow_gain import SlowGain
 from quakedesign.cli import app, main
 from quakedesign.errors import QuakedesignError
 from quakedesign.fault import parse_fault
 from quakedesign.loop import summed_integrals
+from quakedesign.loop.rest_limit import RestLimit
 from quakedesign.rationals import rational
 from quakedesign.report import Comparison, Entry
 from quakedesign.simulation.campaign import Space, campaign_problem
+from quakedesign.symbolic.term_expressions import real_symbols
 
 LONGEST = 60  # seconds of this process
 LAB = (files("quakedesign.fault") / "presets" / "lab-fault.toml").read_text(encoding="utf-8")
@@ -60,6 +64,13 @@ JUNK = st.one_of(
     st.floats().map(repr),
     st.integers().map(str),
 )
+
+
+@pytest.fixture(autouse=True)
+def _memory_stays_below_two_gigabytes():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    yield
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < 2e9
 
 
 def profile(count, which):
@@ -230,7 +241,7 @@ def test_command_lines(which, tmp_path, monkeypatch):
     (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
     (tmp_path / "guarantee.json").write_text(guaranteed(), encoding="utf-8")
 
-    @profile((30, 2000), which)
+    @profile((30, 10_000), which)
     @given(command_lines())
     def check(line):
         before = {p.name for p in tmp_path.iterdir()}
@@ -343,6 +354,11 @@ VALID = {
     "bool": [True, False],
 }
 ANYTHING = [None, 3, -1, 0.5, float("nan"), "x", "\0", b"x", [], [1], {}, {"a": 1}, (), object(), print, int, FAULT, 1j]
+ANYTHING += [
+    *(np.longdouble(1e-3), np.float32(2), np.array(0.5), np.ma.masked, np.ma.array([1.0, 2.0], mask=[0, 1])),
+    *(np.array([]), np.int8(3), 1e300, -1e300, 5e-324, 10**400, range(3), frozenset(), Path("/dev/null"), sp.I),
+    np.datetime64(1, "Y"),
+]
 MINUTES = {"design", "compare", "certify", "assess", "natural_earthquake", "run_campaign", "simulate_state", "prove"}
 MINUTES |= {"decide", "largest", "accuracy", "gain_sensitivity", "noise_sensitivity", "velocity_step"}
 
@@ -430,7 +446,7 @@ def calls(draw):
 def test_calls(which, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
-    @profile((120, 4000), which)
+    @profile((120, 50_000), which)
     @given(calls())
     def check(call):
         name, given = call
@@ -447,3 +463,21 @@ def test_calls(which, tmp_path, monkeypatch):
         assert time.process_time() - began < LONGEST
 
     check()
+
+
+FOUND = [
+    (FAULT.reference.shape, (-1e300,)),
+    (FAULT.reference.shape, (np.datetime64(1, "Y"),)),
+    (real_symbols, ((i for i in range(3)),)),
+    (sos.Program(["x"], ["a"]).proposal, (0.5,)),
+    (sos.Program(["x"], ["a"]).proposal, (float("nan"),)),
+    (partial(SlowGain, parts=10**400, growth=Fraction(1)), ()),
+    (partial(SlowGain, parts=-1, growth=Fraction(10**400)), ()),
+    (partial(RestLimit, width=Fraction(-1), per_slip=Fraction(10**400), resolution=Fraction(1)), ()),
+]
+
+
+@pytest.mark.parametrize("call", FOUND, ids=lambda call: getattr(call[0], "__qualname__", None))
+def test_what_was_found_is_refused(call):
+    with pytest.raises(QuakedesignError):
+        call[0](*call[1])

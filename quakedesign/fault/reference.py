@@ -49,13 +49,16 @@ class Reference:
         Raises
         ------
         ParameterError
-            For anything that has no powers.
+            For anything that has no powers, or too large ones.
         """
         if isinstance(stage, type) or not hasattr(stage, "__pow__"):
             raise ParameterError(
                 f"stage must be a number, an array or an expression. Received {shown(stage)}. Give t/t_op."
             )
-        return stage**3 * (10 - 15 * stage + 6 * stage**2)
+        try:
+            return stage**3 * (10 - 15 * stage + 6 * stage**2)
+        except (OverflowError, TypeError):
+            raise ParameterError(f"stage must be from 0 to 1. Received {shown(stage)}. Give t/t_op.") from None
 
     def slip(self, time: "sp.Expr") -> "sp.Expr":
         """Reference slip [m] at a time [s] of [0, operation_time], with exact numbers."""

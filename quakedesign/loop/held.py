@@ -9,6 +9,7 @@ from quakedesign.loop.instants import Instants
 from quakedesign.loop.laws import NOISES, LinearLaw, Matrix, Model, Row
 from quakedesign.loop.layer import MODES, Layer
 from quakedesign.loop.periodic import EVEN, Fading, PeriodicLoop, Pulse, Segment
+from quakedesign.rationals import shortly
 
 MOST_PERIODS = 8
 SHORTEST = 32  # parts of a step: the modes of a faster layer are gone sooner than bounds can follow
@@ -150,17 +151,17 @@ class _Path:
         if step <= 0 or not 0 <= delay <= MOST_PERIODS * step or lag < 0:
             raise ParameterError(
                 f"a held loop needs a positive step, a delay of 0 to {MOST_PERIODS} steps and a lag of 0 or more. "
-                f"Received {float(step):.4g} s, {float(delay):.4g} s, {float(lag):.4g} s. Shorten the delay."
+                f"Received {shortly(step)} s, {shortly(delay)} s, {shortly(lag)} s. Shorten the delay."
             )
         if diffusion and SHORTEST * diffusion < step:
             raise ParameterError(
                 f"diffusion must take at least T_s/{SHORTEST}, here {float(step / SHORTEST):.4g} s, or nothing. "
-                f"Received {float(diffusion):.4g} s. Leave it out."
+                f"Received {shortly(diffusion)} s. Leave it out."
             )
         if diffusion and self.watched:
             raise ParameterError(
                 "jitter and the rate of a pump are known of pressures that reach the fault at once or through a lag. "
-                f"Received rock of {float(diffusion):.4g} s. Leave one of them out."
+                f"Received rock of {shortly(diffusion)} s. Leave one of them out."
             )
 
     @property

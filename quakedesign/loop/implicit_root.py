@@ -11,6 +11,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.errors import ParameterError
+from quakedesign.rationals import shortly
 
 SIGNALS = ("slip", "rate")
 MOST_TERMS = 16
@@ -48,7 +49,7 @@ class Power:
         if not sound or (self.argument not in SIGNALS and (isinstance(self.argument, str) or not self.argument)):
             raise ParameterError(
                 "a term of an implicit step needs 0 <= factor, an exponent p/q with p, q at most 6 that is not "
-                f"negative, and slip, rate or a sum. Received {float(low):.4g} to {float(high):.4g} and {power}."
+                f"negative, and slip, rate or a sum. Received {shortly(low)} to {shortly(high)} and {power}."
             )
 
 

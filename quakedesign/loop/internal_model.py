@@ -6,6 +6,7 @@ from fractions import Fraction
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.laws import LinearLaw, Matrix, Row, combined, unit_row
+from quakedesign.rationals import shortly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +115,7 @@ def _through(
     if len(gains) != 2 + count or gain <= 0:
         raise ParameterError(
             f"a law with a model of {count} pressures needs {2 + count} gains and a positive gain of the model. "
-            f"Received {len(gains)} and {float(gain):.4g} m²/kg. Complete them."
+            f"Received {len(gains)} and {shortly(gain)} m²/kg. Complete them."
         )
     path = [unit_row(len(level), {own + i: Fraction(1)}) for i in range(count)]
     away = [combined((1 / gain, q), (1 / gain, level)) for q in path]

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.implicit_root import ImplicitRoot
+from quakedesign.rationals import shortly
 
 Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
@@ -222,7 +223,7 @@ def disturbance_estimate(
 def require_gain(gain: Fraction) -> None:
     """Refuse a model whose pressure does nothing, or the wrong thing."""
     if gain <= 0:
-        raise ParameterError(f"the gain of a model must be positive. Received {float(gain):.4g} m²/kg. Check its sign.")
+        raise ParameterError(f"the gain of a model must be positive. Received {shortly(gain)} m²/kg. Check its sign.")
 
 
 def answered(

@@ -5,6 +5,7 @@ from fractions import Fraction
 from typing import ClassVar
 
 from quakedesign.errors import ParameterError
+from quakedesign.rationals import shortly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +47,6 @@ class RestLimit:
         if self.width <= 0 or min(self.per_slip, self.resolution) < 0:
             raise ParameterError(
                 "a limit at rest needs a positive width, and no other number below 0. Received "
-                f"{float(self.width):.4g} Pa, {float(self.per_slip):.4g} Pa/m and {float(self.resolution):.4g} m. "
+                f"{shortly(self.width)} Pa, {shortly(self.per_slip)} Pa/m and {shortly(self.resolution)} m. "
                 "Check their signs."
             )

@@ -18,7 +18,7 @@ from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.certificates.slow_sliding.push import SlidingPush
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.rationals import rational, shortly
 from quakedesign.studies.fundamental_limits import (
     KNOWING,
     QUANTITIES,
@@ -183,7 +183,7 @@ def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fr
     spread = rational(diffusivity, "diffusivity")
     if withdrawal <= 0 or spread <= 0:
         raise ParameterError(
-            f"pressure and diffusivity must be positive. Received {float(withdrawal):.4g} Pa and {float(spread):.4g} "
+            f"pressure and diffusivity must be positive. Received {shortly(withdrawal)} Pa and {shortly(spread)} "
             "m^2/s. Give the size of the largest withdrawal."
         )
     return withdrawal, spread

@@ -6,11 +6,12 @@ from itertools import count
 
 import sympy as sp
 
-from quakedesign.errors import CertificateError
+from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.rationals import fraction_of
 from quakedesign.symbolic.normal_form import normal_form
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 from quakedesign.symbolic.terms import Factor, Term, collected, multiplied
+from quakedesign.text import shown
 
 
 def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ...]:
@@ -120,5 +121,14 @@ def lie_derivative(function: sp.Expr, field: Mapping[sp.Symbol, sp.Expr]) -> sp.
 
 
 def real_symbols(names: Iterable[str]) -> dict[str, sp.Symbol]:
-    """SymPy symbol of every name."""
-    return {name: sp.Symbol(name, real=True) for name in names}
+    """SymPy symbol of every name.
+
+    Raises
+    ------
+    ParameterError
+        For what is no text.
+    """
+    listed = list(names)
+    if wrong := [name for name in listed if not isinstance(name, str)]:
+        raise ParameterError(f"names must be texts. Received {shown(wrong[0])}. Write 'x', say.")
+    return {name: sp.Symbol(name, real=True) for name in listed}

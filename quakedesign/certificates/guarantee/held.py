@@ -9,6 +9,7 @@ from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.loop import NOISES, Instants, Layer, LinearLaw, Model, PeriodicLoop, held_loop, starts, with_known_area
+from quakedesign.rationals import shortly
 
 if TYPE_CHECKING:
     from quakedesign.loop import SampledController
@@ -84,22 +85,22 @@ class Held:
         if min(self.start) < 0:
             raise ParameterError(
                 "initial slip and slip rate are bounds of both signs, 0 or more. Received "
-                f"{float(self.initial_slip):.4g} m and {float(self.initial_slip_rate):.4g} m/s. Leave out the sign."
+                f"{shortly(self.initial_slip)} m and {shortly(self.initial_slip_rate)} m/s. Leave out the sign."
             )
         if min(self.slip_noise, self.rate_noise) < 0:
             raise ParameterError(
                 "a bound of noise must be 0 or more. Received "
-                f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s. Check their signs."
+                f"{shortly(self.slip_noise)} m and {shortly(self.rate_noise)} m/s. Check their signs."
             )
         if min(self.jitter, self.delay_jitter, self.averaging, self.ramp) < 0:
             raise ParameterError(
-                f"jitter must be 0 or more, and averaging too. Received {float(self.jitter):.4g} s, of the delay "
-                f"{float(self.delay_jitter):.4g} s, and {float(self.averaging):.4g} s. Leave out the sign."
+                f"jitter must be 0 or more, and averaging too. Received {shortly(self.jitter)} s, of the delay "
+                f"{shortly(self.delay_jitter)} s, and {shortly(self.averaging)} s. Leave out the sign."
             )
         if self.rate_noise and self.law.of_slip_alone:
             raise ParameterError(
                 "noise of the slip rate needs a law that measures it. Received "
-                f"{float(self.rate_noise):.4g} m/s and a law of the slip alone. Leave it out."
+                f"{shortly(self.rate_noise)} m/s and a law of the slip alone. Leave it out."
             )
         if self.longest_step:
             self._require_no_clock()
@@ -109,7 +110,7 @@ class Held:
         if self.longest_step <= self.step:
             raise ParameterError(
                 "the longest step must be longer than the step, the shortest one. Received "
-                f"{float(self.longest_step):.4g} s and {float(self.step):.4g} s. Exchange them, or leave it out."
+                f"{shortly(self.longest_step)} s and {shortly(self.step)} s. Exchange them, or leave it out."
             )
         first = (v for row in self.law.first for v in row)
         times = (self.ramp, self.jitter, self.delay_jitter, self.averaging)

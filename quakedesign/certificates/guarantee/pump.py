@@ -5,6 +5,7 @@ from fractions import Fraction
 
 from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.errors import ParameterError
+from quakedesign.rationals import shortly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +34,11 @@ class Pump:
         if alone or not low <= 0 <= high or (self.least is not None and low == high):
             raise ParameterError(
                 "a pump's least and largest pressure must have 0 between them. Received "
-                f"{float(low):.4g} Pa and {float(high):.4g} Pa. Check their signs."
+                f"{shortly(low)} Pa and {shortly(high)} Pa. Check their signs."
             )
         if self.rate is not None and self.rate <= 0:
             raise ParameterError(
-                f"the rate of a pump must be positive. Received {float(self.rate):.4g} Pa/s. Leave it out for any."
+                f"the rate of a pump must be positive. Received {shortly(self.rate)} Pa/s. Leave it out for any."
             )
 
     @property

@@ -10,6 +10,7 @@ from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.certificates.guarantee.task import Task
 from quakedesign.errors import ParameterError
 from quakedesign.loop import Model, PeriodicLoop
+from quakedesign.rationals import shortly
 
 MOST_PARTS = 16
 _ONE_OVER_E = Fraction(3679, 10000)  # from above
@@ -38,7 +39,7 @@ class SlowGain:
         if not 1 <= self.parts <= MOST_PARTS or self.growth <= 0:
             raise ParameterError(
                 f"a slow gain needs 1 to {MOST_PARTS} parts and a positive growth. Received {self.parts} and "
-                f"{float(self.growth):.4g} 1/s. Change them."
+                f"{shortly(self.growth)} 1/s. Change them."
             )
 
     def models(self, task: Task) -> tuple[Model, ...]:

@@ -65,6 +65,7 @@ from quakedesign.certificates.guarantee.small_gain import NoGuarantee, channel_b
 from quakedesign.certificates.slow_sliding.task import Range, SlidingTask
 from quakedesign.errors import ParameterError
 from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop
+from quakedesign.rationals import shortly
 
 _TERMS = 24  # of Taylor's series
 _LARGEST = 3  # logarithm of a ratio: beyond that nothing is slow sliding
@@ -105,7 +106,7 @@ class SlidingClaims:
         if min(every) <= 0 or max(self.log_rate, self.log_state) > _LARGEST:
             raise ParameterError(
                 f"claims must be positive, logarithms at most {_LARGEST}. Received "
-                f"{', '.join(f'{float(v):.4g}' for v in every)}. Bound them so."
+                f"{', '.join(f'{shortly(v)}' for v in every)}. Bound them so."
             )
 
 
@@ -184,7 +185,7 @@ def loop_of(held: Held, model: SlidingModel, task: SlidingTask) -> PeriodicLoop:
     if not held.law.of_slip_alone or not (held.lag or held.diffusion):
         raise ParameterError(
             "slow sliding is guaranteed of a law of the slip alone whose pressure reaches the fault through rock or a "
-            f"lag. Received L^2/D = {float(held.diffusion):g} s and a lag of {float(held.lag):g} s. Give one of them."
+            f"lag. Received L^2/D = {shortly(held.diffusion)} s and a lag of {shortly(held.lag)} s. Give one of them."
         )
     times = {"delay": held.delay, "lag": held.lag, "diffusion": held.diffusion}
     loop = sliding_loop(held.law, model, held.step, **times, noisy=held.noise)

@@ -18,6 +18,7 @@ from quakedesign.fault.checks import require_nonnegative, require_positive
 from quakedesign.loop import LinearLaw
 from quakedesign.loop.actuators import DIRECT
 from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.rationals import shortly
 from quakedesign.simulation.campaign.problem import NOT_COMPARED, Problem, SampleResult
 from quakedesign.simulation.campaign.space import Sample, Space
 from quakedesign.simulation.integrators import adaptive_integrators
@@ -191,7 +192,7 @@ def sliding_space(fault: Fault, spread: Fraction) -> Space:
         For a spread that is not from 0 to below 1.
     """
     if not 0 <= spread < 1:
-        raise ParameterError(f"a spread must be from 0 to below 1. Received {float(spread):g}. Change it.")
+        raise ParameterError(f"a spread must be from 0 to below 1. Received {shortly(spread)}. Change it.")
     box = fault.box
     widths = {**dict.fromkeys(FRICTION, spread), "normal_stress": box.authority}
     widths |= {"stiffness": box.stiffness, "damping": box.damping}

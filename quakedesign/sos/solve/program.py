@@ -1,5 +1,6 @@
 """Positivity with decision variables: solved by cvxpy and Clarabel, rounded, and proved polynomial by polynomial."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -158,6 +159,8 @@ class Program:
         room : float
             Share of the optimum that is given up for the margin, or of 1 if that is larger.
         """
+        if not room >= 0 or math.isinf(room):
+            raise PolynomialError(f"room must be a number of at least 0. Received {room!r}. Write 0.01, say.")
         found = next(self._interior((room,)), None)
         return None if found is None else np.asarray(self._vector.value).tolist()
 
@@ -212,6 +215,8 @@ class Program:
             constraints += _membership(self._vector, parts, template, margin)
         for rows in self._definite:
             constraints.append(_definite(self._vector, rows, margin))
+        if not constraints:
+            raise PolynomialError("a program must require something. Received nothing. Call require first.")
         return constraints
 
     def _value(self, affine: Mapping[Exponents, Fraction]) -> Any:

@@ -23,6 +23,7 @@ from quakedesign.loop import (
     slip_observer,
 )
 from quakedesign.loop.sensing.differences import ORDER, names_before, told_by_differences
+from quakedesign.rationals import shortly
 from quakedesign.synthesis.guaranteed.path_design import BEHIND_LAG, THROUGH_ROCK, PathFeedback, path_modes
 from quakedesign.synthesis.guaranteed.rounding import rounded, short
 
@@ -68,7 +69,7 @@ def require_surroundings(around: Around) -> None:
         value = told.get(name, Fraction(0))
         if value < 0:
             what = name.replace("_", " ")
-            raise ParameterError(f"{what} must be 0 or more. Received {float(value):.4g} {unit}. Leave out the sign.")
+            raise ParameterError(f"{what} must be 0 or more. Received {shortly(value)} {unit}. Leave out the sign.")
 
 
 def why_no_law(step: Fraction, measured: str, around: Around) -> str:

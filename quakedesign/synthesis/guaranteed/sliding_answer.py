@@ -19,7 +19,7 @@ from quakedesign.certificates.slow_sliding.push import SlidingPush
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault
 from quakedesign.fault.defaults import AGEINGS
-from quakedesign.rationals import rational
+from quakedesign.rationals import rational, shortly
 from quakedesign.synthesis.guaranteed.sliding_adversary import WorstSliding, worst_sliding
 from quakedesign.synthesis.guaranteed.sliding_reach import Prove, Reach, farthest, suitable, what_would_do
 from quakedesign.synthesis.guaranteed.slow_sliding import (
@@ -138,7 +138,7 @@ def answer_sliding(
         meant = f": {float(spread):g} % is {float(spread) / 100:g}" if 1 <= spread < 100 else ""
         raise ParameterError(f"a spread must be from 0 to below 1. Received {float(spread):g}. Change it{meant}.")
     if stress is not None and stress <= 0:
-        raise ParameterError(f"a stress must be above 0. Received {float(stress):g} Pa. Change it, or leave it out.")
+        raise ParameterError(f"a stress must be above 0. Received {shortly(stress)} Pa. Change it, or leave it out.")
     if not (around.get("lag") or around.get("diffusion")):
         raise ParameterError(
             "slow sliding is guaranteed through rock or a lag between well and fault. Received neither. Give "
@@ -149,7 +149,7 @@ def answer_sliding(
     pump = around.pop("pump", None)
     if pump is not None and pump.rate is not None:
         raise ParameterError(
-            f"the rate of a pump is not known of slow sliding. Received {float(pump.rate):g} Pa/s. Leave it out."
+            f"the rate of a pump is not known of slow sliding. Received {shortly(pump.rate)} Pa/s. Leave it out."
         )
     prove = _proof(pump, tell, given=stress is not None)
     tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)

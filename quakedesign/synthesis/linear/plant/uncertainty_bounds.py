@@ -9,7 +9,7 @@ from quakedesign.certificates.premises import least_authority, plant_ranges
 from quakedesign.certificates.sectors import Sectors, rest_pressure, sectors
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.rationals import float_above, float_below, fraction_of, rational
+from quakedesign.rationals import float_above, float_below, fraction_of, rational, shortly
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 
@@ -113,7 +113,7 @@ def uncertainty_bounds(fault: Fault, *, loading_rate: float | str = 0) -> Uncert
     """
     speed = rational(loading_rate, "loading_rate")
     if speed < 0:
-        raise ParameterError(f"loading_rate must not be negative. Received {float(speed):.4g} m/s. Give its size.")
+        raise ParameterError(f"loading_rate must not be negative. Received {shortly(speed)} m/s. Give its size.")
     needed, b, ranges = sectors(fault), least_authority(fault), plant_ranges(fault)
     values = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
     drift = ranges[plant.k_hat][1] * speed * rational(fault.reference.operation_time)
