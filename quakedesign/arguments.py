@@ -216,7 +216,7 @@ def _test(hint: Any) -> Callable[[Any], bool]:
         return lambda _: True
     if origin in (Union, types.UnionType):
         tests = [_test(part) for part in inner]
-        plain = {part for part in inner if isinstance(part, type) and get_origin(part) is None}
+        plain = {p for p in inner if isinstance(p, type) and get_origin(p) is None and p.__name__ != "ndarray"}
         return lambda value: type(value) in plain or any(test(value) for test in tests)
     if origin is Literal:
         return lambda value: value in inner
@@ -234,7 +234,7 @@ def _test_of_class(hint: type) -> Callable[[Any], bool]:
 
     def test(value: Any) -> bool:
         if type(value) is hint:
-            return True
+            return hint.__name__ != "ndarray" or not _lacks_entries(value)
         if numbers is not None and isinstance(value, numbers):
             return not isinstance(value, bool) and (hint is not float or _is_float(value))
         return isinstance(value, hint) or (hint is bool and type(value).__name__ == "bool")
@@ -311,10 +311,16 @@ def _is_one(value: Any, origin: type) -> bool:
         return True
     if issubclass(origin, Mapping):
         return isinstance(value, Mapping)
-    if getattr(value, "ndim", 1) == 0 or bool(getattr(value, "mask", None) is not None and value.mask.any()):
-        return False  # an array of NumPy that is one number, or lacks some
+    if _lacks_entries(value):
+        return False
     listed = hasattr(value, "__len__") and hasattr(value, "__getitem__") and not isinstance(value, Mapping)
     return isinstance(value, origin) or (issubclass(origin, Sequence) and listed)
+
+
+def _lacks_entries(value: Any) -> bool:
+    """Whether an array of NumPy is one number, or has some that are masked."""
+    mask = getattr(value, "mask", None)
+    return getattr(value, "ndim", 1) == 0 or (mask is not None and hasattr(mask, "any") and bool(mask.any()))
 
 
 def _parts(hint: Any) -> list[str]:

@@ -1,6 +1,6 @@
 """Whatever is written into files, on the command line or into calls is answered, or refused in one line.
 
-A short profile runs by default, the long one, ten thousand commands and fifty thousand calls in one process, is slow. Work is bounded by short
+A short profile runs by default, the long one, 10 000 commands and 50 000 calls, is slow. Work is bounded by short
 tasks; commands and functions that search for minutes are drawn with something wrong, which they have to refuse first.
 Commands and their options are those that the command line knows, functions, classes and methods those that are public.
 """
@@ -466,6 +466,7 @@ def test_calls(which, tmp_path, monkeypatch):
 
 
 FOUND = [
+    (Space.of(FAULT).sample, (np.array(0.5), 0)),
     (FAULT.reference.shape, (-1e300,)),
     (FAULT.reference.shape, (np.datetime64(1, "Y"),)),
     (real_symbols, ((i for i in range(3)),)),
