@@ -54,7 +54,7 @@ __all__ = [
 ]
 
 
-_PLACES = (errno.EBADF, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
+_PLACES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
 """What a disk refuses, as against a defect."""
 
 
@@ -82,7 +82,7 @@ def main(arguments: list[str] | None = None) -> None:
             lack_memory()
         if "QUAKEDESIGN_TRACEBACK" in os.environ:
             raise
-        if isinstance(error, OSError) and error.errno in _PLACES:
+        if isinstance(error, OSError) and (error.errno in _PLACES or error.filename == "stdout"):
             where = error.filename or "the output"
             _refuse(f"{where} cannot be written: {error.strerror}. Choose another place, or make room.")
         defect = one_line(f"{type(error).__name__}: {error}")

@@ -77,7 +77,7 @@ def test_what_is_no_name_is_refused(document, name, tmp_path):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_is_one_is_taken_for_faults_too(name):
-    require_name(name)
+    assert require_name(name) is None
 
 
 def test_a_file_is_about_a_fault_by_its_data_whatever_their_names(tmp_path):
