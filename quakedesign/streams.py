@@ -6,6 +6,9 @@ import os
 import sys
 from typing import NoReturn
 
+if sys.platform != "win32":
+    import resource
+
 LACKS_MEMORY = 4
 """Exit code of a command that ran out of memory: nothing is said about its question."""
 _NARROWEST, _WIDEST = 20, 1000  # columns; tables of help never end below 3, and fill the memory with blanks
@@ -52,9 +55,7 @@ def widen() -> None:
 
 def has_room() -> bool:
     """Whether the process may have what the libraries take when they load: OpenBLAS ends it with 1 otherwise."""
-    try:
-        import resource
-    except ImportError:
+    if sys.platform == "win32":
         return True
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     return limit == resource.RLIM_INFINITY or limit >= _LEAST
