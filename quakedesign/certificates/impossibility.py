@@ -224,6 +224,13 @@ def farthest_well(diffusion_time: UpperBound, diffusivity: Fraction) -> UpperBou
         return UpperBound(upper(ball(diffusion_time * diffusivity).sqrt()))
 
 
+def nearest_proved_well(diffusion_time: LowerBound, diffusivity: Fraction) -> LowerBound:
+    """L [m] of a diffusion time L²/D [s] up to which something is proved, at a diffusivity D [m²/s]."""
+    _require(diffusivity > 0, "a diffusivity above 0", diffusivity)
+    with ctx.workprec(_BITS):
+        return LowerBound(end_of(ball(diffusion_time * diffusivity).sqrt().lower()))
+
+
 def smallest_withdrawal(task: Task | SlidingPush, step: Fraction) -> LowerBound | None:
     """P [Pa] below which no controller holds the fault with samples T apart; None where none is proved."""
     _require(step >= 0, "a step of at least 0", step)

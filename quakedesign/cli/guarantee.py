@@ -99,9 +99,20 @@ class Surroundings:
         """
         from quakedesign.synthesis.guarantee import exact_surroundings
 
+        return exact_surroundings(**self.plain(alone=False))
+
+    def plain(self, *, alone: bool = True) -> dict[str, Any]:
+        """All of it as it was given, with rock in place of a well; a diffusivity may stand alone or may not.
+
+        Raises
+        ------
+        ParameterError
+            For a well that is not told as one.
+        """
         told = asdict(self)
-        told["diffusion"] = rock(self.diffusion, told.pop("well"), told.pop("diffusivity"))
-        return exact_surroundings(**given(told))
+        well, spread = told.pop("well"), told.pop("diffusivity")
+        told["diffusion"] = rock(self.diffusion, well, (spread or "1") if well and alone else None if alone else spread)
+        return given(told)
 
 
 _ALONE = Surroundings()

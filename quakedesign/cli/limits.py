@@ -3,18 +3,15 @@
 from pathlib import Path
 from typing import Literal
 
-from quakedesign.cli.option_values import (
-    ExactMetres,
-    ExactMetresPerSecond,
-    ExactSeconds,
-    ExactSquareMetresPerSecond,
-    Pascals,
-    rock,
-)
+from quakedesign.cli.guarantee import Surroundings
+from quakedesign.cli.option_values import Pascals
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Formats, Output, Shaking
 from quakedesign.cli.shared import app
 from quakedesign.output import hold
 from quakedesign.rationals import rational
+
+
+_ALONE = Surroundings()
 
 
 @app.command
@@ -23,15 +20,10 @@ def limits(
     /,
     *,
     pressure: Pascals | None = None,
-    diffusivity: ExactSquareMetresPerSecond = "1",
-    lag: ExactSeconds = "0",
-    diffusion: ExactSeconds | None = None,
-    well: ExactMetres | None = None,
+    around: Surroundings = _ALONE,
     stress: Pascals | None = None,
     spread: str = "0",
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
-    slip_noise: ExactMetres = "0",
-    rate_noise: ExactMetresPerSecond = "0",
     box: Box = None,
     disturbance: Shaking = None,
     out: Path | None = None,
@@ -48,14 +40,9 @@ def limits(
     ----------
     pressure
         Largest withdrawal, such as '20 MPa'; the effective normal stress unless given.
-    diffusivity
-        Of the rock between well and fault, such as '1 m^2/s'.
-    lag
-        Of a fault with rate-and-state friction: time constant of pump and pipe behind which a design is proved.
-    diffusion
-        Of such a fault: L²/D of the rock behind which a design is proved; that of a near well unless given.
-    well
-        Its distance in place of that, such as '40 m', with --diffusivity.
+    around
+        What designs are proved with. The diffusivity, 1 m²/s unless given, is that of the farthest well too; noise says
+        how far it limits the slip-rate error of any controller as well.
     stress
         Of a fault with rate-and-state friction, whose limits are those of its linearisation about slow sliding: bound
         of the shear stress disturbance, such as '25 kPa'; the largest that a design stands unless given.
@@ -64,11 +51,6 @@ def limits(
         impossible is so for the nominal ones.
     measured
         What controllers are told: slip-and-rate, or slip.
-    slip_noise
-        Bound of the error of the measured slip, whatever its course, such as '1 um': how far noise limits the slip-rate
-        error of any controller.
-    rate_noise
-        The same of the measured slip rate.
     out
         Folder for a figure and results.json; nothing is written unless given.
     """
@@ -87,14 +69,11 @@ def limits(
     answer = all_limits(
         loaded,
         pressure=pressure,
-        diffusivity=float(rational(diffusivity)),
-        lag=lag,
-        diffusion=diffusion if well is None else rock(diffusion, well, diffusivity),
+        diffusivity=float(rational(around.diffusivity or "1")),
         stress=stress,
         spread=spread,
         measured=measured,
-        slip_noise=slip_noise,
-        rate_noise=rate_noise,
+        **around.plain(),
     )
     if out is not None:
         write_limits(answer, out, format)

@@ -1,11 +1,12 @@
 """Limits of every controller as values, each beside what a designed one is proved to do."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 from quakedesign.bounds import Bound, LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Guarantee, task_of
+from quakedesign.certificates.guarantee.held import Around
 from quakedesign.certificates.impossibility import Noise, smallest_peak
 from quakedesign.certificates.slow_sliding import SlidingGuarantee
 from quakedesign.certificates.slow_sliding.push import SlidingPush
@@ -74,6 +75,8 @@ class Told:
         ``slip-and-rate`` or ``slip``.
     slip_noise, rate_noise : Fraction
         Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
+    setup : Around
+        What else is between law and fault, or off, for designs.
 
     Raises
     ------
@@ -84,6 +87,7 @@ class Told:
     measured: str = MEASURED[0]
     slip_noise: Fraction = Fraction(0)
     rate_noise: Fraction = Fraction(0)
+    setup: Around = field(default_factory=Around)
 
     def __post_init__(self) -> None:
         require_known(self.measured, MEASURED[:2], "measured")
@@ -113,7 +117,8 @@ class Told:
     @property
     def around(self) -> dict[str, Any]:
         """Of a design."""
-        return {"measured": self.measured, "slip_noise": self.slip_noise, "rate_noise": self.rate_noise}
+        noise = {"slip_noise": self.slip_noise, "rate_noise": self.rate_noise}
+        return {**self.setup, "measured": self.measured, **noise}
 
     def words(self) -> str:
         """For people: rounded up, since who is told less can do less."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from typing import cast
 
 from quakedesign.bounds import Bound, LowerBound, UpperBound
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task, task_of
@@ -11,6 +12,7 @@ from quakedesign.certificates.impossibility import (
     farthest_well,
     longest_diffusion,
     longest_reaction,
+    nearest_proved_well,
     smallest_peak,
     smallest_withdrawal,
 )
@@ -29,11 +31,18 @@ from quakedesign.studies.fundamental_limits import (
     Told,
     above_the_reference,
 )
-from quakedesign.synthesis.guaranteed import MEASURED, design_held, longest_delay, reached
+from quakedesign.synthesis.guarantee import Quantity, exact_surroundings
+from quakedesign.synthesis.guaranteed import (
+    MEASURED,
+    continued,
+    design_at,
+    design_held,
+    farthest_rock,
+    longest_delay,
+    longest_step,
+)
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer, answer_sliding
 from quakedesign.synthesis.linear.plant.sliding_model import near_path, sliding_model
-
-_ATTEMPTS = 6  # designs for one time
 
 
 def limits(
@@ -49,6 +58,7 @@ def limits(
     slip_noise: float | str | Fraction = 0,
     rate_noise: float | str | Fraction = 0,
     prove: bool = True,
+    **setup: Quantity,
 ) -> Limits:
     """What no controller can do with a fault whose disturbance is of the class ``amplitude``.
 
@@ -65,9 +75,9 @@ def limits(
     diffusivity : float
         Of the rock between well and fault [m²/s].
     lag : float, str or Fraction
-        Of friction with a state: time constant of pump and pipe [s] behind which a design is proved.
+        Time constant of pump and pipe [s] behind which designs are proved.
     diffusion : float, str or Fraction, optional
-        The same of L²/D of the rock [s]; that of a well near the fault without it and a lag.
+        The same of L²/D of the rock [s]; with a state that of a well near the fault without it and a lag.
     stress : float, optional
         Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that a design stands unless
         given.
@@ -81,6 +91,8 @@ def limits(
         that has a state no limit of noise is known.
     prove : bool
         Whether to look for designs with a guarantee, which takes a minute.
+    **setup : float, str or Fraction
+        What else designs are proved with, as in `quakedesign.guarantee`: delay, starts, jitter, averaging, a pump.
 
     Returns
     -------
@@ -89,43 +101,41 @@ def limits(
     Raises
     ------
     ParameterError
-        For a negative pressure, a diffusivity that is not positive, a stress, lag or rock without friction that has a
-        state, no stress where no design stands any, noise with it, negative noise, or noise of a slip rate that is
-        not measured.
+        For a negative pressure, a diffusivity that is not positive, a stress without friction that has a state, no
+        stress where no design stands any, noise or more of a setup with it, negative noise, or noise of a slip rate
+        that is not measured.
     """
+    off = rational(spread, "spread")
+    path = exact_surroundings(lag=lag, diffusion=diffusion or 0, **setup)
     told = Told(
         measured=measured,
         slip_noise=rational(slip_noise, "slip noise"),
         rate_noise=rational(rate_noise, "rate noise"),
+        setup=cast(Around, {name: value for name, value in path.items() if value}),
     )
-    off = rational(spread, "spread")
     if fault.friction.state_names:
-        _require_no_noise(fault, told)
-        path: Around = {"lag": rational(lag, "lag"), "diffusion": rational(diffusion or 0, "diffusion")}
-        return _sliding_limits(fault, pressure, diffusivity, stress, path if prove else None, off)
+        _require_plain(fault, told)
+        way: Around = {"lag": path["lag"], "diffusion": path["diffusion"]}
+        return _sliding_limits(fault, pressure, diffusivity, stress, way if prove else None, off)
     if stress is not None or off:
         raise ParameterError(
             f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Leave it "
             "out: the box and the disturbance of the fault are meant."
         )
-    if rational(lag, "lag") or diffusion is not None:
-        raise ParameterError(
-            "designs of limits stand behind a lag or rock with rate-and-state friction alone. Received "
-            f"{fault.friction.name}. Leave them out; guarantee proves a law behind them, or that none can be."
-        )
     task, step = task_of(fault), rational(fault.sampling_time)
     withdrawal, spread = _given(fault, pressure, diffusivity)
-    held = _proved_steps(task, step, told) if prove else ()
-    if own := next((g for g in held if g.held.step == step), None):
-        own = _best_at(own, told)
-        held = tuple(own if g.held.step == step else g for g in held)
-    peak, proved = smallest_peak(task, step, **told.bounds), dict[str, Bound | None]()
+    held, own = _proved_steps(task, step, told) if prove else ((), None)
+    late = told.setup.get("delay", Fraction(0))
+    peak, proved = smallest_peak(task, step, late, **told.bounds), dict[str, Bound | None]()
     if held:
         proved["largest_step"] = LowerBound(held[-1].held.step)
     if own is not None:
         proved["peak_slip_rate_error"] = own.claims.slip_rate_error
         proved["largest_delay"] = _proved_delay(task, step, told)
-        proved["smallest_pressure"] = UpperBound(max(-own.claims.least_pressure, Fraction(0)))
+        proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
+        if (rock := _proved_rock(task, step, told)) is not None:
+            proved["largest_diffusion_time"] = rock
+            proved["farthest_well"] = nearest_proved_well(rock, spread)
     return Limits(
         fault=fault,
         withdrawal=withdrawal,
@@ -170,11 +180,15 @@ def _limits(
     }
 
 
-def _require_no_noise(fault: Fault, told: Told) -> None:
-    if told != Told():
+def _require_plain(fault: Fault, told: Told) -> None:
+    if replace(told, setup={}) != Told():
         raise ParameterError(
             f"no limit of slow sliding is known for noise. Received {fault.friction.name}, told {told.words()}. "
             "Leave noise out: what cannot be done without it cannot be done with it."
+        )
+    if more := told.setup.keys() - {"lag", "diffusion"}:
+        raise ParameterError(
+            f"limits of slow sliding know a lag and rock alone. Received {', '.join(sorted(more))}. Leave them out."
         )
 
 
@@ -247,8 +261,18 @@ def _why(answer: SlidingAnswer | None) -> str:
     return f": {answer.found.reason}" if answer is not None and isinstance(answer.found, NoGuarantee) else ""
 
 
-def _proved_steps(task: Task, step: Fraction, told: Told) -> tuple[Guarantee, ...]:
-    return reached(lambda held: design_held(task, held, objective="peak", **told.around), step, attempts=_ATTEMPTS)
+def _proved_steps(task: Task, step: Fraction, told: Told) -> tuple[tuple[Guarantee, ...], Guarantee | None]:
+    """Guarantees at growing T_s up to nearly the longest, and that at the fault's own, if there is one."""
+    own: Guarantee | NoGuarantee | None = design_held(task, step, objective="peak", **told.around)
+    longest = longest_step(task, **told.around)
+    if isinstance(own, Guarantee):
+        own = _best_at(own, told)
+    else:
+        own = continued(task, step, longest, **told.around)
+    found = [] if own is None else [own]
+    if longest is not None and (own is None or longest.guarantee.held.step > step):
+        found.append(design_at(task, longest))
+    return tuple(found), own
 
 
 def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
@@ -261,3 +285,9 @@ def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
 def _proved_delay(task: Task, step: Fraction, told: Told) -> LowerBound | None:
     longest = longest_delay(task, step, **told.around)
     return LowerBound(longest.held.delay) if longest else None
+
+
+def _proved_rock(task: Task, step: Fraction, told: Told) -> LowerBound | None:
+    """L²/D [s] behind which a law that is told of a clock is proved."""
+    farthest = farthest_rock(task, step, **told.around)
+    return LowerBound(farthest.held.diffusion) if farthest else None

@@ -36,6 +36,12 @@ class Channel:
     own: Fraction
     shares: Mapping[str, Fraction]
 
+    def rounded(self) -> "Channel":
+        """The same in floats, which are multiplied twenty times as fast: for estimates."""
+        shares: Mapping[str, Any] = {output: float(share) for output, share in self.shares.items()}
+        own: Any = float(self.own)
+        return Channel(name=self.name, own=own, shares=shares)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainSpread:

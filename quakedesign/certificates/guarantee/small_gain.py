@@ -223,6 +223,8 @@ def bounds_from(
     channels = (*channels_of(task, root, step, noise, spread, jitter), *beside(task, {name for _, name in gains}))
     if ("push", "awaited") in gains:
         channels = tuple(through_layer(channels, gains))
+    if all(isinstance(values[0], float) for values in gains.values()):
+        channels = tuple(channel.rounded() for channel in channels)
     small_gain, peaks = channel_bounds(channels, gains)
     if peaks is None:
         return _none(small_gain, channels, gains)

@@ -26,7 +26,8 @@ _NOISE_WORDS = {
     "rate_noise": "with any noise of at most {:.6g} m/s in the measured slip rate",
 }
 _RESTS = Fraction(1, 100)  # of the largest rate of the reference: below that a fault counts as at rest
-_TURNS = 32  # of claims that follow from themselves
+_TURNS, _LEAPS = 32, 16  # of claims that follow from themselves: by small steps first, then by leaps
+_LEAP = Fraction(6, 5)
 _RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # times of a pump that are tried, and what each has more than the last needed
 _FIRST = Fraction(1, 64)  # of a step, the first of them
 
@@ -231,14 +232,14 @@ def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuar
     gains, slip_error = _slow_gains(task, held, slow_gain), Fraction(0)
     if isinstance(gains, NoGuarantee):
         return gains
-    for _ in range(_TURNS):
+    for turn in range(_TURNS + _LEAPS):
         bounds = _slow_bounds(task, held, slow_gain, gains, slip_error)
         if isinstance(bounds, NoGuarantee):
             return bounds
         claims = _rounded(task, bounds)
         if claims.slip_error <= slip_error:
             return claims
-        slip_error = above(claims.slip_error * MARGIN)
+        slip_error = above(max(claims.slip_error * MARGIN, _LEAP * slip_error * (turn >= _TURNS)))
     reason = f"the slip error that moves the input gain, beyond {UpperBound(slip_error):.2g} m, moves it further"
     return NoGuarantee(reason=reason, small_gain=None)
 

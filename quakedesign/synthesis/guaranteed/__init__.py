@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from quakedesign.synthesis.guaranteed.design import OBJECTIVES as OBJECTIVES
     from quakedesign.synthesis.guaranteed.design import design_held as design_held
     from quakedesign.synthesis.guaranteed.families import MEASURED as MEASURED
+    from quakedesign.synthesis.guaranteed.longest_times import continued as continued
+    from quakedesign.synthesis.guaranteed.longest_times import design_at as design_at
+    from quakedesign.synthesis.guaranteed.longest_times import farthest_rock as farthest_rock
     from quakedesign.synthesis.guaranteed.longest_times import longest_delay as longest_delay
+    from quakedesign.synthesis.guaranteed.longest_times import longest_step as longest_step
     from quakedesign.synthesis.guaranteed.longest_times import reached as reached
     from quakedesign.synthesis.guaranteed.sliding import guarantee_of as guarantee_of
     from quakedesign.synthesis.guaranteed.slowly import best_guarantee as best_guarantee

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Unpack
+from typing import Any, Unpack
 
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
 from quakedesign.certificates.guarantee.held import Around
@@ -12,6 +12,7 @@ from quakedesign.synthesis.guaranteed.compensated import WEIGHTS, Compensation, 
 from quakedesign.synthesis.guaranteed.design import design_held
 from quakedesign.synthesis.guaranteed.families import MEASURED
 from quakedesign.synthesis.guaranteed.longest_times import (
+    continued,
     design_at,
     longest_delay,
     longest_step,
@@ -80,20 +81,22 @@ def sampled_design(
     ParameterError
         For an unknown objective.
     """
-    found = design_held(task, step, objective=objective, measured=measured, **around)
-    fails = isinstance(found, NoGuarantee)
-    longest = longest_step(task, step, most=step if fails else None, measured=measured, **around)
+    told: Any = {"measured": measured, **around}
+    found = design_held(task, step, objective=objective, **told)
+    longest = longest_step(task, **told)
+    if isinstance(found, NoGuarantee):
+        found = continued(task, step, longest, **told) or found
     reason = found.reason if isinstance(found, NoGuarantee) else ""
     if isinstance(found, NoGuarantee) and longest is not None:
-        found = design_at(task, longest, objective)
+        found = design_at(task, longest)
     if isinstance(found, NoGuarantee):
         return SampledDesign(step=step, runs=None, reason=reason)
-    delayed, own = longest_delay(task, found.held.step, measured=measured, **around), found.held.delay
+    delayed, own = longest_delay(task, found.held.step, **told), found.held.delay
     return SampledDesign(
         step=step,
         runs=found,
-        reason=reason if found.held.step < step else "",
-        longest_step=max(found.held.step, longest.held.step if longest else found.held.step),
+        reason=reason,
+        longest_step=max(found.held.step, longest.guarantee.held.step if longest else found.held.step),
         longest_delay=max(own, delayed.held.delay) if delayed else own,
     )
 
@@ -122,7 +125,7 @@ def sampled_sliding_mode(
     most = step if reason else None
     longest = reached_again(
         lambda time: careful(time).found,
-        lambda attempt: reached_step(task, step, attempt, most),
+        lambda attempt: reached_step(task, attempt, most),
         *(*question, step, most),
     )
     if reason and longest is not None:

@@ -16,7 +16,7 @@ from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuaran
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.checks import require_ordinary
-from quakedesign.synthesis.guaranteed.estimate import Estimate, estimated, slowly_estimated
+from quakedesign.synthesis.guaranteed.estimate import Estimate, closeness, estimated, slowly_estimated
 from quakedesign.synthesis.guaranteed.families import MEASURED, Family, family_of, require_surroundings, why_no_law
 from quakedesign.synthesis.guaranteed.poles import own_poles
 from quakedesign.synthesis.guaranteed.slowly import best_guarantee
@@ -24,7 +24,8 @@ from quakedesign.synthesis.guaranteed.unclocked import unclocked_estimate
 
 OBJECTIVES = ("tracking", "peak")
 _EVALUATIONS = 150
-_FEW = 50  # evaluations near a law that has a guarantee at another time
+_FEW = 70  # evaluations near a law that has a guarantee at another time
+_SURE = 0.9  # closeness that is near enough
 _NARROW = 1.25  # room of those: more of it costs what is proved of the slip error too
 _FEWER = 80  # evaluations where samples follow no clock
 _CREEPING = 0.1  # what the slip error over a period counts beside the slip-rate error, so that the loop does not creep
@@ -33,36 +34,71 @@ _MOST_GROWTH = 50.0  # logarithm; no law of samples answers that, and prediction
 _FAILED = 1e6
 _HOPELESS = 1.2  # small gain of a whole search after which no other start is tried
 _SETTLES = 0.9  # per period of the family, of what a law does by itself while the fault sticks, but for its integral
+_WIDE = 0.05  # around a small number, at first
 _FAR, _ENOUGH = 3.0, 40  # small gain that a search gives up at after so many evaluations
 
 
-def first_held(
+@dataclass(frozen=True, slots=True)
+class Closest:
+    """Of a family of laws for one loop that which comes nearest to a guarantee.
+
+    Attributes
+    ----------
+    closeness : float
+        As `closeness` in floats: below 1 where a proof is to be expected, else 1 more than the small gain.
+    numbers : numpy.ndarray
+        Of the law in its family.
+    held : Held
+    """
+
+    closeness: float
+    numbers: np.ndarray
+    held: Held
+
+    @property
+    def small_gain(self) -> float:
+        """Of errors that are 0, or those that follow from themselves [-]."""
+        return self.closeness if self.closeness < 1 else self.closeness - 1
+
+
+def closest(
     task: Task,
     step: Fraction,
     *,
     near: np.ndarray | None = None,
     measured: str = MEASURED[0],
     **around: Unpack[Around],
-) -> tuple[Guarantee | NoGuarantee, np.ndarray | None]:
-    """The first law with a guarantee that a search finds, sooner than `design_held` does, and its numbers.
+) -> Closest | NoGuarantee:
+    """The law that comes nearest to a guarantee, or one that is well within it; why there is no law at all.
 
-    The search is a short one near the numbers of another law, if there is one.
+    The search begins near the numbers of another law, if there is one, else where good laws of the family were seen.
     """
     if around.get("delay", 0) > MOST_DELAY * step:
-        return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None), near
+        return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
     laws = _Laws.of(task, step, measured, around)
     if isinstance(laws, NoGuarantee):
-        return laws, near
-    for start in laws.family.starts if near is None else (near,):
-        evaluations = _EVALUATIONS if near is None else _FEW
-        reached, x = laws.least_peak(start, enough=_FAILED / 2, evaluations=evaluations)
-        if reached < _FAILED / 2 or _hopeless(reached):
+        return laws
+    least, x = inf, np.array(laws.family.starts[0])
+    starts = sorted(laws.family.starts, key=lambda start: laws.close(np.array(start))[0])
+    for start in starts if near is None else (near,):
+        least, x = min((least, x), laws.closest(start, _FEW if near is not None else _EVALUATIONS), key=lambda v: v[0])
+        if least < _SURE:
             break
-    if (none := laws.without_bounds(x)) is not None and _hopeless(reached):
-        return none, x
-    held = laws.held(x)
-    # through a layer a guarantee needs a slow input gain; elsewhere one with any gain is much sooner found
-    return best_guarantee(task, held) if held.diffusion or held.longest_step else guarantee(task, held), x
+    return Closest(least, x, laws.held(x))
+
+
+def nearby(
+    task: Task, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> Guarantee | NoGuarantee:
+    """Design for the smallest certified slip-rate error, sought near the numbers of a law for another T_s or delay.
+
+    Near the longest of these a law is proved with a slow input gain alone, of which `design_held` knows too late.
+    """
+    laws = _Laws.of(task, step, measured, around)
+    if isinstance(laws, NoGuarantee):
+        return laws
+    found = best_guarantee(task, laws.held(laws.least_peak_near(near)))
+    return found if isinstance(found, Guarantee) else best_guarantee(task, laws.held(near))
 
 
 def design_held(
@@ -182,6 +218,32 @@ class _Laws:
         except LinAlgError:  # of a Riccati equation
             return None
 
+    def closest(self, start: Sequence[float] | np.ndarray, evaluations: int) -> tuple[float, np.ndarray]:
+        """Smallest closeness to a guarantee near a start, and where."""
+
+        def cost(x: np.ndarray) -> float:
+            return self.quiet(x, _FAILED * min(self.close(x)[0], 9.0)) / _FAILED
+
+        return _search_once(
+            ("closest", *self.question), cost, start, enough=_SURE, evaluations=evaluations, far=1 + _FAR, wide=True
+        )
+
+    def least_peak_near(self, start: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Where the cost of a peak is smallest near a law that may be proved with a slow input gain alone."""
+
+        def cost(x: np.ndarray) -> float:
+            found, bounds = self.close(x)
+            peak = _FAILED * min(found, 9.0) if bounds is None else _decibels(bounds, self.family.period)
+            return self.quiet(x, peak)
+
+        return _search_once(("near peak", *self.question), cost, start, evaluations=_FEW, wide=True)[1]
+
+    def close(self, x: np.ndarray) -> tuple[float, Bounds | None]:
+        try:
+            return closeness(self.task, self.held(x)) if self.family.admits(x) else (inf, None)
+        except LinAlgError:  # of a Riccati equation
+            return inf, None
+
     def without_bounds(self, x: np.ndarray) -> NoGuarantee | None:
         """Why a law has no bounds; None where it has, or is none."""
         seen = self.seen(x)
@@ -262,8 +324,12 @@ def _search(
     enough: float = -inf,
     evaluations: int = _EVALUATIONS,
     far: float = inf,
+    wide: bool = False,
 ) -> tuple[float, np.ndarray]:
-    """Smallest cost found and where; the search ends below `enough`, or after a while still above `far`."""
+    """Smallest cost found and where; the search ends below `enough`, or after a while still above `far`.
+
+    It begins a twentieth of each number around the start; if `wide`, as far around those that are small.
+    """
     least, count = inf, 0
 
     def counted(x: np.ndarray) -> float:
@@ -276,7 +342,10 @@ def _search(
         if intermediate_result.fun < enough or (count >= _ENOUGH and far < least < 9 * _FAILED):
             raise StopIteration
 
-    options = {"maxfev": evaluations, "xatol": 2e-3, "fatol": 1e-3}
+    options: dict[str, Any] = {"maxfev": evaluations, "xatol": 2e-3, "fatol": 1e-3}
+    if wide:
+        first = np.array(start, dtype=float)
+        options["initial_simplex"] = np.vstack([first, first + np.diag(np.maximum(np.abs(first) / 20, _WIDE))])
     found = minimize(counted, np.array(start), method="Nelder-Mead", options=options, callback=stop)
     return float(found.fun), found.x
 
@@ -287,7 +356,11 @@ def _peak_cost(found: Estimate | None, period: Fraction) -> float:
         return 10 * _FAILED
     if isinstance(found.bounds, NoGuarantee):
         return _FAILED * min(float(found.bounds.small_gain or 9), 9.0)
-    return 10 * log10(float(found.bounds.slip_rate_error) + _CREEPING * float(found.bounds.slip_error / period))
+    return _decibels(found.bounds, period)
+
+
+def _decibels(bounds: Bounds, period: Fraction) -> float:
+    return 10 * log10(float(bounds.slip_rate_error) + _CREEPING * float(bounds.slip_error / period))
 
 
 def _drift_cost(found: Estimate | None, limit: float) -> float:

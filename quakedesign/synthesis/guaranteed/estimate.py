@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import reduce
+from math import inf
 
 import numpy as np
 from scipy.linalg import expm
 
-from quakedesign.certificates.guarantee import Bounds, Held, NoGuarantee, Task
+from quakedesign.certificates.guarantee import Bounds, Held, NoGuarantee, SlowGain, Task
 from quakedesign.certificates.guarantee.free_response import START
 from quakedesign.certificates.guarantee.inputs import GainSpread
 from quakedesign.certificates.guarantee.small_gain import bounds_from
@@ -21,6 +22,9 @@ _ALIKE = 0.99  # decays of modes that are not told apart
 _SOON = 1024  # periods
 _ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # of the range of a slow input gain, with whose loops it is judged
 _SPREAD = Fraction(1, 16)  # of the range by which it is off theirs
+_PARTS = SlowGain(parts=8, growth=Fraction(1))  # as in proofs; what is past is left out
+_TURNS, _LEAP = 10, 1.4  # of a slip error that follows from itself, and how far it goes at least after a few
+_FEW = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,43 @@ def slowly_estimated(task: Task, held: Held) -> Estimate | None:
     spread = GainSpread(half=_SPREAD * (high - low), aged=Fraction(0))
     bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
     return Estimate(bounds, max(whole["slip_error", "drift"]))
+
+
+def closeness(task: Task, held: Held) -> tuple[float, Bounds | None]:
+    """Below 1 where a proof is to be expected: the small gain [-], and the bounds; elsewhere 1 more, of errors of 0.
+
+    Where friction depends on the slip alone the input gain is slow, and the slip error that moves it has to follow from
+    itself; loops of the first and the last part of its range tell. Infinite where a nominal loop is unstable or very
+    slow.
+    """
+    if task.friction.rate_slope:
+        found = estimated(task, held)
+        bounds = None if found is None else found.bounds
+        return _closeness(bounds, inf if bounds is None else _small(bounds))
+    whole: dict[tuple[str, str], tuple[float, ...]] = {}
+    for model in (_PARTS.models(task)[0], _PARTS.models(task)[-1]):
+        gains = gains_of(held.loop(task, model))
+        if gains is None:
+            return inf, None
+        whole = {key: whole.get(key, ()) + found for key, found in gains.items()}
+    whole |= {(y, "aged"): found for (y, name), found in whole.items() if name == "acceleration"}
+    slip_error, least = 0.0, inf
+    for turn in range(_TURNS):
+        spread = replace(_PARTS.spread(task, Fraction(slip_error)), aged=Fraction(0))
+        bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
+        least = min(least, _small(bounds))
+        if isinstance(bounds, NoGuarantee) or bounds.slip_error <= slip_error:
+            return _closeness(bounds, least)
+        slip_error = max(1.01 * float(bounds.slip_error), _LEAP * slip_error * (turn >= _FEW))
+    return _closeness(None, least)
+
+
+def _small(bounds: Bounds | NoGuarantee) -> float:
+    return inf if bounds.small_gain is None else float(bounds.small_gain)
+
+
+def _closeness(bounds: Bounds | NoGuarantee | None, least: float) -> tuple[float, Bounds | None]:
+    return (_small(bounds), bounds) if isinstance(bounds, Bounds) else (1 + least, None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """How long a sampling time and a delay may be for a designed loop to have a guarantee."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
 from math import sqrt
 from typing import Any, Unpack
@@ -10,60 +11,80 @@ import numpy as np
 from quakedesign.cache import search_once
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
 from quakedesign.certificates.guarantee.held import Around
-from quakedesign.synthesis.guaranteed.design import MOST_DELAY, design_held, first_held
+from quakedesign.synthesis.guaranteed.design import MOST_DELAY, Closest, closest, nearby
 from quakedesign.synthesis.guaranteed.families import MEASURED, measured_by
-from quakedesign.synthesis.guaranteed.slowly import tightened
+from quakedesign.synthesis.guaranteed.slowly import best_guarantee
 
-Search = Callable[[Fraction, np.ndarray | None], tuple[Guarantee | NoGuarantee, np.ndarray | None]]
+Search = Callable[[Fraction, np.ndarray | None], Closest | NoGuarantee]
 Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
 _ATTEMPTS = 12
 _SHARE = 0.5  # of the time in which the fastest unstable pole grows e-fold, near which the longest T_s was seen
 _NEAR = Fraction(1, 16)  # share of the longest time by which the end of the reach is left open
+_CLOSE = Fraction(1, 20)  # the same where designs are continued
+_BACK = Fraction(39, 40)  # of a time whose law is not proved after all
+_EDGE, _AIM = 0.92, 0.985  # small gain that is at the end of the reach, and that which a time is sought for
+_POWER = 1.3  # of a time with which the small gain was seen to grow
+_FAR = 2.0  # small gain from which a time is halved
 
 
-def longest_step(
-    task: Task,
-    step: Fraction,
-    *,
-    most: Fraction | None = None,
-    measured: str = MEASURED[0],
-    **around: Unpack[Around],
-) -> Guarantee | None:
-    """A guarantee at nearly the longest T_s that has one; None where none is found.
+@dataclass(frozen=True, slots=True)
+class Longest:
+    """A guarantee at nearly the longest time that has one, and the numbers of its law."""
+
+    guarantee: Guarantee
+    numbers: np.ndarray
+
+
+def longest_step(task: Task, *, measured: str = MEASURED[0], **around: Unpack[Around]) -> Longest | None:
+    """A guarantee at nearly the longest T_s that has one, whatever the T_s of the fault; None where none is found.
+
+    Laws are those that come nearest to a guarantee, each sought near that of the T_s before.
 
     Parameters
     ----------
     task : Task
-    step : Fraction
-        T_s of the fault [s], tried first where the fault is stable.
-    most : Fraction, optional
-        Longest T_s to try [s].
     measured, **around
         As in `design_held`.
     """
-    attempt = _attempt(lambda held, near: first_held(task, held, near=near, measured=measured, **around))
-    return reached_step(task, step, attempt, most)
+
+    def search(step: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
+        return closest(task, step, near=near, measured=measured, **around)
+
+    late = sum((around.get(name) or Fraction(0) for name in ("delay", "lag", "diffusion")), Fraction(0))  # type: ignore[misc]
+    return _farthest(task, search, _first_step(task, float(late)), None)
 
 
-def reached_step(task: Task, step: Fraction, attempt: Attempt, most: Fraction | None = None) -> Guarantee | None:
+def reached_step(task: Task, attempt: Attempt, most: Fraction | None = None) -> Guarantee | None:
     """The same for any kind of design, an attempt at a T_s [s]."""
-    pole = _fastest_pole(task)
-    first = Fraction(f"{_SHARE / pole:.3g}") if pole > 0 else step
+    first = _first_step(task)
     return _last(reached(attempt, first if most is None else min(first, most), most=most))
 
 
-def _fastest_pole(task: Task) -> float:
-    """Fastest unstable pole over the box [1/s]; at most 0 for a stable fault."""
+def _first_step(task: Task, late: float = 0.0) -> Fraction:
+    """T_s to begin with [s], where a pressure acts late [s]: of the fastest pole, of a stable fault of its spring."""
     slip, rate = float(task.slip_chord[1]), float(task.rate_chord[0])
-    return (sqrt(max(rate**2 + 4 * slip, 0.0)) - rate) / 2 if slip > 0 or rate < 0 else 0.0
+    pole = (sqrt(max(rate**2 + 4 * slip, 0.0)) - rate) / 2 if slip > 0 or rate < 0 else 0.0
+    pace = pole if pole > 0 else sqrt(abs(slip)) or 1 / float(task.operation_time)
+    return Fraction(f"{_SHARE / pace / (1 + pace * late):.3g}")
 
 
-def design_at(task: Task, longest: Guarantee, objective: str) -> Guarantee:
-    """Design for an objective at T_s and all else of a guarantee, which stays where there is none."""
-    held = longest.held
-    measured = measured_by(held.law)
-    found = design_held(task, held.step, objective=objective, measured=measured, **held.around)
-    return found if isinstance(found, Guarantee) else tightened(longest)
+def continued(
+    task: Task, step: Fraction, longest: Longest | None, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> Guarantee | None:
+    """Design for a T_s [s] near one for a longer T_s, where a search at T_s alone found none; None without one."""
+    if longest is None or longest.guarantee.held.step < step:
+        return None
+    found = nearby(task, step, longest.numbers, measured=measured, **around)
+    return found if isinstance(found, Guarantee) else None
+
+
+def design_at(task: Task, longest: Longest) -> Guarantee:
+    """Design for a small slip-rate error at T_s and all else of a guarantee, which stays where there is none."""
+    held = longest.guarantee.held
+    found = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), **held.around)
+    return min(
+        (longest.guarantee, *([found] if isinstance(found, Guarantee) else [])), key=lambda g: g.claims.slip_rate_error
+    )
 
 
 def longest_delay(
@@ -71,11 +92,89 @@ def longest_delay(
 ) -> Guarantee | None:
     """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
 
-    def search(delay: Fraction, near: np.ndarray | None) -> tuple[Guarantee | NoGuarantee, np.ndarray | None]:
-        return first_held(task, step, near=near, measured=measured, **(around | {"delay": delay}))
+    def search(delay: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
+        return closest(task, step, near=near, measured=measured, **(around | {"delay": delay}))
 
-    _, near = search(Fraction(0), None)
-    return reached_delay(step, _attempt(search, near), step / 2)
+    found = _farthest(task, search, Fraction(0), MOST_DELAY * step, unit=step / 2)
+    return found and found.guarantee
+
+
+def farthest_rock(
+    task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> Guarantee | None:
+    """A guarantee through nearly the largest L²/D of rock that has one; None where none is found."""
+
+    def search(time: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
+        return closest(task, step, near=near, measured=measured, **(around | {"diffusion": time}))
+
+    found = _farthest(task, search, max(_first_step(task), step), None)
+    return found and found.guarantee
+
+
+def _farthest(
+    task: Task, search: Search, first: Fraction, most: Fraction | None, unit: Fraction = Fraction(0)
+) -> Longest | None:
+    """A proof at nearly the longest time for which laws come near enough to a guarantee.
+
+    Parameters
+    ----------
+    search : callable
+        Of a time [s] and the numbers of a law for another one.
+    first : Fraction
+        Time to try first [s].
+    most : Fraction, optional
+        Longest time to try [s].
+    unit : Fraction
+        Time to try after 0 [s].
+    """
+    good: Closest | None = None
+    time, at, bad, before = first, first, None, None
+    for _ in range(_ATTEMPTS):
+        found = search(time, None if good is None else good.numbers)
+        small = None if isinstance(found, NoGuarantee) else found.small_gain
+        if isinstance(found, Closest) and found.closeness < 1:
+            good, at = found, time
+        else:
+            if good is None and (not time or not _nearer(small, before)):
+                return None
+            bad, before = (time, small), small
+        if good is not None and (
+            at == most or good.closeness > _EDGE or (bad is not None and bad[0] - at <= _CLOSE * bad[0])
+        ):
+            break
+        time = _time_between(good, at, bad, most, unit)
+    return None if good is None else _proved_near(task, search, good, at)
+
+
+def _proved_near(task: Task, search: Search, good: Closest, time: Fraction) -> Longest | None:
+    """A proof at a time or a little below."""
+    for _ in range(_ATTEMPTS):
+        found = best_guarantee(task, good.held)
+        if isinstance(found, Guarantee):
+            return Longest(found, good.numbers)
+        time = Fraction(f"{float(time * _BACK):.3g}")
+        nearer = search(time, good.numbers)
+        if isinstance(nearer, Closest):
+            good = nearer
+    return None
+
+
+def _time_between(
+    good: Closest | None, at: Fraction, bad: tuple[Fraction, float | None] | None, most: Fraction | None, unit: Fraction
+) -> Fraction:
+    """Time to try next [s], in three digits: where the small gain, drawn straight, is that of the end of the reach."""
+    if good is None:
+        assert bad is not None
+        time, small = bad
+        return time / 2 if small is None or small > _FAR else Fraction(f"{0.9 * float(time) / max(small, 1.0):.3g}")
+    if bad is None:
+        ahead = float(at) * min((_AIM / good.small_gain) ** (1 / _POWER), 2.0) if at else float(unit)
+        time = Fraction(f"{ahead:.3g}")
+        return time if most is None else min(time, most)
+    width, share = float(bad[0] - at), 0.5
+    if bad[1] is not None and bad[1] > max(1.0, good.small_gain):
+        share = min(max((_AIM - good.small_gain) / (bad[1] - good.small_gain), 0.2), 0.8)
+    return Fraction(f"{float(at) + share * width:.3g}")
 
 
 def reached_delay(step: Fraction, attempt: Attempt, first: Fraction) -> Guarantee | None:
@@ -110,18 +209,6 @@ def reached_again(attempt: Attempt, search: Callable[[Attempt], Guarantee | None
         if isinstance(found := once(Fraction(time)), Guarantee):
             return found
     return search(once)
-
-
-def _attempt(search: Search, near: np.ndarray | None = None) -> Attempt:
-    """Attempt that begins near a law, then where the one before it was good."""
-
-    def attempt(time: Fraction) -> Guarantee | NoGuarantee:
-        nonlocal near
-        found, numbers = search(time, near)
-        near = numbers if isinstance(found, Guarantee) else near
-        return found
-
-    return attempt
 
 
 def _last(found: tuple[Guarantee, ...]) -> Guarantee | None:
@@ -162,7 +249,7 @@ def reached(
     return tuple(found)
 
 
-def _nearer(now: Fraction | None, before: Fraction | None) -> bool:
+def _nearer(now: Fraction | float | None, before: Fraction | float | None) -> bool:
     """Whether twice what half the time has brought would bring the small gain below 1, or may: nothing is known."""
     return now is None or before is None or now - 2 * (before - now) < 1
 

@@ -33,7 +33,7 @@ from quakedesign.synthesis.guaranteed import (
     sampled_design,
 )
 from quakedesign.synthesis.guaranteed.families import why_no_law
-from quakedesign.synthesis.guaranteed.longest_times import design_at, longest_step
+from quakedesign.synthesis.guaranteed.longest_times import continued, design_at, longest_step
 from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
 from quakedesign.synthesis.linear.analysis.robust_stability import why_undecided
@@ -108,11 +108,10 @@ class StateFeedback(Method[ExtendedLQR]):
         found = design_held(task, step, objective=wanted.objective, **told)
         if isinstance(found, Guarantee) or wanted.around.get("longest_step"):
             return attacked(fault, found)
-        longest = longest_step(task, step, most=step, **told)
-        if longest is None:
-            return Answer(fault=fault, found=found)
-        shorter = design_at(task, longest, wanted.objective)
-        return Answer(fault=fault, found=found, shorter=shorter, asked_step=step)
+        longest = longest_step(task, **told)
+        if (again := continued(task, step, longest, **told)) is not None:
+            return attacked(fault, again)
+        return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest), asked_step=longest and step)
 
 
 def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
