@@ -35,6 +35,7 @@ def cut_off(
     width: sp.Expr,
     per_slip: sp.Expr,
     resolution: sp.Expr,
+    within: tuple[sp.Expr, ...] | None = None,
 ) -> tuple[sp.Expr, ...]:
     """The pressure [Pa] that is applied at a sample in place of what is asked for, and `RestLimit.STATES` after it.
 
@@ -48,9 +49,15 @@ def cut_off(
         [m].
     width, per_slip, resolution : Expr
         [Pa], [Pa/m], [m].
+    within : tuple of Expr, optional
+        Least and largest pressure [Pa], and the slip between two samples [m] up to which they are not passed.
     """
     highest, last = states
     moved = per_slip * reference
     short = sp.Max(highest - moved - width - asked, 0)
     applied = asked + sp.Piecewise((short, slip <= last + resolution), (0, True))
+    if within is not None:
+        least, largest, fastest = within
+        inside = sp.Max(least, sp.Min(largest, applied)) - applied
+        applied += sp.Piecewise((inside, slip <= last + fastest), (0, True))
     return applied, highest + sp.Max(applied + moved - highest, 0), slip

@@ -101,7 +101,8 @@ class SampledController(Controller):
         states = signals.integrals[len(self.law.states) :]
         limit, reference = self.rest_limit, signals.slip - signals.slip_error
         numbers = (to_sympy(v) for v in (limit.width, limit.per_slip, limit.resolution))
-        applied, *after = cut_off(asked, states, signals.slip, reference, *numbers)
+        within = None if limit.range is None else tuple(to_sympy(v) for v in limit.range)
+        applied, *after = cut_off(asked, states, signals.slip, reference, *numbers, within)
         return applied, (applied - asked) / to_sympy(self.step), tuple(after)
 
     def _read(self, signals: Signals) -> tuple[Any, ...]:

@@ -142,6 +142,7 @@ def _row(premise: "Premise") -> tuple[str, ...]:
 
 _OTHER_UNITS = {"scale": "", "weight": "", "divisor": "m^2/kg", "authority": "m^2/kg"}
 _OTHER_UNITS |= {"rest_width": "Pa", "rest_per_slip": "Pa/m", "rest_resolution": "m"}
+_OTHER_UNITS |= {"rest_least": "Pa", "rest_largest": "Pa", "rest_fastest": "m"}
 
 
 def _gains(entry: "Entry") -> list[tuple[str, str, Markup]]:

@@ -18,6 +18,7 @@ from quakedesign.fault import Fault
 from quakedesign.fault.units import exact_value
 from quakedesign.rationals import exact_text, rational
 from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, OBJECTIVES, Answer
+from quakedesign.synthesis.guaranteed.longest_times import nearest_setup
 from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer, answer_sliding
 from quakedesign.synthesis.methods.base import Wanted, method_of
 
@@ -119,7 +120,8 @@ def answer(
     late, far = around.get("delay", Fraction(0)), around.get("diffusion", Fraction(0))
     beyond = hopeless(task, rational(fault.effective_normal_stress), late, far)
     if beyond and not gains:
-        return Answer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None))
+        near = nearest_setup(task, period, measured=measured, **around) if controller == "elqr" else None
+        return Answer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None), nearest=near)
     wanted = Wanted(gains=gains, objective=objective, scheme=scheme, measured=measured, around=around)
     given = method_of(law).sampled(fault, task, law, period, wanted)
     longest = max(period, around.get("longest_step", period))

@@ -81,7 +81,8 @@ class Guarantee:
         """A limit that the valve's pressure never reaches; None where nothing is claimed of it, or the law not told.
 
         What the law asks for acts a delay later, while the reference moves on. A fault that moves by less than its
-        measurement tells, or by a hundredth of the reference's largest rate, rests.
+        measurement tells, or by a hundredth of the reference's largest rate, rests. Pressures that are
+        claimed never to be passed are not, either, unless the fault slips faster than is claimed.
         """
         held, (low, high), (*fault, (least, largest)) = self.held, self.task.rest_pressure, self.claims.pressures
         if not held.law.applied or (not fault and (held.lag or held.diffusion)):
@@ -91,7 +92,15 @@ class Guarantee:
         late = per_slip * (held.delay + held.jitter + held.delay_jitter + held.ramp) * self.task.reference_rates[0]
         width = above(2 * away + late)
         resolution = above(2 * held.slip_noise + _RESTS * self.task.reference_rates[0] * held.step)
-        return RestLimit(width=width, per_slip=above(per_slip), resolution=resolution)
+        most = max(held.step, held.longest_step) + 2 * held.off
+        return RestLimit(
+            width=width,
+            per_slip=above(per_slip),
+            resolution=resolution,
+            least=Fraction(least),
+            largest=Fraction(largest),
+            fastest=above(2 * held.slip_noise + self.claims.peak_slip_rate * most),
+        )
 
     @property
     def slip_acceleration(self) -> UpperBound:

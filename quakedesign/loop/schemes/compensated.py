@@ -20,8 +20,9 @@ from quakedesign.loop.steps.discrete_law import Law, Values
 from quakedesign.loop.steps.inclusion import end_rate
 from quakedesign.loop.steps.sampled import Sampled
 
-_LIMIT = sp.symbols("asked slip reference width per_slip resolution highest last", real=True)
-_CUT = cut_off(_LIMIT[0], _LIMIT[6:], *_LIMIT[1:6])
+_LIMIT = sp.symbols("asked slip reference width per_slip resolution least largest fastest highest last", real=True)
+_CUT = cut_off(_LIMIT[0], _LIMIT[9:], *_LIMIT[1:6], _LIMIT[6:9])
+_NUMBERS = ("rest_width", "rest_per_slip", "rest_resolution", "rest_least", "rest_largest", "rest_fastest")
 _WIDEST = 1e30  # Pa, of no limit
 
 
@@ -44,6 +45,10 @@ class Compensated(Sampled):
         Of `RestLimit` [Pa]; no limit unless told.
     rest_per_slip, rest_resolution : float
         Of the same [Pa/m], [m].
+    rest_least, rest_largest : float, optional
+        Of the same [Pa].
+    rest_fastest : float
+        Of the same [m].
     substeps, actuator, measurement, authority
         As in `Sampled`; B0 is the geometric middle of the box unless told, so that β/β0 is as far from both limits.
 
@@ -53,20 +58,23 @@ class Compensated(Sampled):
     """
 
     name: ClassVar[str] = "compensated"
-    own_size: ClassVar[int] = 8 + len(RestLimit.STATES)
+    own_size: ClassVar[int] = 5 + len(_NUMBERS) + len(RestLimit.STATES)
 
     weight: float = 0.5
     rest_width: float | None = None
     rest_per_slip: float = 0.0
     rest_resolution: float = 0.0
+    rest_least: float | None = None
+    rest_largest: float | None = None
+    rest_fastest: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 < self.weight <= 1:
             raise ParameterError(f"weight must be above 0 and at most 1. Received {self.weight!r}.")
         if self.rest_width is not None:
-            width, *others = map(Fraction, (self.rest_width, self.rest_per_slip, self.rest_resolution))
-            RestLimit(width=width, per_slip=others[0], resolution=others[1])
+            given = ((name.removeprefix("rest_"), getattr(self, name)) for name in _NUMBERS)
+            RestLimit(**{name: value if value is None else Fraction(value) for name, value in given})
 
     @staticmethod
     def derive(law: Law) -> tuple[sp.Expr, ...]:
@@ -80,7 +88,9 @@ class Compensated(Sampled):
     def starts(self) -> tuple[float, ...]:
         """See `Sampled.starts`: whether a sample has been taken, e2⁻, the feed-forward then, d, weight and limit."""
         width = _WIDEST if self.rest_width is None else float(self.rest_width)
-        limit = width, float(self.rest_per_slip), float(self.rest_resolution)
+        least = -_WIDEST if self.rest_least is None else float(self.rest_least)
+        largest = _WIDEST if self.rest_largest is None else float(self.rest_largest)
+        limit = width, *map(float, (self.rest_per_slip, self.rest_resolution)), least, largest, float(self.rest_fastest)
         return 0.0, 0.0, 0.0, 0.0, float(self.weight), *limit, 0.0, 0.0
 
     def nominal(self, loop: Stepped) -> float:
@@ -90,7 +100,7 @@ class Compensated(Sampled):
     @property
     def settings(self) -> dict[str, Any]:
         """See `Scheme.settings`."""
-        names = ("rest_width", "rest_per_slip", "rest_resolution") if self.rest_width else ()
+        names = [name for name in _NUMBERS if getattr(self, name) is not None] if self.rest_width else []
         return super().settings | {"weight": self.weight} | {name: getattr(self, name) for name in names}
 
     @classmethod
@@ -109,4 +119,4 @@ class Compensated(Sampled):
         passing = dict(zip(_LIMIT, (asked, known[discrete_law.slip], reference, *limit), strict=True))
         pressure, *passed = discrete_law.values(_CUT, passing)
         after = [ca.SX(0) if slope == 0 else -estimate / share for _ in law.integrals]
-        return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight, *limit[:3], *passed])
+        return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight, *limit[: len(_NUMBERS)], *passed])

@@ -18,6 +18,9 @@ _PIECES = 6
 _SWEEPS = 8
 _MANY, _FEW = 512, 2  # courses that switch after random times, and their sweeps: where the fault sticks, sweeps stall
 _COURSES, _LEAST_COURSES = 24, 8  # for each of the two outputs; fewer where they are longer
+_CLIMBING, _CLIMBS = 48, 8  # courses that climb from the best of those, and how often
+_CHANGED = 0.15, 0.4, 1.0  # shares of the pieces whose inputs are those of the adjoint, in turn
+_BLOCK = 8  # pieces that change together, at most
 _SOON = 1, 2, 4, 8, 16  # periods after which errors are looked at as well where a loop does not start at rest
 _SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
 _LEVELS = 400  # of a disturbance of bounded rate above 0
@@ -35,10 +38,20 @@ class WorstFound:
         [m].
     slip_rate_error : float
         [m/s].
+    least_pressure, largest_pressure : float or None
+        At the valve [Pa]; None where they are not followed: without stick, or a limit at rest.
     """
 
     slip_error: float
     slip_rate_error: float
+    least_pressure: float | None = None
+    largest_pressure: float | None = None
+
+    @property
+    def pressures(self) -> tuple[float, float] | None:
+        """Least and largest [Pa], if they are followed."""
+        least, largest = self.least_pressure, self.largest_pressure
+        return None if least is None or largest is None else (least, largest)
 
 
 def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> WorstFound:
@@ -53,21 +66,28 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     or as late as it may be, by no clock each interval as short or as long; pressures rise at once, as a pump of any
     rate may do, and means are of their middle alone.
     """
-    slip, rate = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
-    return WorstFound(slip_error=slip, slip_rate_error=rate)
+    slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
+    least, largest = pressures or (None, None)
+    return WorstFound(slip_error=slip, slip_rate_error=rate, least_pressure=least, largest_pressure=largest)
 
 
 def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
-    """Largest slip error [m] and slip-rate error [m/s]."""
+    """Largest slip error [m] and slip-rate error [m/s], and the least and largest pressure [Pa] if they are followed."""
     searches = [_Search(claim, sticks, 2 * _COURSES)]
     searches[0].follow(searches[0].random(), _SWEEPS)
     if sticks:
         searches.append(_Search(claim, sticks, _MANY))
-        searches[1].follow(searches[1].switching(), _FEW)
+        switched = searches[1].follow(searches[1].switching(), _FEW)
+        if searches[1].limit is None:
+            best = searches[1].best(min(_CLIMBING, 2 * len(searches[0].aim)))
+            searches.append(_Search(claim, sticks, len(best), numbers=best))
+            searches[2].ascend(switched[:, best])
     for periods in _SOON if claim.loop.start else ():
         searches.append(_Search(claim, sticks, 2 * _COURSES, periods))
         searches[-1].follow(searches[-1].random(), _SWEEPS)
-    return [max(search.largest[k] for search in searches) for k in (0, 1)]
+    pressures = [search.rest_limit.seen for search in searches if search.rest_limit is not None]
+    ends = [min(low for low, _ in pressures), max(high for _, high in pressures)] if pressures else []
+    return [max(search.largest[k] for search in searches) for k in (0, 1)] + ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +162,10 @@ def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, more: Fraction =
 
 @dataclass(slots=True)
 class _Limit:
-    """Limit at rest of the pressure that is asked for, as b·(p − p*) [m/s²], of every course."""
+    """Limit at rest of the pressure that is asked for, as b·(p − p*) [m/s²], of every course; b·p* is `rest`.
+
+    A course may be a part of the task, so that p* is at first that at its start or at either end of its range.
+    """
 
     place: int
     told: np.ndarray
@@ -151,9 +174,17 @@ class _Limit:
     rests: np.ndarray
     highest: np.ndarray
     last: np.ndarray
+    ends: tuple[float, float]
+    within: tuple[float, float]
+    faster: np.ndarray
+    rest: np.ndarray
+    authority: float
+    seen: list[float]
 
     @classmethod
-    def of(cls, claim: Guarantee, held: Held, size: int, back: np.ndarray) -> "_Limit | None":
+    def of(
+        cls, claim: Guarantee, held: Held, size: int, back: np.ndarray, numbers: np.ndarray
+    ) -> "_Limit | None":
         """That of a guarantee along references of some rates [m/s], in a loop; None where it has none."""
         limit, law, authority = claim.rest_limit, claim.held.law, float(claim.task.authority)
         if limit is None:
@@ -165,10 +196,18 @@ class _Limit:
         told[2:place] = [float(v) / authority for v in law.applied]
         rests = float(limit.resolution) - back * step  # of the slip error from sample to sample
         moved, none = float(claim.task.drift) * step, np.zeros(len(back))
-        return cls(place, told, float(limit.width) * authority, moved, rests, none, none)
+        ends: Any = tuple(float(p) * authority for p in claim.task.rest_pressure)
+        least, largest, fastest = limit.range or (Fraction(-(10**30)), Fraction(10**30), Fraction(0))
+        within = float(least) * authority, float(largest) * authority
+        faster = float(fastest) - back * step
+        rest = np.array((0.0, *ends))[numbers // 2 % 3]
+        return cls(
+            *(place, told, float(limit.width) * authority, moved, rests, none, none),
+            *(ends, within, faster, rest, authority, [0.0, 0.0]),
+        )
 
     def anew(self) -> "_Limit":
-        """At the start of a course."""
+        """At the start of a course, while this one stays as it is."""
         return replace(self, highest=np.zeros_like(self.highest), last=np.zeros_like(self.last))
 
     def cut(self, state: np.ndarray, sampled: np.ndarray) -> np.ndarray:
@@ -176,13 +215,20 @@ class _Limit:
         asked, highest = state[:, self.place], self.highest - self.moved
         stuck = state[:, 0] - self.last <= self.rests
         applied = np.where(stuck, np.maximum(asked, highest - self.width), asked)
+        inside = np.clip(applied, self.within[0] - self.rest, self.within[1] - self.rest)
+        applied = np.where(state[:, 0] - self.last <= self.faster, inside, applied)
+        if sampled.any():
+            pressures = (applied + self.rest)[sampled] / self.authority
+            self.seen[:] = [min(self.seen[0], float(pressures.min())), max(self.seen[1], float(pressures.max()))]
         self.highest = np.where(sampled, np.maximum(highest, applied), self.highest)
         self.last = np.where(sampled, state[:, 0], self.last)
         return np.asarray(state + np.outer((applied - asked) * sampled, self.told))
 
     def follow(self, before: np.ndarray, after: np.ndarray) -> None:
         """p* drifts, and with it what all pressures are less it."""
-        self.highest = self.highest + after[:, self.place] - before[:, self.place]
+        drifted = after[:, self.place] - before[:, self.place]
+        self.highest = self.highest + drifted
+        self.rest = np.clip(self.rest - drifted, *self.ends)
 
 
 def _of_asked(task: Task, held: Held) -> list[float]:
@@ -198,7 +244,13 @@ class _Search:
     """Many courses at once; `largest` holds |e1| and |e2|."""
 
     def __init__(
-        self, claim: Guarantee | ContinuousPeaks, sticks: bool, courses: int, periods: int | None = None
+        self,
+        claim: Guarantee | ContinuousPeaks,
+        sticks: bool,
+        courses: int,
+        periods: int | None = None,
+        *,
+        numbers: np.ndarray | None = None,
     ) -> None:
         task, loop = claim.task, claim.loop
         held, off, early = _on_time(claim.held) if isinstance(claim, Guarantee) else (None, Fraction(0), Fraction(0))
@@ -222,30 +274,64 @@ class _Search:
         self.punctual = bool(held and (held.law.first or any(held.start)))  # at first
         if periods is None:
             periods = _periods_to_forget(self.parts, len(loop.states))
-            courses = 2 * max(courses // 2 * PERIODS // periods, _LEAST_COURSES)
-        paces = np.where(np.arange(courses) // 2 % 2, 1, _SLOW)
+            courses = 2 * max(courses // 2 * PERIODS // periods, _LEAST_COURSES) if numbers is None else courses
+        numbers = np.arange(courses) if numbers is None else numbers  # of courses, whose kinds follow from them
+        paces = np.where(numbers // 2 % 2, 1, _SLOW)
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.rest_limit = None
         if self.back is not None and isinstance(claim, Guarantee):
-            self.rest_limit = _Limit.of(claim, held or claim.held, self.size, self.back)
+            self.rest_limit = _Limit.of(claim, held or claim.held, self.size, self.back, numbers)
         self.allowed = np.ones((courses, len(self.parts[0].steps)), dtype=bool)
         slow = isinstance(claim, Guarantee) and claim.slow_gain is not None
         if (slow or self.limit is not None) and beta[0] < beta[1]:  # β is slow; it stays at either end
             half = len(vertices) // 2
-            self.allowed[::2, :half] = self.allowed[1::2, half : len(vertices)] = False
+            self.allowed[numbers % 2 == 0, :half] = self.allowed[numbers % 2 == 1, half : len(vertices)] = False
         self.aim = np.zeros((courses, self.size))
-        self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
+        if sticks:  # behind its reference a fault that rests is not what it is ahead of it
+            self.aim[numbers % 3 == 0, 0], self.aim[numbers % 3 == 1, 1], self.aim[numbers % 3 == 2, 0] = 1, 1, -1
+        else:
+            self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
+        self.marks = np.empty((0, courses))
         self.steps = periods * len(self.parts) * _PIECES
         self.largest = (0.0, 0.0)
 
-    def follow(self, costates: np.ndarray, sweeps: int) -> None:
-        """Follow the maximum principle forward and backward."""
+    def follow(self, costates: np.ndarray, sweeps: int) -> np.ndarray:
+        """Follow the maximum principle forward and backward; the costates of the last sweep forward."""
         slopes = None
+        last = costates
         for left in reversed(range(sweeps)):
-            chosen, held, jumped = self._forward(costates, slopes)
+            chosen, held, jumped = self._forward(last := costates, slopes)
             costates = self._backward(chosen, held, jumped)
             if self.limit is not None and left <= sweeps // 2:  # before, by the sign of its costate
                 slopes = self._slopes(costates, chosen, self.limit)
+        return last
+
+    def best(self, count: int) -> np.ndarray:
+        """Numbers of the best courses of the last sweep, a third for each aim."""
+        reached = self.marks.max(axis=0)
+        kinds = [np.arange(kind, reached.size, 3) for kind in range(3)]
+        return np.concatenate([kind[np.argsort(-reached[kind])[: count // 3]] for kind in kinds])
+
+    def ascend(self, costates: np.ndarray) -> None:
+        """Climb: of each course the inputs of some pieces become those of its adjoint, and stay so where it goes on.
+
+        Where the fault sticks, the maximum principle for all pieces at once stalls. The adjoint is that of the largest
+        error, whenever it is reached.
+        """
+        random = np.random.default_rng(_SEED)
+        chosen, held, jumped = self._forward(costates, None)
+        top, kept = self.marks.max(axis=0), costates
+        for turn in range(_CLIMBS):
+            adjoint = self._backward(chosen, held, jumped, self.marks.argmax(axis=0))
+            blocks = random.random((-(-self.steps // (1 + turn % _BLOCK)), len(top))) < _CHANGED[turn % len(_CHANGED)]
+            changed = np.repeat(blocks, 1 + turn % _BLOCK, axis=0)[: self.steps]
+            tried = np.where((changed & adjoint.any(axis=2))[:, :, None], adjoint, kept)
+            now = self._forward(tried, None)
+            reached = self.marks.max(axis=0)
+            better = reached > top
+            kept = np.where(better[None, :, None], tried, kept)
+            top = np.maximum(top, reached)
+            chosen, held, jumped = now
 
     def _slopes(self, costates: np.ndarray, chosen: list[np.ndarray], limit: float) -> np.ndarray:
         """Of a disturbance of bounded rate, in every piece, over the largest: the best along the vertices chosen."""
@@ -275,6 +361,7 @@ class _Search:
         self, costates: np.ndarray, slopes: np.ndarray | None
     ) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
         state, chosen, held, jumped = self._started(costates[0]), [], [], []
+        marks = []
         limit = self.rest_limit and self.rest_limit.anew()
         self._seen(state)
         for number, costate in enumerate(costates):
@@ -302,6 +389,8 @@ class _Search:
                 limit.follow(state, following)
             state = following
             self._seen(state)
+            marks.append((state[:, : self.size] * self.aim).sum(axis=1))
+        self.marks = np.array(marks)
         return chosen, held, jumped
 
     def _soon(self, part: _Pieces, state: np.ndarray, costates: np.ndarray, number: int) -> np.ndarray:
@@ -354,9 +443,18 @@ class _Search:
             state[:, -1] = np.clip(state[:, -1], -self.limit, self.limit)
         return mask
 
-    def _backward(self, chosen: list[np.ndarray], held: list[np.ndarray], jumped: list[np.ndarray]) -> np.ndarray:
-        costate, found = self.aim.copy(), []
+    def _backward(
+        self,
+        chosen: list[np.ndarray],
+        held: list[np.ndarray],
+        jumped: list[np.ndarray],
+        when: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Costates of the aim at the end, or of every course after a piece."""
+        last = np.full(len(self.aim), len(chosen) - 1) if when is None else when
+        costate, found = np.zeros(self.aim.shape), []
         for number in reversed(range(len(chosen))):
+            costate = np.where((last == number)[:, None], self.aim, costate)
             part = self.parts[number // _PIECES % len(self.parts)]
             costate = np.where(held[number], 0, costate)
             found.append(costate)

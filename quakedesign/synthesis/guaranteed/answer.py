@@ -49,6 +49,9 @@ class Answer:
         For a design without a guarantee at its step: one near the longest step that has one.
     asked_step : Fraction or None
         T_s [s] that has no guarantee where `shorter` has one.
+    nearest : (str, Guarantee) or None
+        For a loop without a guarantee: another quantity of its setup and a design with the value nearest to it that
+        has one, all else as it is; `GAINS` for a design in place of given gains.
     compensation : Compensation or None
         Gains, scale and settings of a sliding mode that runs in the scheme ``compensated``.
     """
@@ -59,6 +62,7 @@ class Answer:
     worst_with_stick: WorstFound | None = None
     shorter: Guarantee | None = None
     asked_step: Fraction | None = None
+    nearest: tuple[str, Guarantee] | None = None
     compensation: Compensation | None = None
 
     @property
@@ -74,12 +78,19 @@ class Answer:
                 said = [f"not guaranteed at T_s = {float(self.asked_step):g} s: {self.found.reason}"]
             if self.shorter is not None:
                 said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
-            return [*said, "the command limits tells for which T_s, delays and wells designs of this fault have one"]
+            if self.nearest is not None:
+                said.append(f"{_with_nearest(*self.nearest)}: {self.nearest[1].sentence()}")
+            if len(said) == 1:
+                said.append("no T_s was found for which a design is proved with this box, disturbance and setup")
+            return said
         said = [f"proved: {self.found.sentence()}", *self._at_rest()]
         for name, seen in (("worst found", self.worst), ("worst found with stick", self.worst_with_stick)):
             if seen is not None:
+                ends = seen.pressures
+                pressure = "" if ends is None else f", pressure {ends[0] / 1e6:.4g} MPa to {ends[1] / 1e6:.4g} MPa"
                 said.append(
                     f"{name}: slip error {seen.slip_error:.3g} m, slip-rate error {seen.slip_rate_error:.3g} m/s"
+                    f"{pressure}"
                 )
         said += [*self._told(), *self.task_lines()]
         if self.leaves_with_stick:
@@ -169,6 +180,9 @@ class Answer:
         if not isinstance(self.found, Guarantee) or self.worst_with_stick is None:
             return False
         claims, seen = self.found.claims, self.worst_with_stick
+        (least, largest), ends = claims.pressures[-1], seen.pressures
+        if ends is not None and not least <= ends[0] <= ends[1] <= largest:
+            return True
         return seen.slip_error > claims.slip_error or seen.slip_rate_error > claims.slip_rate_error
 
     def to_dict(self) -> dict[str, Any]:
@@ -183,6 +197,7 @@ class Answer:
                 "reason": self.found.reason,
                 "small_gain": None if gain is None else gain.exact,
                 "shorter": shorter,
+                "nearest": self.nearest and _nearest(*self.nearest),
             }
         bounds, held = self.found.bounds(), self.found.held
         small = None if isinstance(bounds, NoGuarantee) else float_above(bounds.small_gain)
@@ -203,6 +218,37 @@ class Answer:
             "law": _law(held.law),
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
+
+
+GAINS = "gains"
+_QUANTITIES = {
+    "delay_jitter": ("jitter of the delay", "s"),
+    "jitter": ("jitter", "s"),
+    "averaging": ("averaging time", "s"),
+    "delay": ("delay", "s"),
+    "lag": ("lag", "s"),
+    "diffusion": ("diffusion time L^2/D", "s"),
+}
+
+
+def _with_nearest(name: str, found: Guarantee) -> str:
+    """For people."""
+    if name == GAINS:
+        return "with designed gains"
+    if name in _QUANTITIES:
+        title, unit = _QUANTITIES[name]
+        return f"with a {title} of at most {LowerBound(getattr(found.held, name)).quantity(unit)}"
+    pump = found.held.pump
+    if pump is None:
+        return "with a pump without limits"
+    return f"with a pump of at least {UpperBound(pump.rate or 0).quantity('Pa/s')}"
+
+
+def _nearest(name: str, found: Guarantee) -> dict[str, Any]:
+    """Plain values, SI; exact numbers as texts."""
+    pump = found.held.pump
+    value = getattr(found.held, name, None) if name in _QUANTITIES else pump and pump.rate
+    return {"quantity": name, "value": None if value is None else str(value), **found.claims.to_dict()}
 
 
 def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> Answer:
@@ -236,7 +282,7 @@ def _limit(limit: SmallestPeak | None) -> dict[str, str | None] | None:
 
 
 def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
-    names = ("width", "per_slip", "resolution")
+    names = ("width", "per_slip", "resolution", "least", "largest", "fastest")
     return None if limit is None else {name: exact_text(getattr(limit, name)) for name in names}
 
 

@@ -1,7 +1,7 @@
 """A sliding mode in the scheme ``compensated``: scale, weight and authority chosen by what can be guaranteed."""
 
 from bisect import bisect_left
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import product
@@ -64,7 +64,8 @@ class Compensation:
         limit, sampling = getattr(self.found, "rest_limit", None), self.controller.sampling
         if limit is None or sampling is None:
             return self.controller
-        more = ("rest_width", limit.width), ("rest_per_slip", limit.per_slip), ("rest_resolution", limit.resolution)
+        given = ((part.name, getattr(limit, part.name)) for part in fields(limit))
+        more = tuple((f"rest_{name}", value) for name, value in given if value is not None)
         return replace(self.controller, sampling=replace(sampling, settings=(*sampling.settings, *more)))
 
     def sentence(self) -> str:

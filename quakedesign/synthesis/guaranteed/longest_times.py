@@ -1,16 +1,19 @@
 """How long a sampling time and a delay may be for a designed loop to have a guarantee."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import sqrt
-from typing import Any, Unpack
+from typing import Any, Unpack, cast
 
 import numpy as np
 
 from quakedesign.cache import search_once
+from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, Task
+from quakedesign.certificates.guarantee.claims import above
 from quakedesign.certificates.guarantee.held import Around
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.synthesis.guaranteed.design import MOST_DELAY, Closest, closest, nearby
 from quakedesign.synthesis.guaranteed.families import MEASURED, measured_by
 from quakedesign.synthesis.guaranteed.slowly import best_guarantee
@@ -25,6 +28,13 @@ _BACK = Fraction(39, 40)  # of a time whose law is not proved after all
 _EDGE, _AIM = 0.92, 0.985  # small gain that is at the end of the reach, and that which a time is sought for
 _POWER = 1.3  # of a time with which the small gain was seen to grow
 _FAR = 2.0  # small gain from which a time is halved
+
+
+RATE = "rate_limit"
+LIMITING = (RATE, "delay_jitter", "jitter", "averaging", "delay", "lag", "diffusion")
+"""What of a setup may be too much for any design, what is easiest to change first."""
+_FEWER = 8  # attempts, each of which begins anew where its first law fails
+_ANY_RATE = Fraction(10**30)  # [Pa/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +121,56 @@ def farthest_rock(
     return found and found.guarantee
 
 
+def nearest_setup(
+    task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> tuple[str, Guarantee] | None:
+    """Where a loop has no guarantee: one quantity of its setup, and a guarantee with nearly the most of it that has one.
+
+    It is the first of `LIMITING` without which a design has a guarantee at T_s and with all else as it is; None without
+    one. Of a pump it is the rate, with nearly the lowest that will do.
+    """
+    pump, told = around.get("pump"), measured
+    for name in LIMITING:
+        rated = name == RATE
+        asked: Any = (pump.rate if pump else None) if rated else around.get(name)
+        if not asked:
+            continue
+
+        def search(value: Fraction, near: np.ndarray | None, name: str = name, rated: bool = rated) -> Any:
+            other: Any = {"pump": _ramped(pump, value), "ramp": value} if rated else {name: value}
+            return closest(task, step, near=near, measured=told, **(around | other))
+
+        most = step / 2 if rated else asked
+        found = _farthest(task, search, Fraction(0), most, unit=most / (32 if rated else 2), attempts=_FEWER)
+        if found is not None and rated:
+            return name, with_lowest_rate(found.guarantee)
+        if found is not None:
+            return name, found.guarantee
+    return None
+
+
+def _ramped(pump: Pump | None, ramp: Fraction) -> Pump | None:
+    """A pump that makes any change within a time [s], or at once."""
+    limited = replace(pump or Pump(), rate=_ANY_RATE if ramp else None)
+    return None if limited == Pump() else limited
+
+
+def with_lowest_rate(found: Guarantee) -> Guarantee:
+    """The same guarantee of the slowest pump that makes the largest change within the ramp."""
+    held, step = found.held, found.claims.largest_step
+    if held.pump is None or step is None or not held.ramp:
+        return found
+    slower = replace(found, held=replace(held, pump=replace(held.pump, rate=above(step / held.ramp))))
+    return slower if slower.check() is Verdict.PROVED else found
+
+
 def _farthest(
-    task: Task, search: Search, first: Fraction, most: Fraction | None, unit: Fraction = Fraction(0)
+    task: Task,
+    search: Search,
+    first: Fraction,
+    most: Fraction | None,
+    unit: Fraction = Fraction(0),
+    attempts: int = _ATTEMPTS,
 ) -> Longest | None:
     """A proof at nearly the longest time for which laws come near enough to a guarantee.
 
@@ -126,24 +184,32 @@ def _farthest(
         Longest time to try [s].
     unit : Fraction
         Time to try after 0 [s].
+    attempts : int
+        Number of times at most.
     """
     good: Closest | None = None
     time, at, bad, before = first, first, None, None
-    for _ in range(_ATTEMPTS):
+    for _ in range(attempts):
         found = search(time, None if good is None else good.numbers)
+        if attempts < _ATTEMPTS and good is not None and bad is None and not _within(found):
+            found = search(time, None)
         small = None if isinstance(found, NoGuarantee) else found.small_gain
-        if isinstance(found, Closest) and found.closeness < 1:
+        if isinstance(found, Closest) and _within(found):
             good, at = found, time
         else:
             if good is None and (not time or not _nearer(small, before)):
                 return None
             bad, before = (time, small), small
         if good is not None and (
-            at == most or good.closeness > _EDGE or (bad is not None and bad[0] - at <= _CLOSE * bad[0])
+            at == most or (good.closeness > _EDGE and not unit) or (bad is not None and bad[0] - at <= _CLOSE * bad[0])
         ):
             break
         time = _time_between(good, at, bad, most, unit)
     return None if good is None else _proved_near(task, search, good, at)
+
+
+def _within(found: Closest | NoGuarantee) -> bool:
+    return isinstance(found, Closest) and found.closeness < 1
 
 
 def _proved_near(task: Task, search: Search, good: Closest, time: Fraction) -> Longest | None:
@@ -168,7 +234,7 @@ def _time_between(
         time, small = bad
         return time / 2 if small is None or small > _FAR else Fraction(f"{0.9 * float(time) / max(small, 1.0):.3g}")
     if bad is None:
-        ahead = float(at) * min((_AIM / good.small_gain) ** (1 / _POWER), 2.0) if at else float(unit)
+        ahead = float(at) * (2.0 if unit else min((_AIM / good.small_gain) ** (1 / _POWER), 2.0)) if at else float(unit)
         time = Fraction(f"{ahead:.3g}")
         return time if most is None else min(time, most)
     width, share = float(bad[0] - at), 0.5

@@ -1,5 +1,6 @@
 """Linear state feedback with integral action: Riccati equations, quadratic V, guarantees of the loop that runs."""
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, ClassVar
 
@@ -32,8 +33,9 @@ from quakedesign.synthesis.guaranteed import (
     design_held,
     sampled_design,
 )
+from quakedesign.synthesis.guaranteed.answer import GAINS
 from quakedesign.synthesis.guaranteed.families import why_no_law
-from quakedesign.synthesis.guaranteed.longest_times import continued, design_at, longest_step
+from quakedesign.synthesis.guaranteed.longest_times import continued, design_at, longest_step, nearest_setup
 from quakedesign.synthesis.guaranteed.sliding_answer import answer_sliding
 from quakedesign.synthesis.linear.analysis.common_quadratic import finished_exactly, robust_stability, sector_loop
 from quakedesign.synthesis.linear.analysis.robust_stability import why_undecided
@@ -103,7 +105,13 @@ class StateFeedback(Method[ExtendedLQR]):
             if differs and (reason := why_no_law(step, wanted.measured, wanted.around)):
                 return Answer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
             summed = told_by_differences(summed, step) if differs else summed
-            return attacked(fault, best_guarantee(task, Held(law=summed, step=step, **wanted.around)))
+            given = best_guarantee(task, Held(law=summed, step=step, **wanted.around))
+            if isinstance(given, Guarantee):
+                return attacked(fault, given)
+            other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
+            if isinstance(other.found, Guarantee):
+                return Answer(fault=fault, found=given, nearest=(GAINS, other.found))
+            return replace(other, found=given)
         told: Any = {"measured": wanted.measured, **wanted.around}
         found = design_held(task, step, objective=wanted.objective, **told)
         if isinstance(found, Guarantee) or wanted.around.get("longest_step"):
@@ -111,7 +119,8 @@ class StateFeedback(Method[ExtendedLQR]):
         longest = longest_step(task, **told)
         if (again := continued(task, step, longest, **told)) is not None:
             return attacked(fault, again)
-        return Answer(fault=fault, found=found, shorter=longest and design_at(task, longest), asked_step=longest and step)
+        shorter, nearest = longest and design_at(task, longest), nearest_setup(task, step, **told)
+        return Answer(fault=fault, found=found, shorter=shorter, asked_step=longest and step, nearest=nearest)
 
 
 def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
