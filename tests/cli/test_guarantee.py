@@ -5,6 +5,7 @@ import subprocess
 import sys
 from fractions import Fraction as F
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -105,6 +106,7 @@ def test_gains_that_are_not_guaranteed_say_what_fails(call):
     code, out, _ = call("real-fault", "--gains", *GAINS, "--delay", "150 ms", "--json")
     found = json.loads(out)
     assert (code, found["verdict"], found["shorter"]) == (1, "undecided", None)
+    assert found["nearest"]["quantity"] == "gains"  # a design is proved with all else as it is
     assert found["reason"].startswith("small gain")
     assert F(found["small_gain"]) >= 1
     assert found["class"] == "amplitude"
@@ -118,11 +120,14 @@ def test_gains_that_do_not_hold_the_nominal_fault_either(call, tmp_path):
     assert f"{path} is not written" in out
 
 
-def test_nothing_is_designed_where_no_controller_whatever_can_hold_the_fault(call):
+def test_where_no_controller_whatever_can_hold_the_fault_the_nearest_rock_that_is_proved_is_named(call, monkeypatch):
+    near = SimpleNamespace(sentence=lambda: "held", held=SimpleNamespace(diffusion=F(7)))
+    monkeypatch.setattr("quakedesign.synthesis.guarantee.nearest_setup", lambda *_, **__: ("diffusion", near))
     code, out, _ = call("real-fault", "--diffusion", "180 s")
     assert code == 1
     assert out.startswith("none: no controller whatever that withdraws at most 50 MPa holds it through rock of L^2/D")
-    assert "the command limits" in out
+    assert "with a diffusion time L^2/D of at most 7 s: held" in out
+    assert "command limits" not in out
 
 
 @pytest.mark.parametrize(("name", "least", "most"), [("delay", F("17.6"), F("18.5")), ("diffusion", F(172), F(180))])

@@ -9,6 +9,7 @@ import pytest
 
 from quakedesign.certificates.guarantee import NoGuarantee
 from quakedesign.certificates.guarantee.files import parse_guarantee
+from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.cli import main
 from quakedesign.fault import fault_toml, load_fault
 from quakedesign.studies import impossible_and_proved
@@ -25,6 +26,8 @@ def _quick(monkeypatch):
         "quakedesign.studies.impossible_and_proved.design_held",
         lambda *_, **__: NoGuarantee(reason="none", small_gain=None),
     )
+    for name in ("longest_step", "longest_delay", "farthest_rock"):
+        monkeypatch.setattr(f"quakedesign.studies.impossible_and_proved.{name}", lambda *_, **__: None)
 
 
 def run(*arguments):
@@ -185,7 +188,27 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     assert "a spread needs friction with a state" in capsys.readouterr().err
     for others in (("--well", "40 m", "--diffusion", "9 s"), ("--well", "0 m")):
         assert run(*patch, *others) == 2
-    assert run("lab-fault", "--well", "1 m") == run("lab-fault", "--lag", "1 s") == 2
+    assert run(*patch, "--delay", "1 s") == 2
     errors = capsys.readouterr().err.splitlines()
     assert ["a well is told by" in errors[0], "must be positive" in errors[1]] == [True, True]
-    assert all("with rate-and-state friction alone" in line for line in errors[2:])
+    assert errors[2].endswith("limits of slow sliding know a lag and rock alone. Received delay. Leave them out.")
+
+
+def test_designs_are_proved_with_the_whole_setup(monkeypatch, capsys):
+    """A well of 2 m at 0.5 m²/s is L²/D = 8 s; a mean over 0.02 s comes 0.01 s later."""
+    told = {}
+    for name in ("design_held", "longest_step"):
+        none = NoGuarantee(reason="none", small_gain=None) if name == "design_held" else None
+        monkeypatch.setattr(
+            f"quakedesign.studies.impossible_and_proved.{name}",
+            lambda *_, n=name, a=none, **around: told.__setitem__(n, around) or a,
+        )
+    setup = ("--delay", "20 ms", "--lag", "0.3 s", "--well", "2 m", "--diffusivity", "0.5", "--jitter", "1 ms")
+    noise = ("--measured", "slip", "--slip-noise", "5 um", "--averaging-time", "20 ms", "--rate-limit", "2 MPa/s")
+    assert run("real-fault", *setup, *noise, "--json") == 0
+    around = {name: Fraction(value) for name, value in (("delay", "0.03"), ("lag", "0.3"), ("diffusion", "8"))}
+    around |= {"jitter": Fraction(1, 1000), "averaging": Fraction(1, 50), "pump": Pump(rate=Fraction(2 * 10**6))}
+    around |= {"measured": "slip", "slip_noise": Fraction(5, 10**6), "rate_noise": 0}
+    assert told == {"design_held": around | {"objective": "peak"}, "longest_step": around}
+    assert run("lab-fault", "--jitter", "-1 s") == run("lab-fault", "--well", "0 m") == 2
+    assert capsys.readouterr().err.count("\n") == 2

@@ -17,7 +17,7 @@ from quakedesign.rationals import rational
 from quakedesign.report.impossibility_table import limits_figure, limits_lines
 from quakedesign.studies import limits as study
 from quakedesign.studies.facts import beyond_control
-from quakedesign.synthesis.guaranteed import reached
+from quakedesign.synthesis.guaranteed.longest_times import Longest
 
 REAL = qd.load_fault("real-fault")
 LAW = summed_integrals((F(1), F(1), F(1), F(1)), F(1))
@@ -51,14 +51,23 @@ def designs(monkeypatch):
             return NoGuarantee(reason="too long", small_gain=None)
         return Guarantee(task=task, held=Held(law=LAW, step=step, delay=delay), claims=CLAIMS)
 
-    monkeypatch.setattr("quakedesign.studies.impossible_and_proved.design_held", designed)
+    def claimed(task, step, **around):
+        return Guarantee(task=task, held=Held(law=LAW, step=step, **around), claims=CLAIMS)
 
-    def late(task, step, **told):
+    def longest_step(task, **told):
         tellings.append(told)
-        found = reached(lambda delay: designed(task, step, objective="peak", delay=delay), step / 2, most=7 * step)
-        return found[-1] if found else None
+        return Longest(claimed(task, longest["step"]), None) if longest["step"] else None
 
-    monkeypatch.setattr("quakedesign.studies.impossible_and_proved.longest_delay", late)
+    found = {
+        "design_held": designed,
+        "longest_step": longest_step,
+        "design_at": lambda task, one: one.guarantee,
+        "continued": lambda *_, **__: None,
+        "longest_delay": lambda task, step, **_: claimed(task, step, delay=longest["delay"]),
+        "farthest_rock": lambda task, step, **_: claimed(task, step, diffusion=F(5)),
+    }
+    for name, search in found.items():
+        monkeypatch.setattr(f"quakedesign.studies.impossible_and_proved.{name}", search)
     return asked, longest, tellings
 
 
@@ -68,7 +77,6 @@ def test_both_sides_of_the_real_fault(designs):
     assert found.largest_step.impossible_beyond == longest_reaction(task_of(REAL), F(2 * 10**7))
     assert found.largest_delay.impossible_beyond == found.largest_step.impossible_beyond - F(184, 1000)
     assert found.farthest_well.to_dict()["impossible_beyond"] == "11.7421"
-    assert found.farthest_well.proved_up_to is None
     assert found.peak_slip_rate_error.proved_up_to == CLAIMS.slip_rate_error
     assert found.smallest_pressure.proved_up_to == 10**7
     for limit in found.named().values():
@@ -91,23 +99,29 @@ def test_between_both_sides_it_says_that_neither_is_known(designs, step, said):
     assert (f"T_s = {step:g} s of this fault: neither proved of a design nor impossible" in lines) is said
 
 
-def test_the_search_doubles_and_then_bisects(designs):
-    asked, *_ = designs
+def test_what_is_proved_of_t_s_delay_and_rock_is_what_the_searches_of_designs_find(designs):
     found = study(REAL)
-    steps = [step for step, delay in asked if not delay]
-    assert steps == [F(n, 1000) for n in (184, 368, 736, 1472, 1100, 918)]
-    assert found.largest_step.proved_up_to == F(736, 1000)
-    assert found.largest_delay.proved_up_to == F(92, 1000)
-    assert [g.held.step for g in found.proved] == [F(184, 1000) * times for times in (1, 2, 4)]
+    assert found.largest_step.proved_up_to == F(4, 5)
+    assert found.largest_delay.proved_up_to == F(95, 1000)
+    assert found.largest_diffusion_time.proved_up_to == 5
+    assert [g.held.step for g in found.proved] == [rational(REAL.sampling_time), F(4, 5)]
+
+
+@pytest.mark.parametrize(("diffusivity", "well"), [(1.0, 5**0.5), (0.02, 0.1**0.5)])
+def test_the_farthest_well_that_is_proved_is_not_beyond_its_rock(designs, diffusivity, well):
+    proved = study(REAL, diffusivity=diffusivity).farthest_well.proved_up_to
+    assert isinstance(proved, LowerBound)
+    assert proved**2 <= 5 * rational(diffusivity)
+    assert float(proved) == pytest.approx(well, rel=1e-12)
 
 
 def test_a_fault_that_is_sampled_too_slowly_gets_a_shorter_step(designs):
-    asked, longest, _ = designs
+    longest = designs[1]
     longest["step"] = F(3, 100)
     found = study(REAL)
-    assert [step for step, _ in asked] == [F(n, 10000) for n in (1840, 920, 460, 230, 345, 288)]
-    assert found.largest_step.proved_up_to == F(288, 10000)
+    assert found.largest_step.proved_up_to == F(3, 100)
     assert found.largest_delay.proved_up_to is None
+    assert found.largest_diffusion_time.proved_up_to is None
     assert found.peak_slip_rate_error.proved_up_to is None
 
 
@@ -199,7 +213,7 @@ def test_the_figure_shows_the_earthquake_and_what_is_proved(designs):
     labels = axis.get_legend_handles_labels()[1]
     assert "natural earthquake (slip rate)" in labels
     (points,) = [line for line in axis.lines if line.get_label().startswith("proved")]
-    assert list(points.get_xdata()) == pytest.approx([0.184, 0.368, 0.736])
+    assert list(points.get_xdata()) == pytest.approx([0.184, 0.8])
     assert axis.get_ylim()[1] > 0.1
 
 

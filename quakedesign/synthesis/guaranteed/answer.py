@@ -237,6 +237,8 @@ def _with_nearest(name: str, found: Guarantee) -> str:
         return "with designed gains"
     if name in _QUANTITIES:
         title, unit = _QUANTITIES[name]
+        if not getattr(found.held, name):
+            return f"without any {title}"
         return f"with a {title} of at most {LowerBound(getattr(found.held, name)).quantity(unit)}"
     pump = found.held.pump
     if pump is None:

@@ -141,7 +141,12 @@ def nearest_setup(
             return closest(task, step, near=near, measured=told, **(around | other))
 
         most = step / 2 if rated else asked
-        found = _farthest(task, search, Fraction(0), most, unit=most / (32 if rated else 2), attempts=_FEWER)
+        first, unit = Fraction(0), min(asked, step) / 2
+        if rated or "jitter" in name:
+            unit = min(most, step) / 16
+        elif name == "diffusion":
+            first, unit = min(max(_first_step(task), step), asked), Fraction(0)
+        found = _farthest(task, search, first, most, unit=unit, attempts=_FEWER)
         if found is not None and rated:
             return name, with_lowest_rate(found.guarantee)
         if found is not None:

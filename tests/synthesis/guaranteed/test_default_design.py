@@ -55,8 +55,8 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     assert found.rest_limit is not None
     assert found.claims.slip_rate_error < F(3, 10**4)
     assert all(p.holds for p in design.premises)
-    assert premises(design)["sampling_time"].certified >= F("0.6")
-    assert premises(design)["delay"].certified >= F("0.4")
+    assert premises(design)["sampling_time"].certified >= F("0.88")  # 0.98 s is the longest that long searches proved
+    assert premises(design)["delay"].certified >= F("0.5")
 
 
 def test_a_law_has_one_bound_however_it_is_asked_for(monkeypatch):

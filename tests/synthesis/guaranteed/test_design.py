@@ -19,7 +19,7 @@ from quakedesign.fault import load_fault
 from quakedesign.synthesis import Design, answer
 from quakedesign.synthesis.guaranteed import Answer, design_held, worst_found
 from quakedesign.synthesis.guaranteed.adversary import WorstFound
-from quakedesign.synthesis.guaranteed.design import _with_noise, first_held
+from quakedesign.synthesis.guaranteed.design import _with_noise, closest
 from quakedesign.synthesis.methods import state_feedback
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
@@ -192,7 +192,7 @@ def test_a_step_far_too_long_has_no_guarantee_and_says_why():
 
 
 def test_a_step_beyond_all_sizes_is_refused():
-    for search in (first_held, design_held):
+    for search in (closest, design_held):
         with pytest.raises(ParameterError, match=r"step must be of a size between 1e-40 and 1e\+40 in SI units\."):
             search(task_of(load_fault("real-fault")), F(10) ** 400)
 
@@ -200,7 +200,7 @@ def test_a_step_beyond_all_sizes_is_refused():
 def test_a_step_in_which_errors_outgrow_all_numbers_has_none_either():
     """The pole (√(w² + 4s) − w)/2 with s = 0.4493 1/s² and w = 1.6 1/s is 0.2437 1/s, for an hour: e^877."""
     task = task_of(load_fault("real-fault"))
-    for found in (design_held(task, F(3600)), first_held(task, F(3600))[0]):
+    for found in (design_held(task, F(3600)), closest(task, F(3600))):
         assert isinstance(found, NoGuarantee)
         assert found.reason == "errors grow by e^877 within T_s = 3600 s"
 

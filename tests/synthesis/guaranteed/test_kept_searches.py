@@ -25,23 +25,26 @@ def test_what_a_search_proposes_is_decided_each_time(task, monkeypatch):
         return [-1.0, question[-2]]
 
     monkeypatch.setattr(design, "search_once", told)
-    found, _ = design.first_held(task, STEP)
+    found = longest_times.longest_step(task).guarantee
     assert isinstance(found, Guarantee)
     assert found.check() is Verdict.PROVED
     monkeypatch.setattr(design, "search_once", lambda _search, *question: [-1.0, [-3.0 for _ in question[-2]]])
-    found, _ = design.first_held(task, STEP)
+    assert longest_times.longest_step(task) is None
+    found = design.design_held(task, STEP)
     assert isinstance(found, NoGuarantee) or found.check() is Verdict.PROVED
 
 
 def test_a_design_is_searched_once(task, tmp_path, monkeypatch):
     monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
-    first = design.first_held(task, STEP)[0]
+    first = design.design_held(task, STEP)
+    near = design.closest(task, STEP)
     monkeypatch.setattr(design, "_search", None)
-    again = design.first_held(task, STEP)[0]
+    again = design.design_held(task, STEP)
+    assert design.closest(task, STEP).held == near.held
     assert (again, again.rest_limit) == (first, first.rest_limit)
     assert again.held.law.applied == first.held.law.applied != ()
     with pytest.raises(TypeError):
-        design.first_held(task, STEP / 2)
+        design.closest(task, STEP / 2)
     worst = adversary.worst_found(first)
     monkeypatch.setattr(adversary, "_searched", None)
     assert adversary.worst_found(first) == worst
