@@ -10,7 +10,6 @@ from quakedesign.cli.shared import app
 from quakedesign.output import hold
 from quakedesign.rationals import rational
 
-
 _ALONE = Surroundings()
 
 

@@ -35,6 +35,7 @@ def cut_off(
     width: sp.Expr,
     per_slip: sp.Expr,
     resolution: sp.Expr,
+    *,
     within: tuple[sp.Expr, ...] | None = None,
 ) -> tuple[sp.Expr, ...]:
     """The pressure [Pa] that is applied at a sample in place of what is asked for, and `RestLimit.STATES` after it.

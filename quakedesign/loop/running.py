@@ -102,7 +102,7 @@ class SampledController(Controller):
         limit, reference = self.rest_limit, signals.slip - signals.slip_error
         numbers = (to_sympy(v) for v in (limit.width, limit.per_slip, limit.resolution))
         within = None if limit.range is None else tuple(to_sympy(v) for v in limit.range)
-        applied, *after = cut_off(asked, states, signals.slip, reference, *numbers, within)
+        applied, *after = cut_off(asked, states, signals.slip, reference, *numbers, within=within)
         return applied, (applied - asked) / to_sympy(self.step), tuple(after)
 
     def _read(self, signals: Signals) -> tuple[Any, ...]:

@@ -30,7 +30,7 @@ from quakedesign.simulation import Variation, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
 from quakedesign.synthesis import answer
-from quakedesign.synthesis.guaranteed.adversary import _Limit, _searched
+from quakedesign.synthesis.guaranteed.adversary import _Limit, _searched, worst_found
 
 REAL, STEP, GAIN = load_fault("real-fault"), F("0.184"), F("2.282e-8")
 GAINS = F(672300000), F(206000000)
@@ -185,6 +185,76 @@ def test_a_guarantee_has_limits_of_what_it_proves(proved):
     assert float(limit.resolution) == pytest.approx(way / 100, rel=1e-3)
     noisy = replace(claim, held=replace(claim.held, slip_noise=F(1, 10**6)))
     assert float(noisy.rest_limit.resolution) == pytest.approx(2e-6 + way / 100, rel=1e-3)
+
+
+def test_pressures_that_are_proved_never_to_be_passed_are_cut_off_unless_the_fault_goes_faster():
+    """p = −e1 Pa, within −3 and 2 Pa for slips of at most 5 m a sample, at rest or not."""
+    law = summed_integrals((F(1), F(0), F(0), F(0)), F(1))
+    limit = RestLimit(width=F(100), per_slip=F(0), resolution=F(0), least=F(-3), largest=F(2), fastest=F(5))
+    controller = SampledController(law=law, step=F(1), rest_limit=limit)
+    for error, last, applied in ((4.0, 4.0, -3.0), (4.0, 0.0, -3.0), (-4.0, 0.0, 2.0), (1.0, 0.0, -1.0), (9.0, 0.0, -9.0)):
+        pressure, after = stepped(controller, [0.0, 0.0, 0.0, last], error, 0.0, 0.0)
+        assert pressure == applied
+        assert after[2] == max(0.0, applied)  # the highest so far is that which was applied
+    with pytest.raises(ParameterError, match="both or none"):
+        replace(limit, largest=None)
+    with pytest.raises(ParameterError, match="must have 0 between them"):
+        replace(limit, largest=F(-1))
+    with pytest.raises(ParameterError, match="no other number below 0"):
+        replace(limit, fastest=F(-1))
+
+
+def test_a_guarantee_cuts_off_what_it_proves_never_to_be_passed(proved):
+    claims, limit, way = proved.claims, proved.rest_limit, proved.claims.peak_slip_rate * STEP
+    assert (limit.least, limit.largest) == (claims.least_pressure, claims.largest_pressure)
+    assert way <= limit.fastest <= way * F(1001, 1000)
+    off = replace(proved, held=replace(proved.held, slip_noise=F(1), jitter=F(1, 100)))
+    moved = 2 + proved.claims.peak_slip_rate * (STEP + F(2, 100))
+    assert moved <= off.rest_limit.fastest <= moved * F(1001, 1000)
+    late = replace(claims, least_asked=LowerBound(-(10**8)), largest_asked=UpperBound(10**8))
+    behind = replace(proved, claims=late, held=replace(proved.held, lag=F(1))).rest_limit
+    assert (behind.least, behind.largest) == (-(10**8), 10**8)  # of the valve, where the law acts
+
+
+def test_where_the_fault_sticks_no_course_takes_the_pressure_beyond_what_is_certified(proved):
+    """The limit at rest alone allows twice the proved |p − p*|: before, courses left the interval."""
+    seen, claims = worst_found(proved, sticks=True), proved.claims
+    assert claims.least_pressure <= seen.least_pressure < 0.97 * claims.least_pressure
+    assert 0.97 * claims.largest_pressure < seen.largest_pressure <= claims.largest_pressure
+    assert worst_found(proved).pressures is None
+
+
+def test_an_independent_adversary_does_not_leave_the_certified_pressure(proved):
+    """Pushes at random ends from the end of the task on, where p* is lowest, on the stick-slip plant in plain Euler."""
+    law, limit, authority = proved.held.law, proved.rest_limit, float(proved.task.authority)
+    rows, seen, output, fed = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output, law.feedback))
+    told = np.array(law.applied, dtype=float)
+    random, low, high = np.random.default_rng(11), *(float(p) for p in proved.task.rest_pressure)
+    ends = [float(v) for v in proved.task.slip_chord], [float(v) for v in proved.task.rate_chord]
+    beta, pieces, count = [float(b) for b in proved.task.beta], 20, 400
+    for rest in (low, high):
+        e1, e2, z = np.zeros(count), np.zeros(count), np.zeros((count, 2))
+        highest, last, cuts = np.full(count, rest), np.zeros(count), 0
+        push = random.choice([-1.0, 1.0], count) * float(proved.task.amplitude)
+        gain = random.choice(beta, count)
+        for _ in range(150):
+            asked = rest + z @ output + np.outer(e1, fed[:1])[:, 0] + fed[1] * e2
+            still = e1 <= last + float(limit.resolution)
+            applied = np.where(still, np.maximum(asked, highest - float(limit.width)), asked)
+            inside = np.clip(applied, float(limit.least), float(limit.largest))
+            applied = np.where(e1 <= last + float(limit.fastest), inside, applied)
+            assert float(proved.claims.least_pressure) <= applied.min()
+            assert applied.max() <= float(proved.claims.largest_pressure)
+            cuts += int((inside != asked).sum())
+            z = z @ rows.T + np.outer(e1, seen[:, 0]) + np.outer(e2, seen[:, 1]) + np.outer(applied - asked, told)
+            highest, last = np.maximum(highest, applied), e1.copy()
+            push = np.where(random.random(count) < 0.15, -push, push)
+            for _ in range(pieces):
+                slope, damping = random.choice(ends[0], count), random.choice(ends[1], count)
+                force = slope * e1 - damping * e2 + gain * authority * (applied - rest) + push
+                e2 = np.maximum(e2 + 0.184 / pieces * force, 0.0)  # a fault that rests does not slide backward
+                e1 = e1 + 0.184 / pieces * e2
+        assert cuts > 0
 
 
 def test_the_adversary_s_limit_is_that_of_the_run(proved):

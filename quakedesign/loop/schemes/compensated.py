@@ -21,7 +21,7 @@ from quakedesign.loop.steps.inclusion import end_rate
 from quakedesign.loop.steps.sampled import Sampled
 
 _LIMIT = sp.symbols("asked slip reference width per_slip resolution least largest fastest highest last", real=True)
-_CUT = cut_off(_LIMIT[0], _LIMIT[9:], *_LIMIT[1:6], _LIMIT[6:9])
+_CUT = cut_off(_LIMIT[0], _LIMIT[9:], *_LIMIT[1:6], within=_LIMIT[6:9])
 _NUMBERS = ("rest_width", "rest_per_slip", "rest_resolution", "rest_least", "rest_largest", "rest_fastest")
 _WIDEST = 1e30  # Pa, of no limit
 
@@ -73,8 +73,8 @@ class Compensated(Sampled):
         if not 0 < self.weight <= 1:
             raise ParameterError(f"weight must be above 0 and at most 1. Received {self.weight!r}.")
         if self.rest_width is not None:
-            given = ((name.removeprefix("rest_"), getattr(self, name)) for name in _NUMBERS)
-            RestLimit(**{name: value if value is None else Fraction(value) for name, value in given})
+            given = {name.removeprefix("rest_"): getattr(self, name) for name in _NUMBERS}
+            RestLimit(**{name: Fraction(value) for name, value in given.items() if value is not None})
 
     @staticmethod
     def derive(law: Law) -> tuple[sp.Expr, ...]:
@@ -119,4 +119,5 @@ class Compensated(Sampled):
         passing = dict(zip(_LIMIT, (asked, known[discrete_law.slip], reference, *limit), strict=True))
         pressure, *passed = discrete_law.values(_CUT, passing)
         after = [ca.SX(0) if slope == 0 else -estimate / share for _ in law.integrals]
-        return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight, *limit[: len(_NUMBERS)], *passed])
+        numbers = limit[: len(_NUMBERS)]
+        return Decision(pressure, after, [ca.SX(1), rate_error, ahead, estimate, weight, *numbers, *passed])

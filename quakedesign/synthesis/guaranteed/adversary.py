@@ -72,7 +72,7 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
 
 
 def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
-    """Largest slip error [m] and slip-rate error [m/s], and the least and largest pressure [Pa] if they are followed."""
+    """Largest slip error [m] and slip-rate error [m/s]; the least and largest pressure [Pa] if they are followed."""
     searches = [_Search(claim, sticks, 2 * _COURSES)]
     searches[0].follow(searches[0].random(), _SWEEPS)
     if sticks:
@@ -183,7 +183,7 @@ class _Limit:
 
     @classmethod
     def of(
-        cls, claim: Guarantee, held: Held, size: int, back: np.ndarray, numbers: np.ndarray
+        cls, claim: Guarantee, held: Held, size: int, back: np.ndarray, numbers: np.ndarray | None = None
     ) -> "_Limit | None":
         """That of a guarantee along references of some rates [m/s], in a loop; None where it has none."""
         limit, law, authority = claim.rest_limit, claim.held.law, float(claim.task.authority)
@@ -200,7 +200,7 @@ class _Limit:
         least, largest, fastest = limit.range or (Fraction(-(10**30)), Fraction(10**30), Fraction(0))
         within = float(least) * authority, float(largest) * authority
         faster = float(fastest) - back * step
-        rest = np.array((0.0, *ends))[numbers // 2 % 3]
+        rest = np.array((0.0, *ends))[(np.arange(len(back)) if numbers is None else numbers) // 2 % 3]
         return cls(
             *(place, told, float(limit.width) * authority, moved, rests, none, none),
             *(ends, within, faster, rest, authority, [0.0, 0.0]),

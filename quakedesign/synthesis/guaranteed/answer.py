@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quakedesign.bounds import UpperBound
+from quakedesign.bounds import LowerBound, UpperBound
 from quakedesign.certificates.claim import Verdict
 from quakedesign.certificates.guarantee import Guarantee, NoGuarantee, guarantee
 from quakedesign.certificates.impossibility import SmallestPeak, smallest_peak

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import sqrt
-from typing import Any, Unpack, cast
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -60,8 +60,9 @@ def longest_step(task: Task, *, measured: str = MEASURED[0], **around: Unpack[Ar
     def search(step: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
         return closest(task, step, near=near, measured=measured, **around)
 
-    late = sum((around.get(name) or Fraction(0) for name in ("delay", "lag", "diffusion")), Fraction(0))  # type: ignore[misc]
-    return _farthest(task, search, _first_step(task, float(late)), None)
+    path: dict[str, Any] = {**around}
+    late = sum(float(path.get(name) or 0) for name in ("delay", "lag", "diffusion"))
+    return _farthest(task, search, _first_step(task, late), None)
 
 
 def reached_step(task: Task, attempt: Attempt, most: Fraction | None = None) -> Guarantee | None:
@@ -106,7 +107,7 @@ def longest_delay(
         return closest(task, step, near=near, measured=measured, **(around | {"delay": delay}))
 
     found = _farthest(task, search, Fraction(0), MOST_DELAY * step, unit=step / 2)
-    return found and found.guarantee
+    return None if found is None else found.guarantee
 
 
 def farthest_rock(
@@ -118,13 +119,13 @@ def farthest_rock(
         return closest(task, step, near=near, measured=measured, **(around | {"diffusion": time}))
 
     found = _farthest(task, search, max(_first_step(task), step), None)
-    return found and found.guarantee
+    return None if found is None else found.guarantee
 
 
 def nearest_setup(
     task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
 ) -> tuple[str, Guarantee] | None:
-    """Where a loop has no guarantee: one quantity of its setup, and a guarantee with nearly the most of it that has one.
+    """Of a loop without a guarantee: a quantity of its setup, and a guarantee with nearly the most of it that has one.
 
     It is the first of `LIMITING` without which a design has a guarantee at T_s and with all else as it is; None without
     one. Of a pump it is the rate, with nearly the lowest that will do.

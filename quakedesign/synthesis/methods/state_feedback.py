@@ -119,8 +119,9 @@ class StateFeedback(Method[ExtendedLQR]):
         longest = longest_step(task, **told)
         if (again := continued(task, step, longest, **told)) is not None:
             return attacked(fault, again)
-        shorter, nearest = longest and design_at(task, longest), nearest_setup(task, step, **told)
-        return Answer(fault=fault, found=found, shorter=shorter, asked_step=longest and step, nearest=nearest)
+        shorter, asked = (None, None) if longest is None else (design_at(task, longest), step)
+        nearest = nearest_setup(task, step, **told)
+        return Answer(fault=fault, found=found, shorter=shorter, asked_step=asked, nearest=nearest)
 
 
 def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
