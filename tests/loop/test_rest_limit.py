@@ -192,7 +192,8 @@ def test_pressures_that_are_proved_never_to_be_passed_are_cut_off_unless_the_fau
     law = summed_integrals((F(1), F(0), F(0), F(0)), F(1))
     limit = RestLimit(width=F(100), per_slip=F(0), resolution=F(0), least=F(-3), largest=F(2), fastest=F(5))
     controller = SampledController(law=law, step=F(1), rest_limit=limit)
-    for error, last, applied in ((4.0, 4.0, -3.0), (4.0, 0.0, -3.0), (-4.0, 0.0, 2.0), (1.0, 0.0, -1.0), (9.0, 0.0, -9.0)):
+    cases = (4.0, 4.0, -3.0), (4.0, 0.0, -3.0), (-4.0, 0.0, 2.0), (1.0, 0.0, -1.0), (9.0, 0.0, -9.0)
+    for error, last, applied in cases:
         pressure, after = stepped(controller, [0.0, 0.0, 0.0, last], error, 0.0, 0.0)
         assert pressure == applied
         assert after[2] == max(0.0, applied)  # the highest so far is that which was applied
@@ -314,7 +315,7 @@ def test_what_the_adversary_cuts_off_moves_all_that_stands_at_the_valve(proved):
 
 
 def test_where_p_star_drifts_all_pressures_that_count_from_it_move(proved):
-    limit = _Limit.of(proved, proved.held, 6, np.array([0.0])).anew()
+    limit = replace(_Limit.of(proved, proved.held, 6, np.array([0.0])).anew(), within=(-9.0, 9.0))
     limit.cut(np.array([[0.0, 0.0, 0.0, 0.0, 3.0, 0.0]]), np.array([True]))
     limit.follow(np.zeros((1, 6)), np.array([[0.0, 0.0, 0.0, 0.0, -2.0, 0.0]]))
     assert limit.highest == pytest.approx([1.0])

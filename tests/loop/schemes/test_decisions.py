@@ -54,12 +54,13 @@ def test_the_compensated_scheme_derives_the_pull_with_integral_states_at_zero(pr
 
 
 OWN = [1.0, 2.0, 0.25, 0.125, 0.3]  # a sample was taken; e2 then, feed-forward then, d, weight
-LIMIT = [1e6, 0.5, 0.125, 22.0, 9.0]  # width, per slip, resolution; largest p + r/2 so far, last slip; now r = 9 − 1
+LIMIT = [1e6, 0.5, 0.125, -1e6, 1e6, 0.5, 22.0, 9.0]  # width, per slip, resolution; least, largest and fastest
+# of the pressure; largest p + r/2 so far, last slip; now r = 9 − 1
 
 
 def decided(law, own=OWN, limit=LIMIT):
     decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in (*own, *limit)])
-    assert numbers(decision.own[5:8]) == limit[:3]
+    assert numbers(decision.own[5:11]) == limit[:6]
     return numbers([decision.pressure]), numbers(decision.integrals), numbers(decision.own[:5])
 
 
@@ -80,15 +81,19 @@ def test_the_compensated_scheme_follows_the_disturbance_and_answers_it():
     [
         (5, LIMIT, 5, 22),
         (5, [3.0, *LIMIT[1:]], 15, 22),  # no less than 22 − 4 − 3
-        (5, [3.0, *LIMIT[1:4], 8.9], 15, 22),
-        (5, [3.0, *LIMIT[1:4], 8.5], 5, 22),  # the fault moved by more than the resolution
+        (5, [3.0, *LIMIT[1:7], 8.9], 15, 22),
+        (5, [3.0, *LIMIT[1:7], 8.7], 5, 22),  # the fault moved by more than the resolution
         (50, LIMIT, 50, 54),
+        (50, [*LIMIT[:4], 40.0, *LIMIT[5:]], 40, 44),  # no more than is proved
+        (-50, [*LIMIT[:3], -40.0, *LIMIT[4:]], -40, 22),
+        (5, [3.0, *LIMIT[1:4], 11.0, *LIMIT[5:]], 11, 22),  # which counts more than the limit at rest
+        (50, [*LIMIT[:4], 40.0, 0.5, 22.0, 8.4], 50, 54),  # the fault moved faster than is proved
     ],
 )
 def test_at_rest_the_pressure_has_a_limit(asked, limit, applied, highest):
     law = Law.of(None, float(asked))
     decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in (*OWN, *limit)])
-    assert numbers([decision.pressure, *decision.own[8:]]) == [applied, highest, 9]
+    assert numbers([decision.pressure, *decision.own[11:]]) == [applied, highest, 9]
 
 
 def test_a_feed_forward_is_added_and_known_not_to_be_a_disturbance():
@@ -105,10 +110,14 @@ def test_a_constant_pressure_is_no_law_to_compensate():
 def test_the_compensated_scheme_starts_without_a_sample_and_in_the_middle_of_the_box():
     scheme, fault = simulation_scheme("compensated", weight=0.25), load_fault("real-fault")
     assert scheme.starts[:5] == (0, 0, 0, 0, 0.25)
-    assert scheme.starts[6:] == (0, 0, 0, 0)
-    assert scheme.own_size == len(scheme.starts) == 10
+    assert scheme.starts[6:] == (0, 0, -1e30, 1e30, 0, 0, 0)
+    assert scheme.own_size == len(scheme.starts) == 13
     limited = simulation_scheme("compensated", rest_width=7.0, rest_per_slip=3.0, rest_resolution=2.0)
-    assert limited.starts[5:] == (7, 3, 2, 0, 0)
+    assert limited.starts[5:] == (7, 3, 2, -1e30, 1e30, 0, 0, 0)
+    within = simulation_scheme("compensated", rest_width=7.0, rest_least=-4.0, rest_largest=5.0, rest_fastest=6.0)
+    assert within.starts[5:] == (7, 0, 0, -4, 5, 6, 0, 0)
+    assert within.settings.items() >= {"rest_least": -4, "rest_largest": 5, "rest_fastest": 6}.items()
+    assert "rest_least" not in limited.settings
     assert [limited.settings[f"rest_{name}"] for name in ("width", "per_slip", "resolution")] == [7, 3, 2]
     assert "rest_width" not in scheme.settings
     assert scheme.settings["weight"] == 0.25

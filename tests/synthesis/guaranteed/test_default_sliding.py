@@ -1,7 +1,7 @@
 """The default 2-CTA and 2-DIA: laws of samples that run exactly as they are guaranteed, everywhere."""
 
 import pickle
-from dataclasses import replace
+from dataclasses import fields, replace
 from fractions import Fraction as F
 from functools import cache
 from importlib import import_module
@@ -82,7 +82,7 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     assert design.controller.sampling.step == found.held.step == STEP
     assert design.compensation.found is found
     settings = dict(design.controller.sampling.settings)
-    limit = {f"rest_{name}": getattr(found.rest_limit, name) for name in ("width", "per_slip", "resolution")}
+    limit = {f"rest_{part.name}": getattr(found.rest_limit, part.name) for part in fields(found.rest_limit)}
     assert settings == {name: design.gains[name] for name in ("weight", "authority")} | limit
     premises = {p.name: p for p in design.premises}
     assert [p.name for p in design.conditions] == ["sampling_time", "delay"]
@@ -122,7 +122,7 @@ def test_how_far_other_designs_go_is_asked_with_the_same_noise(monkeypatch):
         return made(*asks, **around)
 
     monkeypatch.setattr(DEFAULT, "design_compensated", seen)
-    monkeypatch.setattr(DEFAULT, "reached_step", lambda task, step, attempt, most: attempt(step) and None)
+    monkeypatch.setattr(DEFAULT, "reached_step", lambda task, attempt, most: attempt(STEP) and None)
     monkeypatch.setattr(DEFAULT, "reached_delay", lambda step, attempt, first: attempt(first) and None)
     qd.design(REAL, "dia", slip_noise="1e-6")
     assert asked == 3 * [noise]
@@ -138,7 +138,7 @@ def test_what_runs_is_what_is_guaranteed():
 
 def test_it_runs_in_no_other_way():
     law = designed().controller
-    limit = {name: float(law.numbers[name]) for name in ("rest_width", "rest_per_slip", "rest_resolution")}
+    limit = {name: float(value) for name, value in law.sampling.settings if name.startswith("rest_")}
     own = dict(weight=0.35, authority=2.282e-8, **limit)
     same = run(law, scheme=simulation_scheme("compensated", **own), step=0.184)
     assert np.array_equal(same.pressure, run(law).pressure)
