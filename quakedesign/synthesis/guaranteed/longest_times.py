@@ -27,6 +27,7 @@ _CLOSE = Fraction(1, 20)  # the same where designs are continued
 _BACK = Fraction(39, 40)  # of a time whose law is not proved after all
 _EDGE, _AIM = 0.92, 0.985  # small gain that is at the end of the reach, and that which a time is sought for
 _POWER = 1.3  # of a time with which the small gain was seen to grow
+_LEAST = 0.01  # small gain that is counted with
 _FAR = 2.0  # small gain from which a time is halved
 
 
@@ -240,7 +241,8 @@ def _time_between(
         time, small = bad
         return time / 2 if small is None or small > _FAR else Fraction(f"{0.9 * float(time) / max(small, 1.0):.3g}")
     if bad is None:
-        ahead = float(at) * (2.0 if unit else min((_AIM / good.small_gain) ** (1 / _POWER), 2.0)) if at else float(unit)
+        grown = 2.0 if unit else min((_AIM / max(good.small_gain, _LEAST)) ** (1 / _POWER), 2.0)
+        ahead = float(at) * grown if at else float(unit)
         time = Fraction(f"{ahead:.3g}")
         return time if most is None else min(time, most)
     width, share = float(bad[0] - at), 0.5
