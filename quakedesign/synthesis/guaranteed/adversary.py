@@ -286,9 +286,9 @@ class _Search:
         if (slow or self.limit is not None) and beta[0] < beta[1]:  # β is slow; it stays at either end
             half = len(vertices) // 2
             self.allowed[numbers % 2 == 0, :half] = self.allowed[numbers % 2 == 1, half : len(vertices)] = False
-        self.aim = np.zeros((courses, self.size))
+        self.aim, self.kinds = np.zeros((courses, self.size)), numbers // 4 % 4
         if sticks:  # behind its reference a fault that rests is not what it is ahead of it
-            self.aim[numbers % 3 == 0, 0], self.aim[numbers % 3 == 1, 1], self.aim[numbers % 3 == 2, 0] = 1, 1, -1
+            self.aim[self.kinds == 0, 0], self.aim[self.kinds % 2 == 1, 1], self.aim[self.kinds == 2, 0] = 1, 1, -1
         else:
             self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
         self.marks = np.empty((0, courses))
@@ -307,10 +307,10 @@ class _Search:
         return last
 
     def best(self, count: int) -> np.ndarray:
-        """Numbers of the best courses of the last sweep, a third for each aim."""
+        """Numbers of the best courses of the last sweep, a quarter of each kind."""
         reached = self.marks.max(axis=0)
-        kinds = [np.arange(kind, reached.size, 3) for kind in range(3)]
-        return np.concatenate([kind[np.argsort(-reached[kind])[: count // 3]] for kind in kinds])
+        kinds = [np.flatnonzero(self.kinds == kind) for kind in range(4)]
+        return np.concatenate([kind[np.argsort(-reached[kind])[: count // 4]] for kind in kinds])
 
     def ascend(self, costates: np.ndarray) -> None:
         """Climb: of each course the inputs of some pieces become those of its adjoint, and stay so where it goes on.

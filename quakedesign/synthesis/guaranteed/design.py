@@ -24,7 +24,7 @@ from quakedesign.synthesis.guaranteed.unclocked import unclocked_estimate
 
 OBJECTIVES = ("tracking", "peak")
 _EVALUATIONS = 150
-_FEW = 70  # evaluations near a law that has a guarantee at another time
+_FEW = 45  # evaluations near a law that has a guarantee at another time
 _SURE = 0.9  # closeness that is near enough
 _NARROW = 1.25  # room of those: more of it costs what is proved of the slip error too
 _FEWER = 80  # evaluations where samples follow no clock
