@@ -24,6 +24,7 @@ _ATTEMPTS = 12
 _SHARE = 0.5  # of the time in which the fastest unstable pole grows e-fold, near which the longest T_s was seen
 _NEAR = Fraction(1, 16)  # share of the longest time by which the end of the reach is left open
 _CLOSE = Fraction(1, 16)  # the same where designs are continued
+_LOOSE = Fraction(1, 10)  # the same of delays and what else may be 0, each of which takes longer
 _BACK = Fraction(39, 40)  # of a time whose law is not proved after all
 _EDGE, _AIM = 0.92, 0.985  # small gain that is at the end of the reach, and that which a time is sought for
 _POWER = 1.3  # of a time with which the small gain was seen to grow
@@ -207,9 +208,9 @@ def _farthest(
             if good is None and (not time or not _nearer(small, before)):
                 return None
             bad, before = (time, small), small
-        if good is not None and (
-            at == most or (good.closeness > _EDGE and not unit) or (bad is not None and bad[0] - at <= _CLOSE * bad[0])
-        ):
+        open_end = (_LOOSE if unit else _CLOSE) * bad[0] if bad is not None else Fraction(0)
+        edge = good is not None and good.closeness > _EDGE and not unit
+        if good is not None and (at == most or edge or (bad is not None and bad[0] - at <= open_end)):
             break
         time = _time_between(good, at, bad, most, unit)
     return None if good is None else _proved_near(task, search, good, at)
