@@ -12,7 +12,7 @@ from scipy.optimize import OptimizeResult, minimize
 
 from quakedesign.bounds import UpperBound
 from quakedesign.cache import search_once
-from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task
+from quakedesign.certificates.guarantee import Bounds, Guarantee, Held, NoGuarantee, Task, guarantee
 from quakedesign.certificates.guarantee.held import Around
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.checks import require_ordinary

@@ -263,6 +263,8 @@ def test_the_first_words_are_that_nothing_is_guaranteed_at_the_step_that_was_ask
     monkeypatch.setattr(state_feedback, "design_held", lambda *_, **__: none)
     monkeypatch.setattr(state_feedback, "longest_step", lambda *_, **__: shorter)
     monkeypatch.setattr(state_feedback, "design_at", lambda *_: shorter)
+    for search in ("continued", "nearest_setup"):
+        monkeypatch.setattr(state_feedback, search, lambda *_, **__: None)
     found = answer(load_fault("real-fault"), step=F("0.5"))
     assert not found.proved
     assert found.lines()[:2] == [
