@@ -19,7 +19,7 @@ from quakedesign.sos.solve.engine import decide
 from quakedesign.sos.solve.expanding_interior import affine, decision_names, expanded, with_shape
 from quakedesign.sos.solve.faces import just_below, simplest_between
 from quakedesign.sos.solve.level_crossing import lowest_crossing, other_equilibrium
-from quakedesign.sos.solve.program import Program
+from quakedesign.sos.solve.program import NoSolution, Program
 
 _SHARES = tuple(
     Fraction(s) for s in ("999999/1000000", "9999/10000", "999/1000", "99/100", "9/10", "1/2", "1/10", "1/1000")
@@ -236,7 +236,7 @@ def _searched(claim: Attraction, top: int) -> Attraction | None:
     program.require(affine(combination([(Fraction(-1), claim.lyapunov)]), powers))
     program.require(affine({}, [combination([(Fraction(-1), along(claim.field, p))]) for p in powers]))
     solution = program.solve()
-    if solution is None:
+    if isinstance(solution, NoSolution):
         return None
     values = zip(terms, solution.values.values(), strict=True)
     return replace(claim, lyapunov={e: c for e, c in values if c})

@@ -15,14 +15,17 @@ from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.definiteness import positive_definite
 from quakedesign.sos.exact.polynomial import Exponents, combination, degree
 from quakedesign.sos.exact.reading import read
-from quakedesign.sos.exact.statement import Statement, statement
+from quakedesign.sos.exact.statement import statement
 from quakedesign.sos.solve.conic import Compiled, solve
 from quakedesign.sos.solve.engine import decide
-from quakedesign.sos.solve.joint import shape_of
+from quakedesign.sos.solve.faces import Block, at_kernels
+from quakedesign.sos.solve.forced import Forced, Requirement
 from quakedesign.sos.solve.moment import pairs
 
 _ROOM = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 _BITS = (4, 8, 12, 18, 24, 32)
+_KERNELS = ((1e-6, 1e-3), (1e-6, 1e-5), (1e-4, 1e-2), (1e-4, 1e-4))  # largest eigenvalue of one, and its rounding
+_ROUNDS = 3  # of numerical kernels, each on the faces of the last
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,12 +42,31 @@ class Solution:
         Exact value of the objective; a bound on the optimum from the feasible side.
     bound : float
         The solver's optimum, in floating point: no proof.
+    forced : tuple of str
+        Decisions that a requirement forces, each with the monomial that does.
     """
 
     values: Mapping[str, Fraction]
     answers: tuple[Answer, ...]
     objective: Fraction
     bound: float
+    forced: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoSolution:
+    """No decision was found; false where a truth value is needed, and no proof that there is none.
+
+    Attributes
+    ----------
+    reason : str
+        Which decisions are forced by which requirement, and where the search ended.
+    """
+
+    reason: str
+
+    def __bool__(self) -> bool:
+        return False
 
 
 class Program:
@@ -61,7 +83,11 @@ class Program:
         self.variables, self.decisions = tuple(variables), tuple(decisions)
         self._vector = cp.Variable(len(self.decisions), name="decisions")
         self.constraints: list[Any] = []
-        self._required: list[tuple[list[dict[Any, Any]], Statement]] = []
+        self._required: list[Requirement] = []
+        self._forced = Forced(requirements=())
+        self._grams: list[list[Any]] = []
+        self._margin: Any = None
+        self._status = ""
         self._definite: list[list[list[dict[Exponents, Fraction]]]] = []
         self._objective: dict[Exponents, Fraction] = {}
 
@@ -99,7 +125,7 @@ class Program:
             products=products,
             degree_bound=degree_bound,
         )
-        self._required.append((parts, template))
+        self._required.append(Requirement(parts=parts, template=template))
 
     def require_definite(self, matrix: Sequence[Sequence[Any]]) -> None:
         """Demand that a symmetric matrix of affine functions of the decisions is positive definite; proved exactly.
@@ -132,24 +158,67 @@ class Program:
         self._objective = {e: -c for e, c in self._affine(objective).items()}
 
     def problem(self) -> Any:
-        """The cvxpy problem as it is first solved."""
+        """The cvxpy problem as it is first solved, on the faces that the requirements force."""
+        self._forced = Forced(requirements=tuple(self._required)).reduced(self.decisions)
+        return self._problem()
+
+    def _problem(self) -> Any:
         import cvxpy as cp
 
         return cp.Problem(cp.Maximize(self._value(self._objective)), self._constraints(0.0))
 
-    def solve(self) -> Solution | None:
-        """Exact decision with proofs, as near to the optimum as can be proved; None if none was found.
+    def solve(self) -> Solution | NoSolution:
+        """Exact decision with proofs, as near to the optimum as can be proved.
+
+        Decisions that the requirements force, such as the coefficient of a monomial that no square produces, are
+        eliminated exactly beforehand.
 
         Returns
         -------
-        Solution or None
-            None says nothing about feasibility.
+        Solution or NoSolution
+            The latter is false, has a reason, and says nothing about feasibility unless the reason does.
         """
-        for best, room in self._interior(_ROOM):
-            solution = self._rounded(best, room)
-            if solution is not None:
-                return solution
-        return None
+        self.problem()
+        base = self._forced
+        solution, ended = self._ended()
+        for kernel in _KERNELS if solution is None and self._margin is not None else ():
+            self._forced = base
+            for _ in range(_ROUNDS):
+                if not self._restricted(*kernel):
+                    break
+                solution, _ = self._ended()
+                if solution is not None:
+                    return solution
+            self._forced = base
+        return solution or NoSolution(reason="; ".join((*base.reasons, ended)))
+
+    def _ended(self) -> tuple[Solution | None, str]:
+        """Solution on the present faces, or how the search for one ended."""
+        if self._forced.contradiction:
+            return None, "so no decisions satisfy the requirements"
+        solution = next(filter(None, (self._rounded(*found) for found in self._interior(_ROOM))), None)
+        rest = "the rest is" if self._forced.reasons else "the programme is"
+        if self._margin is None:
+            return solution, f"{rest} {self._status} in floating point"
+        margin = f"{self._margin.value:.1g}"
+        return (
+            solution,
+            f"{rest} feasible in floating point, with a margin of {margin}, but no exact decisions were found",
+        )
+
+    def _restricted(self, threshold: float, tolerance: float) -> bool:
+        """Pass to the faces without the numerical kernels of the last Gram matrices; whether there are any."""
+        if self._margin is None or self._forced.contradiction:
+            return False
+        faces: list[Sequence[Block] | None] = []
+        sizes = [float(np.abs(v.value).max(initial=0)) for v in (self._vector, *(g for gs in self._grams for g in gs))]
+        for asked, grams in zip(self._forced.requirements, self._grams, strict=True):
+            whole = [gram.value + self._margin.value * np.eye(gram.shape[0]) for gram in grams]
+            unit = max(1e-3 * max(sizes), 1e-300, *(float(np.abs(w).max()) for w in whole))
+            scaled = [w / unit for w in whole]
+            faces.append(at_kernels(asked.present, scaled, threshold, tolerance, [Fraction(1)] * len(self.variables)))
+        self._forced = self._forced.on_faces(faces, self.decisions)
+        return any(face is not None for face in faces)
 
     def proposal(self, room: float) -> list[float] | None:
         """Decisions with the largest margin, in floating point: no proof; None if none are found.
@@ -161,6 +230,7 @@ class Program:
         """
         if not room >= 0 or math.isinf(room):
             raise PolynomialError(f"room must be a number of at least 0. Received {room!r}. Write 0.01, say.")
+        self.problem()
         found = next(self._interior((room,)), None)
         return None if found is None else np.asarray(self._vector.value).tolist()
 
@@ -168,22 +238,29 @@ class Program:
         """The optimum, and how much of it was given up where decisions with a margin are now at hand."""
         import cvxpy as cp
 
-        problem = self.problem()
+        self._margin = None
+        if self._forced.contradiction:
+            return
+        problem = self._problem()
         if not solve(problem):
+            self._status = problem.status
             return
         best = float(problem.value)
         margin, least = cp.Variable(), cp.Parameter()
         wanted = [self._value(self._objective) >= least] if self._objective else []
         within = Compiled(cp.Problem(cp.Maximize(margin), [*self._constraints(margin), margin <= 1, *wanted]))
-        for room in (share * max(1.0, abs(best)) for share in rooms):
+        for room in (share * max(1.0, abs(best)) for share in (rooms if self._objective else rooms[:1])):
             least.value = best - room
-            if within.solve() and within.problem.value >= 1e-11:
-                yield best, room
+            if within.solve():
+                self._margin = margin
+                if within.problem.value >= 1e-11:
+                    yield best, room
 
     def _rounded(self, best: float, room: float) -> Solution | None:
         """Proved decision near the last one of the solver, which gave up some room of the optimum for its margin."""
         for bits in _BITS:
-            values = [nearest(float(v), 2**bits) for v in np.asarray(self._vector.value).tolist()]
+            near = [nearest(float(v), 2**bits) for v in np.asarray(self._vector.value).tolist()]
+            values = self._forced.completed(near)
             close = not self._objective or _at(self._objective, values) >= Fraction(best) - 2 * Fraction(room)
             answers = self._proved(values) if close else None
             if answers is not None:
@@ -193,6 +270,7 @@ class Program:
                     answers=answers,
                     objective=objective,
                     bound=best,
+                    forced=self._forced.reasons,
                 )
         return None
 
@@ -201,18 +279,23 @@ class Program:
             if not positive_definite([[_at(entry, values) for entry in row] for row in rows]):
                 return None
         answers = []
-        for parts, template in self._required:
-            polynomial = combination(zip((Fraction(1), *values), parts, strict=True))
-            answer = decide(replace(template, polynomial=polynomial))
+        for asked in self._required:
+            polynomial = combination(zip((Fraction(1), *values), asked.parts, strict=True))
+            answer = decide(replace(asked.template, polynomial=polynomial))
             if answer.verdict is not Positivity.SOS:
                 return None
             answers.append(answer)
         return tuple(answers)
 
     def _constraints(self, margin: Any) -> list[Any]:
-        constraints = list(self.constraints)
-        for parts, template in self._required:
-            constraints += _membership(self._vector, parts, template, margin)
+        constraints, self._grams = list(self.constraints), []
+        for asked in self._forced.requirements:
+            grams, equations = _membership(self._vector, asked, margin)
+            self._grams.append(grams)
+            constraints += [*(gram >> 0 for gram in grams), *equations]
+        for j, affine in self._forced.solved.items():
+            row = np.array([float(c) for c in affine])
+            constraints.append(self._vector[j] == row[0] + row[1:] @ self._vector)
         for rows in self._definite:
             constraints.append(_definite(self._vector, rows, margin))
         if not constraints:
@@ -288,27 +371,30 @@ def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fra
     )
 
 
-def _membership(vector: Any, parts: Sequence[Mapping[Any, Any]], template: Statement, margin: Any) -> list[Any]:
-    """Equations between the coefficients of the polynomial and of a sum of squares with margin."""
+def _membership(vector: Any, asked: Requirement, margin: Any) -> tuple[list[Any], list[Any]]:
+    """Gram matrices, less the margin, and the equations between their coefficients and those of the polynomial."""
     import cvxpy as cp
 
-    shape = shape_of(template)
-    known = [{e: c for e, c in part.items() if e in shape.index} for part in parts]
-    beyond = [[float(part.get(e, 0)) for part in parts] for e in {e for p in parts for e in p if e not in shape.index}]
+    shape, reached = asked.shape, asked.reached
+    beyond = {e for part in asked.parts for e in part} - reached  # empty unless the requirements contradict each other
+    rows = [[float(c) for c in asked.coefficient(e)] for e in beyond]
+    vanishing = [row[0] + np.array(row[1:]) @ vector == 0 for row in rows]
+    if shape is None:
+        return [], vanishing
+    known = [{e: c for e, c in part.items() if e in reached} for part in asked.parts]
     left, triangles = np.array([shape.vector(part) for part in known]).T, shape.triangles()
     total: Any = left[:, 0] + left[:, 1:] @ vector
-    constraints, start = [], 0
+    grams, start = [], 0
     for block in shape.blocks:
         gram = cp.Variable((block.size, block.size), symmetric=True)
         rows, columns = pairs(block.size)
         own = triangles[start : start + len(rows)].T @ diags_array(np.where(rows == columns, 1.0, 2.0))
         total = total - own @ (gram[rows, columns] + margin * (rows == columns))
-        constraints.append(gram >> 0)
+        grams.append(gram)
         start += len(rows)
     if shape.relation_count:
         total = total - shape.relations().T @ cp.Variable(shape.relation_count)
-    vanishing = [row[0] + np.array(row[1:]) @ vector == 0 for row in beyond]
-    return [*constraints, *vanishing, total == 0]
+    return grams, [*vanishing, total == 0]
 
 
 def _definite(vector: Any, rows: list[list[dict[Any, Any]]], margin: Any) -> Any:

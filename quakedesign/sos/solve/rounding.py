@@ -42,7 +42,7 @@ def rounded(
         Checked.
     """
     decision = checked or (lambda proof: proof if identity_holds(statement, proof) else None)
-    system = _System(statement, blocks)
+    system = System(statement, blocks)
     floats = system.flat(solution)
     largest = max((len(b.basis) for b in blocks), default=1)
     enough = largest / max(solution.margin, 2.0**-36)
@@ -69,7 +69,7 @@ def relations(statement: Statement) -> Iterator[tuple[int, Exponents, dict[Expon
             yield k, m, {times(m, e): c for e, c in h.items()}
 
 
-class _System:
+class System:
     """The linear system from Gram entries and cofactor coefficients to coefficients of the target."""
 
     def __init__(self, statement: Statement, blocks: Sequence[Block]) -> None:

@@ -48,7 +48,7 @@ def test_cvxpy_constraints_steer_the_search():
 def test_infeasible_is_an_answer():
     program = sos.Program(["x"], ["g"])
     program.require("-x^2 + g")
-    assert program.solve() is None
+    assert not program.solve()
 
 
 def test_a_product_of_decisions_is_refused():
