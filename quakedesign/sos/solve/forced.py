@@ -10,6 +10,7 @@ same way; such equations are a guess. What follows from them is proved for the d
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 
 from flint import fmpq, fmpq_mat
 
@@ -18,6 +19,7 @@ from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination
 from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.solve.decide import initial_blocks
 from quakedesign.sos.solve.faces import Block, modulo
+from quakedesign.sos.solve.joint import shape_of
 from quakedesign.sos.solve.moment import MomentProgram
 from quakedesign.sos.solve.rounding import System, relations
 
@@ -43,17 +45,19 @@ class Requirement:
     template: Statement
     blocks: Sequence[Block] | None = None
 
-    @property
+    @cached_property
     def shape(self) -> MomentProgram | None:
         """The cone in floats; None where only zero is in it."""
         rows = [{e: float(c) for e, c in r.items()} for _, _, r in relations(self.template)]
-        return MomentProgram([b.shape() for b in self.present], rows) if self.present or rows else None
+        if not self.present and not rows:
+            return None
+        whole = self.blocks is None and self.present
+        return shape_of(self.template) if whole else MomentProgram([b.shape() for b in self.present], rows)
 
     @property
-    def reached(self) -> set[Exponents]:
+    def reached(self) -> Mapping[Exponents, int]:
         """Monomials that a product or a multiple of an equality may have."""
-        shape = self.shape
-        return set() if shape is None else set(shape.index)
+        return {} if self.shape is None else self.shape.index
 
     @property
     def present(self) -> Sequence[Block]:
@@ -114,6 +118,19 @@ class Forced:
                 equation = tuple(sum((c * p.get(e, 0) for e, c in row.items()), start=Fraction(0)) for p in parts)
                 present = present._with(equation, rule, names)
         return present.reduced(names)
+
+    def refuted(self) -> str:
+        """Requirement with a monomial that squares alone produce, and whose coefficient is negative; else nothing."""
+        for k, asked in enumerate(self.requirements):
+            system = System(asked.template, asked.present)
+            mixed = {e for _, _, r in system.relations for e in r}
+            for (_, i, j), column in zip(system.entries, system.columns, strict=False):
+                mixed |= {e for e, c in column.items() if i != j or c < 0}
+            for e, c in asked.parts[0].items():
+                if c < 0 and e not in mixed and not any(asked.coefficient(e)[1:]):
+                    monomial = _monomial(asked.template.variables, e)
+                    return f"requirement {k + 1}: squares alone produce {monomial}, but {c} stands before it"
+        return ""
 
     def _with(self, equation: Affine, rule: str, names: Sequence[str]) -> "Forced":
         """One more equation, equation·(1, d) = 0."""

@@ -272,7 +272,8 @@ def _localizing(blocks: Sequence[Shape], entries: list[Any], where: Any, width: 
         values.append(flat)
         diagonal.append(_diagonal(block.size) + first)
         first += block.size * (block.size + 1) // 2
-    return tuple(np.concatenate(part) for part in (rows, columns, values, diagonal))
+    parts = (rows, columns, values, diagonal)
+    return tuple(np.concatenate(part) if part else np.zeros(0, dtype=np.int64) for part in parts)
 
 
 def options(accuracy: float) -> dict[str, Any]:

@@ -43,7 +43,7 @@ class Solution:
     bound : float
         The solver's optimum, in floating point: no proof.
     forced : tuple of str
-        Decisions that a requirement forces, each with the monomial that does.
+        Equations that were solved beforehand: each with its requirement, and the monomial or kernel that forces it.
     """
 
     values: Mapping[str, Fraction]
@@ -195,16 +195,14 @@ class Program:
     def _ended(self) -> tuple[Solution | None, str]:
         """Solution on the present faces, or how the search for one ended."""
         if self._forced.contradiction:
-            return None, "so no decisions satisfy the requirements"
+            return None, "so no decisions satisfy the requirements at this degree"
         solution = next(filter(None, (self._rounded(*found) for found in self._interior(_ROOM))), None)
-        rest = "the rest is" if self._forced.reasons else "the programme is"
-        if self._margin is None:
-            return solution, f"{rest} {self._status} in floating point"
-        margin = f"{self._margin.value:.1g}"
-        return (
-            solution,
-            f"{rest} feasible in floating point, with a margin of {margin}, but no exact decisions were found",
-        )
+        ended = f"{'the rest' if self._forced.reasons else 'the programme'} is {self._status} in floating point"
+        if self._margin is not None:
+            ended += f", with a margin of {self._margin.value:.1g}, but no exact decisions were found"
+        elif refuted := self._forced.refuted():
+            ended = f"{refuted}; so no decisions satisfy the requirements at this degree"
+        return solution, ended
 
     def _restricted(self, threshold: float, tolerance: float) -> bool:
         """Pass to the faces without the numerical kernels of the last Gram matrices; whether there are any."""
@@ -242,8 +240,9 @@ class Program:
         if self._forced.contradiction:
             return
         problem = self._problem()
-        if not solve(problem):
-            self._status = problem.status
+        solved = solve(problem)
+        self._status = "feasible" if solved else problem.status or "not solved"
+        if not solved:
             return
         best = float(problem.value)
         margin, least = cp.Variable(), cp.Parameter()
@@ -376,9 +375,10 @@ def _membership(vector: Any, asked: Requirement, margin: Any) -> tuple[list[Any]
     import cvxpy as cp
 
     shape, reached = asked.shape, asked.reached
-    beyond = {e for part in asked.parts for e in part} - reached  # empty unless the requirements contradict each other
-    rows = [[float(c) for c in asked.coefficient(e)] for e in beyond]
-    vanishing = [row[0] + np.array(row[1:]) @ vector == 0 for row in rows]
+    beyond = {e for part in asked.parts for e in part if e not in reached}  # none unless the requirements contradict
+    vanishing = []
+    for constant, *factors in map(asked.coefficient, beyond):
+        vanishing.append(float(constant) + np.array(factors, dtype=float) @ vector == 0)
     if shape is None:
         return [], vanishing
     known = [{e: c for e, c in part.items() if e in reached} for part in asked.parts]

@@ -48,7 +48,9 @@ def test_cvxpy_constraints_steer_the_search():
 def test_infeasible_is_an_answer():
     program = sos.Program(["x"], ["g"])
     program.require("-x^2 + g")
-    assert not program.solve()
+    found = program.solve()
+    assert not found
+    assert "squares alone produce x^2" in found.reason
 
 
 def test_a_product_of_decisions_is_refused():
