@@ -60,6 +60,28 @@ def test_a_square_whose_coefficient_is_negative_is_named():
     assert "squares alone produce x^2, but -1 stands before it" in found.reason
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_decisions_that_have_squares_satisfy_every_forced_equation(seed):
+    # p(d) = Σ g²+ (x − 1)·h² + Σ_j (d_j − known_j)·p_j is in the cone for d = known
+    random = np.random.default_rng(seed)
+    terms = [sp.Integer(1), x, y, x * y, x**2, y**2, x**2 * y, x * y**2, x**3]
+    known = [sp.Rational(int(n), 3) for n in random.integers(-3, 4, 4)]
+    squares = [
+        sum(int(c) * m for c, m in zip(random.integers(-1, 2, 2), random.choice(terms, 2), strict=True)) for _ in "12"
+    ]
+    weight, on = (x - 1, ("x >= 1",)) if seed % 2 else (sp.Integer(1), ())
+    names = sp.symbols("d:4")
+    free = sum((d - k) * random.choice(terms) * random.choice(terms) for d, k in zip(names, known, strict=True))
+    asked = program(
+        sp.expand(squares[0] ** 2 + weight * squares[1] ** 2 + free), decisions=list(map(str, names)), on=on
+    )
+    asked.problem()
+    forced, values = asked._forced, [Fraction(int(k.p), int(k.q)) for k in known]
+    assert not forced.contradiction
+    assert forced.refuted() == ""
+    assert forced.completed(values) == values
+
+
 def test_no_solution_says_that_the_optimum_is_unbounded():
     asked = program("x^2 + 1")
     asked.maximize("a")
