@@ -54,6 +54,23 @@ def test_a_tenth_of_the_natural_peak_beyond_the_reference_is_an_earthquake_a_hun
     assert found.harmless == (kind in ("tracked", "slow slip"))
 
 
+def test_what_is_as_fast_as_a_threshold_is_still_tracked_and_already_an_earthquake():
+    """A natural peak of 100 m/s: a hundredth and a tenth of it are whole numbers, which floats hold exactly."""
+    quick = replace(CRITERION, natural_peak=100.0)
+    assert [quick.outcome(0.125 + excess, 0.0, {}, followed=True).kind for excess in (1.0, 10.0)] == [
+        "tracked",
+        "earthquake",
+    ]
+
+
+def test_friction_with_a_state_is_compared_with_its_dynamic_rate_whatever_its_natural_peak():
+    state = replace(CRITERION, dynamic_rate=0.01)
+    assert state.outcome(0.125 + 0.0011, 0.0, {}, followed=True) == Outcome(
+        kind="earthquake", peak_slip_rate=0.125 + 0.0011, share_of_natural=(0.125 + 0.0011) / 0.5
+    )
+    assert state.outcome(0.125 + 0.0009, 0.0, {}, followed=True).kind == "slow slip"
+
+
 def test_what_follows_nothing_is_never_tracked_and_has_no_reference_to_be_as_fast_as():
     assert CRITERION.outcome(0.0, None, {}, followed=False).kind == "slow slip"
     assert CRITERION.outcome(0.051, None, {}, followed=False).kind == "earthquake"
@@ -62,7 +79,7 @@ def test_what_follows_nothing_is_never_tracked_and_has_no_reference_to_be_as_fas
 def test_a_stable_fault_is_compared_with_its_own_swing_through_the_target():
     """ω_n·d_max = √(0.48)·0.785 m/s for the real fault."""
     criterion = OutcomeCriterion.of(STABLE, natural_peak(STABLE))
-    assert criterion.natural_peak is None
+    assert criterion.natural_peak is OutcomeCriterion.of(STABLE, 0.0).natural_peak is None
     assert criterion.inertial_rate == pytest.approx(np.sqrt(30e9 / 2500 / 5000**2) * 0.785, rel=1e-12)
     tenth = criterion.inertial_rate / 10
     assert criterion.outcome(0.99 * tenth, 0.0, {}, followed=True).kind == "slow slip"

@@ -59,7 +59,7 @@ class Delay(SampledStage):
 
     def __post_init__(self) -> None:
         for name, value in (("samples of a delay", self.samples), ("jitter", self.jitter)):
-            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_SAMPLES:
+            if not isinstance(value, int) or not 0 <= value <= MOST_SAMPLES:
                 raise ParameterError(f"{name} must be a whole number, 0 to {MOST_SAMPLES}. Received {value!r}.")
         if not 0 <= self.part < 1:
             raise ParameterError(f"part of a delay must be at least 0 and below 1. Received {self.part!r}.")

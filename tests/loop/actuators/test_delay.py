@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop.actuators import Delay
+from quakedesign.loop.actuators import Actuator, Delay, Quantisation
 
 COUNT = 4000
 
@@ -42,7 +42,67 @@ def test_a_seed_says_everything():
     assert (first != other).any()
 
 
-@pytest.mark.parametrize("settings", [{"jitter": -1}, {"jitter": 0.5}, {"jitter": 101}, {"jitter": 1, "seed": -1}])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"jitter": -1},
+        {"jitter": 0.5},
+        {"jitter": True},
+        {"jitter": np.int64(1)},  # times a tuple it would be a product of numbers
+        {"jitter": 101},
+        {"jitter": 1, "seed": -1},
+    ],
+)
 def test_what_cannot_be_is_refused(settings):
     with pytest.raises(ParameterError, match=r"whole number"):
         Delay(samples=1, **settings)
+
+
+@pytest.mark.parametrize("part", [-1e-300, 1.0, 1.5, float("nan")])
+def test_a_part_is_less_than_a_whole_sample(part):
+    with pytest.raises(ParameterError, match="part of a delay must be at least 0 and below 1"):
+        Delay(samples=1, part=part)
+
+
+@pytest.mark.parametrize(
+    ("step", "delay", "samples", "part"),
+    [
+        (0.5, 0.0, 0, 0.0),
+        (0.5, 1.25, 2, 0.5),
+        (0.1, 0.3, 3, 0.0),  # whose quotient is below 3 in floats
+        (1.0, 3 + 0.75e-9, 3, 0.0),
+        (1.0, 3 - 0.75e-9, 3, 0.0),
+        (1.0, 3 + 1.5e-9, 3, 1.5e-9),
+        (1.0, 3 - 1.5e-9, 2, 1 - 1.5e-9),
+        (1.0, 1e-9, 0, 0.0),
+        (1.0, 1.5e-9, 0, 1.5e-9),
+        (0.25, 25.0, 100, 0.0),
+    ],
+)
+def test_a_time_is_so_many_periods_to_a_billionth_of_one_and_a_part(step, delay, samples, part):
+    found = Delay.asked(step, delay=delay)
+    assert (found.samples, found.jitter, found.seed) == (samples, 0, 0)
+    assert found.part == pytest.approx(part, rel=0, abs=4e-15)
+    assert (found.part == 0) is (part == 0)
+
+
+@pytest.mark.parametrize("delay", [-1e-9, 0.2500001 * 100, 26.0, float("nan"), float("inf")])
+def test_a_time_is_at_most_a_hundred_periods(delay):
+    with pytest.raises(ParameterError, match="delay must be 0 to 100 sampling periods of 0.25 s"):
+        Delay.asked(0.25, delay=delay)
+
+
+def test_jitter_is_asked_for_with_a_delay_or_without():
+    assert Delay.asked(0.25, delay=0.5, jitter=3) == Delay(samples=2, jitter=3)
+    (without,) = (option.default for option in Delay.options if option.name == "delay")
+    assert Delay.asked(0.25, delay=without, jitter=100) == Delay(samples=0, jitter=100)
+
+
+def test_a_delay_comes_before_what_the_pump_does():
+    quantised, delayed = Quantisation(quantum=1.0), Delay(samples=1)
+    assert Actuator(stages=(quantised,)).completed(Actuator(stages=(delayed,))).stages == (delayed, quantised)
+
+
+def test_before_the_delay_nothing_is_injected():
+    assert Delay(samples=3).start == (0.0, 0.0, 0.0)
+    assert Delay(samples=1, jitter=2).start[:4] == (0.0, 0.0, 0.0, 1.0)

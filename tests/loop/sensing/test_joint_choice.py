@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from quakedesign.controllers import published
+from quakedesign.controllers import control_law, published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.loop.schemes import simulation_scheme
@@ -16,6 +16,7 @@ from quakedesign.simulation import simulate
 
 LAB = load_fault("lab-fault")
 PUBLISHED = published("lab-fault")
+IDLE = control_law("elqr")(gains=dict.fromkeys(PUBLISHED["elqr"].gain_units, 0.0))
 ACCELERATION = {1e-5: 0.073, 1e-4: 3.0}  # of the sampled 2-CTA with exact states [m/s²]
 
 
@@ -27,6 +28,34 @@ def tracks(differentiator):
 
 def test_the_swing_of_a_linear_law_is_its_gains_times_the_errors():
     assert pressure_swing(PUBLISHED["elqr"], 1e-6, 1e-3) == pytest.approx(4.17e8 * 1e-6 + 6.94e5 * 1e-3)
+
+
+@pytest.mark.parametrize("signs", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
+def test_errors_of_either_sign_are_thought_of(signs):
+    gains = dict.fromkeys(PUBLISHED["elqr"].gain_units, 0.0)
+    slip, rate, *_ = gains
+    law = control_law("elqr")(gains=gains | {slip: 3e8 * signs[0], rate: 7e5 * signs[1]})
+    assert pressure_swing(law, 1e-6, 1e-3) == pytest.approx(300 + 700, rel=1e-12)
+
+
+def test_without_a_pressure_the_bound_is_the_acceleration_which_it_must_exceed():
+    """Up to 1e12, and to the last digits: halving 24 decades as often as floats can tell."""
+    d = Differentiator(bound=0.25, step=1e-4)
+    at, below = (joint_condition(LAB, IDLE, d, acceleration=a) for a in (0.25, math.nextafter(0.25, 0)))
+    assert (at.required, at.ratio, at.holds, below.holds) == (0.25, 1.0, False, True)
+    assert at.to_dict()["required"] == 0.25
+    assert (at.slip_error, at.rate_error) == (below.slip_error, below.rate_error)
+    for acceleration in (1e-9, 0.0035, 73.0, 0.9e12):
+        assert smallest_bound(LAB, IDLE, d, acceleration=acceleration) == pytest.approx(acceleration, rel=1e-13)
+    assert smallest_bound(LAB, IDLE, d, acceleration=1.1e12) is None
+
+
+def test_unless_told_there_is_no_noise():
+    d = Differentiator(bound=100.0, step=1e-4)
+    assert joint_condition(LAB, IDLE, d, acceleration=1.0) == joint_condition(LAB, IDLE, d, acceleration=1.0, noise=0.0)
+    assert smallest_bound(LAB, PUBLISHED["cta"], d, acceleration=3.0) == smallest_bound(
+        LAB, PUBLISHED["cta"], d, acceleration=3.0, noise=0.0
+    )
 
 
 def test_the_swing_of_the_sliding_mode_is_that_of_its_powers_astride_the_origin():
