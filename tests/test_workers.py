@@ -3,10 +3,12 @@
 import os
 import signal
 import sys
+from concurrent.futures import BrokenExecutor, Future
 
 import pytest
 
-from quakedesign.workers import Processes
+from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.workers import Crew, Processes, cores, require_workers
 
 PROGRAM = """
 import os, sys, time
@@ -106,3 +108,57 @@ def test_a_death_that_closes_the_pipes_of_a_process_about_to_start_is_a_death(mo
 def test_an_error_of_a_task_is_that_of_the_caller():
     with pytest.raises(ZeroDivisionError), Processes(1) as crew:
         list(crew.answers(divmod, [(1, 0)]))
+
+
+class Mortal(Crew):
+    """Does tasks at once, and dies at some of them: at those numbers, counted over all lives."""
+
+    width = 1
+
+    def __init__(self, *deaths):
+        self.deaths, self.begun, self.renewed = deaths, [], 0
+
+    def submit(self, task, *given):
+        done = Future()
+        if len(self.begun) in self.deaths:
+            done.set_exception(BrokenExecutor("died"))
+        else:
+            done.set_result(task(*given))
+        self.begun.append(given)
+        return done
+
+    def renew(self):
+        self.renewed += 1
+
+
+def test_workers_have_three_lives():
+    """A single task that twice kills who does it is done by the third; one that kills three is given up."""
+    third = Mortal(0, 1)
+    with third as crew:
+        assert list(crew.answers(divmod, [(9, 7)])) == [(0, (1, 2))]
+    assert (len(third.begun), third.renewed) == (3, 2)
+    with pytest.raises(SimulationError, match="died 3 times, with 1 tasks left"):
+        list(Mortal(0, 1, 2, 3).answers(divmod, [(9, 7)]))
+
+
+def test_what_was_answered_before_a_death_is_not_asked_for_again():
+    crew, tasks = Mortal(0), [(i, 7) for i in range(5)]
+    found = [(place, answer, crew.renewed) for place, answer in crew.answers(divmod, tasks)]
+    assert {place: answer for place, answer, _ in found} == {i: divmod(*given) for i, given in enumerate(tasks)}
+    assert sorted(place for place, _, lives in found if lives) == [i for i, _ in crew.begun[5:]]
+    assert len(found) == 5
+    assert list(Mortal().answers(divmod, [])) == []
+
+
+def test_one_worker_is_enough_and_none_is_refused():
+    assert require_workers(1) == 1
+    for none in (0, -1, True, 1.5, "2"):
+        with pytest.raises(ParameterError, match="whole number of at least 1"):
+            require_workers(none)
+    with Processes(1) as one, Processes() as many:
+        assert (one.width, many.width) == (1, cores())
+
+
+def test_what_many_tasks_take_is_handed_on_as_it_is():
+    value = object()
+    assert Mortal().shared(value) is value

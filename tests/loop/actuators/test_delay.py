@@ -88,7 +88,7 @@ def test_a_time_is_so_many_periods_to_a_billionth_of_one_and_a_part(step, delay,
 
 @pytest.mark.parametrize("delay", [-1e-9, 0.2500001 * 100, 26.0, float("nan"), float("inf")])
 def test_a_time_is_at_most_a_hundred_periods(delay):
-    with pytest.raises(ParameterError, match="delay must be 0 to 100 sampling periods of 0.25 s"):
+    with pytest.raises(ParameterError, match=r"delay must be 0 to 100 sampling periods of 0\.25 s"):
         Delay.asked(0.25, delay=delay)
 
 
