@@ -1,0 +1,201 @@
+"""Least squares by hand: straight lines, wells whose bottoms are known, tables of distributions."""
+
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+
+from quakedesign.errors import RecordError
+from quakedesign.identification.experiment import Coordinate, Experiment
+from quakedesign.identification.fitting import Fit, Search, advantage, fit, minimised, outliers
+
+
+def coordinate(name, low=-10.0, high=10.0, start=(-1.0, 1.0)):
+    return Coordinate(name=name, unit="", low=low, high=high, start=start, logarithmic=False)
+
+
+@dataclass(frozen=True)
+class Linear(Experiment):
+    """Friction is a matrix times what is fitted."""
+
+    matrix: np.ndarray
+    law = None
+
+    @property
+    def coordinates(self):
+        return tuple(coordinate(f"q{i}") for i in range(self.matrix.shape[1]))
+
+    def friction(self, fitted):
+        return self.matrix @ fitted
+
+    def slopes(self, _fitted):
+        return self.matrix
+
+
+@dataclass(frozen=True)
+class Wells(Experiment):
+    """Two bottoms, at -1 and at 1, where the second sample is off by `depth` and by nothing."""
+
+    depth: float
+    samples: int
+    law = None
+    coordinates = (coordinate("q", start=(0.8, 1.2)),)
+
+    def friction(self, fitted):
+        (q,) = fitted
+        return np.array([q * q - 1, self.depth * (1 - q) / 2, *[0.0] * (self.samples - 2)])
+
+    def slopes(self, fitted):
+        (q,) = fitted
+        return np.array([[2 * q], [-self.depth / 2], *[[0.0]] * (self.samples - 2)])
+
+
+def line(samples):
+    return Linear(np.column_stack([np.ones(samples), np.arange(samples)]))
+
+
+def made(experiment, measured, *, fitted=None, counts=None, kept=None):
+    samples = len(measured)
+    return Fit(
+        experiment=experiment,
+        fitted=np.zeros(experiment.matrix.shape[1]) if fitted is None else fitted,
+        measured=measured,
+        counts=np.ones(samples) if counts is None else counts,
+        kept=np.ones(samples, dtype=bool) if kept is None else kept,
+        agreeing=1,
+        starts=1,
+    )
+
+
+def test_three_samples_a_coordinate_are_enough():
+    measured = np.array([0.1, 0.0, 0.3, 0.2, 0.5, 0.4])
+    found = fit(line(6), measured, seed=0)
+    assert found.fitted == pytest.approx(np.polyfit(range(6), measured, 1)[::-1], abs=1e-6)
+    with pytest.raises(RecordError, match="at least 6 samples for what is fitted. Received 5"):
+        fit(line(5), measured[:5], seed=0)
+
+
+@pytest.mark.parametrize(("share", "searches"), [(0.75e-3, 2), (1.5e-3, 3)])
+def test_searches_agree_when_their_squares_differ_by_less_than_a_thousandth(share, searches):
+    """The noise leaves 1; the first search ends at -1 with `share` more than that, all others at 1."""
+    noise = np.resize([1.0, -1.0], 20) / 20**0.5
+    measured = np.concatenate([[0.0, 0.0], noise])
+    wells, start = Wells(share**0.5, 22), np.array([-1.0])
+    found = fit(wells, measured, seed=0, near=start, search=Search(least=2))
+    assert (found.starts, found.agreeing) == (searches, 2)
+    assert found.fitted[0] == pytest.approx(1, abs=1e-4)
+    assert fit(wells, measured, seed=0, near=start).starts == 4
+    alone = fit(wells, measured, seed=0, near=start, search=Search(least=1, most=1))
+    assert alone.starts == 2
+
+
+def test_where_there_is_no_experiment_between_the_ends_nothing_is_fitted():
+    class Jumping(Wells):
+        def friction(self, fitted):
+            return np.full(self.samples, np.nan)
+
+    with pytest.raises(RecordError, match="without a jump"):
+        fit(Jumping(0.1, 9), np.arange(9.0), seed=0)
+    start = np.array([0.5])
+    at, squares = minimised(Jumping(0.1, 9), np.arange(9.0), np.ones(9), start)
+    assert (at.tolist(), squares) == ([0.5], np.inf)
+
+
+def test_what_is_fixed_stays_and_what_has_no_weight_does_not_count():
+    """With a slope of 2 held, the best height is the mean of y - 2x, weighted by squares."""
+    measured, weights = np.array([1.0, 2.0, 7.0, 900.0]), np.array([1.0, 2.0, 1.0, 0.0])
+    start, held = np.array([0.0, 2.0]), np.array([False, True])
+    at, squares = minimised(line(4), measured, weights, start, fixed=held)
+    height = (1 * 1 + 4 * 0 + 1 * 3) / 6
+    assert at == pytest.approx([height, 2.0], abs=1e-8)
+    assert squares == pytest.approx((1 - height) ** 2 + 4 * height**2 + (3 - height) ** 2, rel=1e-8)
+
+
+def test_an_outlier_is_one_that_noise_makes_in_one_record_of_twenty():
+    """Of 11 samples; half of all normal numbers are closer than 0.6745 to their middle, here than 1."""
+    limit = NormalDist().inv_cdf(1 - 0.05 / 2 / 11) / NormalDist().inv_cdf(0.75)
+    within = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 0.0, 1.0, -1.0, 1.0, -1.0])
+    for share, far in ((0.999, False), (1.001, True)):
+        for sign in (1, -1):
+            found = outliers(sign * np.append(within, share * limit) + 5.0, 2)
+            assert found.tolist() == [False] * 10 + [far]
+
+
+@pytest.mark.parametrize(("run", "left_out"), [(1, True), (2, True), (3, False)])
+def test_more_than_two_in_a_row_are_no_accident(run, left_out):
+    for first in (0, 7, 40 - run):
+        residuals = np.resize([1.0, -1.0], 40)
+        residuals[first : first + run] = 50.0
+        assert outliers(residuals, Search().longest_outlier).nonzero()[0].tolist() == (
+            list(range(first, first + run)) if left_out else []
+        )
+
+
+def test_a_fit_without_an_outlier_is_that_of_the_others():
+    draw = np.random.default_rng(5)
+    measured = 0.5 + 0.01 * np.arange(30) + 1e-3 * draw.standard_normal(30)
+    measured[12] += 0.1
+    found = fit(line(30), measured, seed=1)
+    others = np.delete(np.arange(30), 12)
+    assert (~found.kept).nonzero()[0].tolist() == [12]
+    assert found.fitted == pytest.approx(np.polyfit(others, measured[others], 1)[::-1], rel=1e-6)
+    assert found.freedom == 29 - 2
+    residuals = measured[others] - np.polyval(np.polyfit(others, measured[others], 1), others)
+    assert found.noise == pytest.approx((np.sum(residuals**2) / 27) ** 0.5, rel=1e-9)
+
+
+def test_a_mean_of_many_measurements_weighs_by_the_root_of_their_number():
+    counts = np.array([4.0, 1.0, 9.0, 1.0])
+    found = made(Linear(np.ones((4, 1))), np.array([1.0, 2.0, -1.0, 50.0]), counts=counts, kept=np.arange(4) < 3)
+    assert found.scaled.tolist() == [2.0, 2.0, -3.0, 50.0]
+    assert found.weights.tolist() == [2.0, 1.0, 3.0, 0.0]
+    assert (found.squares, found.freedom, found.noise) == (17.0, 2, 8.5**0.5)
+    assert found.accuracy == pytest.approx(3e-3 * 8.5**0.5 / (15 / 4) ** 0.5, rel=1e-14)
+
+
+def test_the_threshold_is_fishers():
+    """Of tables at 95 %: F(1, 10) = 4.965, F(2, 10) = 4.103; the excess at a distance d of the mean of n is n d²/s²."""
+    draw = np.resize([0.5, -0.5], 11) + 0.0
+    found = made(Linear(np.ones((11, 1))), draw, fitted=np.array([draw.mean()]))
+    assert found.freedom == 10
+    assert [found.threshold(1), found.threshold(2)] == pytest.approx([4.965, 2 * 4.103], abs=1e-3)
+    assert found.correlation == 1.0  # what alternates is not counted as more than independent
+    assert found.distance(found.fitted + 0.3) == pytest.approx(11 * 0.3**2 / np.var(draw, ddof=1), rel=1e-12)
+    assert found.deviations == pytest.approx([(np.var(draw, ddof=1) / 11) ** 0.5], rel=1e-12)
+
+
+def test_samples_that_follow_each_other_count_as_fewer():
+    """By direct sums; of noise that decays by 0.8 from sample to sample about (1 + 0.8)/(1 - 0.8) = 9 are one."""
+    draw, found = np.random.default_rng(7).standard_normal(3000), np.zeros(3000)
+    for i in range(1, 3000):
+        found[i] = 0.8 * found[i - 1] + draw[i]
+    told = made(Linear(np.ones((3000, 1))), found).correlation
+    covariance = [float(np.dot(found[: 3000 - lag], found[lag:])) for lag in range(200)]
+    sums = [1.0]
+    while len(sums) - 1 < 5 * sums[-1]:
+        sums.append(sums[-1] + 2 * covariance[len(sums)] / covariance[0])
+    assert told == pytest.approx(sums[-1], rel=1e-9)
+    assert told == pytest.approx(9, rel=0.25)
+
+
+def test_deviations_are_those_of_the_inverse_and_infinite_along_what_is_not_told():
+    matrix = np.column_stack([np.ones(8), np.arange(8.0), np.zeros(8)])
+    measured = np.resize([1.0, -1.0], 8)
+    known = made(Linear(matrix[:, :2]), measured)
+    expected = np.sqrt(np.diag(np.linalg.inv(matrix[:, :2].T @ matrix[:, :2]))) * known.noise
+    assert known.deviations == pytest.approx(expected, rel=1e-9)
+    told = made(Linear(matrix), measured).deviations
+    assert np.isfinite(told).tolist() == [True, True, False]
+    twice = made(Linear(matrix[:, [0, 1, 1]]), measured).deviations
+    assert np.isfinite(twice).tolist() == [True, False, False]
+
+
+def test_the_advantage_is_of_the_samples_that_both_count():
+    """Squares of 4 and of 8 over three samples, all independent: 3 ln 2."""
+    matrix = Linear(np.ones((5, 1)))
+    one = made(matrix, np.array([1.0, -1.0, 2**0.5, -9.0, 0.1]), kept=np.array([1, 1, 1, 0, 1], dtype=bool))
+    other = replace(one, measured=2**0.5 * one.measured, kept=np.array([1, 1, 1, 1, 0], dtype=bool))
+    vars(one)["correlation"], vars(other)["correlation"] = 1.0, 3.0
+    assert advantage(one, other) == pytest.approx((2.0, 3 * np.log(2)), rel=1e-12)
+    assert advantage(other, one) == pytest.approx((0.5, -3 * np.log(2)), rel=1e-12)
