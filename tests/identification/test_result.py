@@ -81,6 +81,8 @@ def test_the_box_of_all_holds_the_ends_of_each():
     assert (wide.name, wide.unit, wide.value) == ("drop", "", pytest.approx(2.0, rel=1e-15))
     tight = estimate(made(), 0, (0.0, 1.0), (0.25, 0.75))
     assert (tight.least, tight.most) == (tight.low, tight.high) == (1.0, math.e)
+    open_ = estimate(made(), 0, (-math.inf, math.inf), (-math.inf, math.inf))
+    assert (open_.low, open_.high, open_.identified) == (-math.inf, math.inf, False)
     straight = estimate(made(), 1, (-1.0, math.inf), (-math.inf, math.inf))
     assert (straight.low, straight.high, straight.least) == (-1.0, math.inf, -math.inf)
 
@@ -143,6 +145,8 @@ def test_what_is_not_told_is_said_with_the_end_that_is():
     assert both == "a and b are not identifiable from this record: only a - b = 2 m (1 to 3) is"
     assert other == nothing
     assert len(identification(estimates=estimates, difference=told("a - b", **ends)).untold()) == 3
+    pair = {name: estimates[name] for name in "ab"}
+    assert identification(estimates=pair, difference=told("a - b")).untold() == [both.replace("2 m", "2")]
     one = identification(estimates=estimates | {"b": told("b")}, difference=between).untold()
     assert one == [above, nothing]
     assert identification().untold() == []

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,7 +12,8 @@ from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
 from quakedesign.simulation import Metrics, natural_earthquake, simulate
-from quakedesign.simulation.coulomb import CoulombLoop
+from quakedesign.simulation.coulomb import CoulombLoop, _onset, _stop
+from quakedesign.simulation.integrators.rk4 import ClassicRungeKutta
 
 REAL = load_fault("real-fault")
 BLOCK = dataclasses.replace(REAL, damping=0.0, friction=dataclasses.replace(REAL.friction, drop=0.0))
@@ -259,3 +261,92 @@ def test_an_opened_fault_has_no_friction_in_any_direction():
 def test_an_unknown_plant_is_refused():
     with pytest.raises(ParameterError, match=r"smooth, coulomb.*'sticky'"):
         simulate(REAL, plant="sticky")
+
+
+def one_step(load, friction, rate, length):
+    """Slip, rate, a state of the law that grows by 1 a second, and a work that grows by 2, after a step under a load."""
+    loop = CoulombLoop(REAL, published("real-fault")["cta"])
+    assert len(loop.integrals) == 1
+    vars(loop)["directed"] = lambda time, x, _, sense: ca.fabs(sense) * ca.vertcat(x[1], load(time) - sense * friction)
+
+    def motion(plant, passed, now):
+        return ca.vertcat(plant(passed * length, now[:2], 0), 1, 2)
+
+    return loop.advance(ClassicRungeKutta, motion, ca.DM([0, rate, 0, 0]), length).full().ravel()
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize(
+    ("load", "rate", "length", "slip", "end"),
+    [
+        (lambda _: 0, 2.0, 1.0, 1.5, 1.0),  # brakes by 1
+        (lambda _: 0, 0.5, 1.0, 0.125, 0.0),  # to rest after half of the step
+        (lambda _: -1, 1.0, 1.0, 0.25, 0.0),  # at rest under a load that is just carried
+        (lambda _: -3, 2.0, 1.0, 0.25, -1.0),  # brakes by 4, and after half of the step gets faster by 2 backward
+        (lambda _: 3, 0.0, 1.0, 1.0, 2.0),
+        (lambda _: 1, 0.0, 1.0, 0.0, 0.0),
+        (lambda t: 4 * t, 0.0, 1.0, 4 / 6 * 0.75**3, 2 * 0.75**2),  # sets off after a quarter
+        (lambda t: 1 + t, 0.0, 1.0, 1 / 6, 1 / 2),
+        (lambda t: t, 0.0, 1.0, 0.0, 0.0),  # carried up to the end
+    ],
+)
+def test_under_a_friction_of_one_a_step_is_made_of_parabolas(sense, load, rate, length, slip, end):
+    found = one_step(lambda t: sense * load(t), 1.0, sense * rate, length)
+    assert found[:2] == pytest.approx([sense * slip, sense * end], rel=1e-13, abs=1e-15)
+    assert (found[1] == 0) == (end == 0)
+    assert found[2:] == pytest.approx([length, 2 * length], rel=1e-14)
+
+
+def test_where_it_stops_twice_in_a_step_it_stays_at_the_first_stop_with_the_work_up_to_there():
+    """x2 = 0.6 - 4 t + 4 t²: forward to the first root, then backward until a load that grows would turn it again."""
+    stop = (4 - 6.4**0.5) / 8
+    motion = np.polynomial.Polynomial([0.6, -4, 4])
+    found = one_step(lambda t: -3 + 8 * t, 1.0, 0.6, 0.7)
+    assert found == pytest.approx([motion.integ()(stop), 0.0, 0.7, 2 * stop], rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("root", [1e-6, 0.1, 0.5, 1 / 3, 0.9, 1 - 1e-6])
+@pytest.mark.parametrize("further", [(-3.0, 2.0), (1.5, 4.0), (1.5, -0.5)])
+def test_the_cubic_stops_at_its_root(root, further):
+    """(s - root)(s - a)(s - b) up to its sign, with a and b outside of the step."""
+    cubic = np.polynomial.Polynomial.fromroots([root, *further])
+    cubic = cubic if cubic(0) > 0 else -cubic
+    ends = [cubic(0), cubic(1), cubic.deriv()(0), cubic.deriv()(1)]
+    assert float(_stop(*(ca.DM(v) for v in ends))) == pytest.approx(root, rel=1e-15, abs=5e-16)
+
+
+def test_a_standstill_at_the_start_stops_at_once_and_a_straight_fall_where_the_line_does():
+    assert float(_stop(*(ca.DM(v) for v in (0.0, -1.0, -1.0, -1.0)))) == pytest.approx(0, abs=1e-16)
+    assert float(_stop(*(ca.DM(v) for v in (3.0, -1.0, -4.0, -4.0)))) == 0.75
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "share"),
+    [(-1.0, 3.0, 0.25), (-1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (1.0, 2.0, 0.0), (-1.0, -2.0, 0.0), (1.0, -1.0, 0.0)],
+)
+def test_a_push_that_ends_positive_has_left_zero_on_its_secant(before, after, share):
+    assert float(_onset(ca.DM(before), ca.DM(after))) == share
+
+
+@pytest.mark.parametrize(
+    ("push", "rate", "stress"),
+    [
+        (-0.5, 0.0, 0.5),
+        (-1.0, 0.0, 0.0),
+        (-1.75, 0.0, -0.75),
+        (-2.5, 0.0, -1.0),
+        (0.5, 0.0, 1.0),
+        (-0.5, 1e-9, 1.0),
+        (-0.5, -1e-9, -1.0),
+    ],
+)
+def test_at_rest_the_shear_stress_is_what_carries_the_load(push, rate, stress):
+    """In units of the strength; the fault begins on the verge of slip, so that a push adds to one."""
+    loop = CoulombLoop(pushed(BLOCK, constant=push * STRENGTH))
+    strength = BLOCK.friction.residual * BLOCK.effective_normal_stress
+    found = loop.shear_stress(0.0, ca.DM([0.0, rate]), 0.0, BLOCK.friction.residual)
+    assert float(found) / strength == pytest.approx(stress, rel=1e-12, abs=1e-12)
+    eased = loop.shear_stress(0.0, ca.DM([0.0, 1.0]), 0.25 * BLOCK.effective_normal_stress, BLOCK.friction.residual)
+    assert float(eased) / strength == pytest.approx(0.75, rel=1e-12)
+    opened = loop.shear_stress(0.0, ca.DM([0.0, 1.0]), 2 * BLOCK.effective_normal_stress, BLOCK.friction.residual)
+    assert float(opened) == 0
