@@ -264,7 +264,7 @@ def test_an_unknown_plant_is_refused():
 
 
 def one_step(load, friction, rate, length):
-    """Slip, rate, a state of the law that grows by 1 a second, and a work that grows by 2, after a step under a load."""
+    """Slip, rate, a state of the law that grows by 1 a second, and a work that grows by 2, after a step."""
     loop = CoulombLoop(REAL, published("real-fault")["cta"])
     assert len(loop.integrals) == 1
     vars(loop)["directed"] = lambda time, x, _, sense: ca.fabs(sense) * ca.vertcat(x[1], load(time) - sense * friction)

@@ -1,14 +1,26 @@
-"""What the sampled schemes share: a sensor must be made for the period of the loop."""
+"""What the sampled schemes share: a sensor for the period of the loop, and single steps by hand."""
 
+from types import SimpleNamespace
+
+import casadi as ca
 import pytest
 
-from quakedesign.controllers import published
+from quakedesign.controllers import control_law, published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.loop.actuators import Actuator, Delay, Lag, RateLimit, Saturation
+from quakedesign.loop.schemes.explicit import Explicit
+from quakedesign.loop.steps import discrete_law
+from quakedesign.loop.steps.no_clock import NoClock
+from quakedesign.loop.steps.sampled import Sampled
 from quakedesign.simulation import Differentiator, OutputFeedback, simulate, simulation_scheme
+from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.simulation.integrators.rk4 import ClassicRungeKutta
 
 LAB = load_fault("lab-fault")
 LAW = published("lab-fault")["cta"]
+IDLE = dict.fromkeys(published("lab-fault")["elqr"].gain_units, 0.0)
+SLIP, RATE, SLIP_INTEGRAL, *_ = IDLE
 SENSOR = OutputFeedback(differentiator=Differentiator(bound=100.0, step=1e-4))
 
 
@@ -27,3 +39,94 @@ def test_a_sensor_can_be_told_to_simulate_or_to_the_scheme():
     ]
     assert (runs[0].slip == runs[1].slip).all()
     assert runs[0].metrics.peak_slip_rate > 0
+
+
+@pytest.mark.parametrize("substeps", [0, -1, 101, True, 1.5])
+def test_substeps_are_a_whole_number_from_one_to_a_hundred(substeps):
+    assert [Explicit(substeps=able).substeps for able in (1, 100)] == [1, 100]
+    assert Explicit().substeps == 1
+    with pytest.raises(ParameterError, match="substeps"):
+        Explicit(substeps=substeps)
+
+
+@pytest.mark.parametrize("authority", [0.0, -1.0, float("inf"), float("nan")])
+def test_an_authority_is_positive_and_finite(authority):
+    assert [Explicit(authority=able).authority for able in (5e-324, 0.5, 1e308, None)] == [5e-324, 0.5, 1e308, None]
+    with pytest.raises(ParameterError, match="authority must be positive and finite"):
+        Explicit(authority=authority)
+
+
+def stepped(scheme, law, state, step, *, counter=0, plant=None):
+    """Pressure at the start of a step [Pa], and slip, rate and states of the law at its end."""
+    loop = ClosedLoop(LAB, law)
+    if plant is not None:
+        vars(loop)["plant"] = plant
+    memory = scheme.memory(loop, step)
+    given = ca.SX.sym("given", 2 + len(loop.integrals) + len(memory))
+    asked = scheme.pressure(loop, counter, given, step)
+    end = scheme.advance(loop, ClassicRungeKutta, counter, given, step)
+    found = ca.Function("step", [given], [asked, end])([*state, *[0] * len(loop.integrals), *memory.values()])
+    return float(found[0]), found[1].full().ravel()[: 2 + len(loop.integrals)]
+
+
+def linear(**gains):
+    return control_law("elqr")(gains=IDLE | gains)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize(("clock", "steps"), [(None, 1), (NoClock(shortest=8, longest=16), 8)])
+def test_a_pump_changes_as_far_as_it_can_until_the_next_sample_is_expected(clock, steps, sense):
+    """A law that asks for 10 MPa behind a pump of 20 Pa/s: 20 Pa/s times 0.25 s, as often as steps are sure to pass."""
+    scheme = Explicit(clock=clock, actuator=Actuator(stages=(RateLimit(rate=20.0),)))
+    reached, _ = stepped(scheme, linear(**{SLIP: 1e7}), (-sense, 0.0), 0.25)
+    assert reached == pytest.approx(sense * 20 * 0.25 * steps, rel=1e-14)
+
+
+def test_a_law_is_told_the_reference_of_now_and_of_the_next_sample_expected():
+    """A reference of t, t² and t³ at 1.5 s, and the next sample four steps of 0.5 s later."""
+    loop = SimpleNamespace(reference=lambda t: (t, t**2, t**3))
+    told = Sampled._known(loop, 3, 0.5, (10.0, 20.0), 4)
+    assert {symbol: float(value) for symbol, value in told.items()} == {
+        discrete_law.slip: 10.0,
+        discrete_law.rate: 20.0,
+        discrete_law.slip_error: 8.5,
+        discrete_law.rate_error: 17.75,
+        discrete_law.acceleration: 3.375,
+        discrete_law.next_reference: 3.5,
+        discrete_law.next_reference_rate: 12.25,
+        discrete_law.step: 2.0,
+    }
+
+
+@pytest.mark.parametrize("substeps", [1, 3, 10])
+@pytest.mark.parametrize("part", [0.0, 0.25])
+def test_what_is_held_acts_from_its_part_of_the_step_on_and_time_goes_on_within_it(substeps, part):
+    """Rates of p and t: in 0.5 s from 2 s on slip grows by p times what is left of it, the rate by (2.5² - 2²)/2."""
+    late = Actuator(stages=(Delay(samples=0, part=part),))
+    scheme = Explicit(substeps=substeps, actuator=late)
+    law, at = linear(**{SLIP: 8.0}), (-1.0, 0.0)
+    asked, _ = stepped(Explicit(), law, at, 0.5, counter=4)
+    assert abs(asked) == pytest.approx(8, rel=1e-2)
+    acting, end = stepped(scheme, law, at, 0.5, counter=4, plant=lambda t, _, p: ca.vertcat(p, t))
+    assert acting == (0 if part else asked)
+    assert end[0] + 1 == pytest.approx(asked * 0.5 * (1 - part), rel=1e-13)
+    assert end[1] == pytest.approx((2.5**2 - 2**2) / 2, rel=1e-13)
+
+
+@pytest.mark.parametrize(("slip", "winds"), [(-1.0, False), (1.0, False), (-1e-3, True), (1e-3, True)])
+def test_what_a_law_sums_up_stays_where_a_limit_keeps_the_pressure_from_following(slip, winds):
+    """Gains of 1 Pa/m and 1 Pa/(m s), a limit of 0.5 Pa: an error of 1 m is not added, one of 1 mm is."""
+    scheme = Explicit(actuator=Actuator(stages=(Saturation(lowest=-0.5, highest=0.5),)))
+    law = linear(**{SLIP: 1.0, SLIP_INTEGRAL: 1.0})
+    pressure, end = stepped(scheme, law, (slip, 0.0), 0.25)
+    assert abs(pressure) == pytest.approx(min(0.5, abs(slip)), rel=1e-12)
+    assert end[2] == pytest.approx(0.25 * slip if winds else 0.0, rel=1e-9)
+
+
+def test_outputs_and_settings_are_those_of_what_lies_around_the_law():
+    assert Explicit().described == {}
+    assert Explicit().settings == {"substeps": 1}
+    lagged = Explicit(actuator=Actuator(stages=(Lag(time_constant=1.0),)), authority=2.0)
+    assert lagged.described == {"well_pressure": ("pressure at the well", "Pa")}
+    assert lagged.settings["authority"] == 2.0
+    assert "Lag" in lagged.settings["actuator"]
