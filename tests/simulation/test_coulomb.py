@@ -280,12 +280,14 @@ def one_step(load, friction, rate, length):
     ("load", "rate", "length", "slip", "end"),
     [
         (lambda _: 0, 2.0, 1.0, 1.5, 1.0),  # brakes by 1
+        (lambda _: 0, 1.5, 1.0, 1.0, 0.5),
         (lambda _: 0, 0.5, 1.0, 0.125, 0.0),  # to rest after half of the step
         (lambda _: -1, 1.0, 1.0, 0.25, 0.0),  # at rest under a load that is just carried
         (lambda _: -3, 2.0, 1.0, 0.25, -1.0),  # brakes by 4, and after half of the step gets faster by 2 backward
         (lambda _: 3, 0.0, 1.0, 1.0, 2.0),
         (lambda _: 1, 0.0, 1.0, 0.0, 0.0),
         (lambda t: 4 * t, 0.0, 1.0, 4 / 6 * 0.75**3, 2 * 0.75**2),  # sets off after a quarter
+        (lambda t: 1.6 * t, 0.0, 1.0, 1.6 / 6 * 0.375**3, 0.8 * 0.375**2),  # later than half
         (lambda t: 1 + t, 0.0, 1.0, 1 / 6, 1 / 2),
         (lambda t: t, 0.0, 1.0, 0.0, 0.0),  # carried up to the end
     ],
@@ -350,3 +352,26 @@ def test_at_rest_the_shear_stress_is_what_carries_the_load(push, rate, stress):
     assert float(eased) / strength == pytest.approx(0.75, rel=1e-12)
     opened = loop.shear_stress(0.0, ca.DM([0.0, 1.0]), 2 * BLOCK.effective_normal_stress, BLOCK.friction.residual)
     assert float(opened) == 0
+
+
+def test_at_rest_the_stress_is_that_of_the_slip_so_far_and_of_no_other_state():
+    """A damping that is not zero, no slip rate, and the spring pulls back by k̂ x/N̂ of the strength on the verge."""
+    loop = CoulombLoop(pushed(dataclasses.replace(BLOCK, damping=REAL.damping)))
+    slip = 0.5 * STRENGTH / FREQUENCY**2
+    strength = BLOCK.friction.residual * BLOCK.effective_normal_stress
+    found = loop.shear_stress(0.0, ca.DM([slip, 0.0, 7.0]), 0.0, BLOCK.friction.residual)
+    assert float(found) / strength == pytest.approx(0.5, rel=1e-12)
+
+
+@pytest.mark.parametrize("symbolic", [False, True])
+def test_friction_that_differs_from_the_nominal_opposes_motion_all_the_same(symbolic):
+    """With 1.2 of the input gain: 2.4 strengths between the senses; a push of -0.6 strengths leaves half the stress."""
+    numbers = (1.3, 0.7, 1.2)
+    given = ca.SX.sym("factors", 3)
+    loop = CoulombLoop(pushed(BLOCK, constant=-0.6 * STRENGTH))
+    varied = loop.with_factors(tuple(ca.vertsplit(given)) if symbolic else numbers)
+    backward, forward = (varied.directed(0.0, ca.SX([0.01, 0.0]), 0.0, sense)[1] for sense in (-1, 1))
+    stress = varied.shear_stress(0.0, ca.SX([0.0, 0.0]), 0.0, BLOCK.friction.residual)
+    found = ca.Function("found", [given], [backward - forward, stress])(list(numbers))
+    assert float(found[0]) == pytest.approx(2.4 * STRENGTH, rel=1e-12)
+    assert float(found[1]) == pytest.approx(0.5 * BLOCK.friction.residual * BLOCK.effective_normal_stress, rel=1e-12)
