@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.errors import RecordError
 from quakedesign.identification.experiment import Coordinate, Experiment
-from quakedesign.identification.fitting import Fit, Search, advantage, fit, minimised, outliers
+from quakedesign.identification.fitting import Fit, Search, _finite, _starts, advantage, fit, minimised, outliers
 
 
 def coordinate(name, low=-10.0, high=10.0, start=(-1.0, 1.0)):
@@ -88,6 +88,55 @@ def test_searches_agree_when_their_squares_differ_by_less_than_a_thousandth(shar
     assert fit(wells, measured, seed=0, near=start).starts == 4
     alone = fit(wells, measured, seed=0, near=start, search=Search(least=1, most=1))
     assert alone.starts == 2
+    itself = fit(wells, measured, seed=0, search=Search(least=1, most=1, agreement=0.0))
+    assert (itself.starts, itself.agreeing) == (1, 1)
+
+
+def test_a_mean_of_four_counts_as_four_in_a_fit():
+    measured, counts = np.array([1.0, 0.0, 0.0, 5.0]), np.array([4.0, 1.0, 1.0, 1.0])
+    found = fit(Linear(np.ones((4, 1))), measured, seed=0, counts=counts)
+    assert found.fitted == pytest.approx([(4 + 5) / 7], abs=1e-3)
+
+
+def test_searches_start_from_the_sixteen_nearest_of_many_between_the_ends():
+    """By the sum of absolute residuals, each with the root of its count."""
+    experiment, measured, roots = Linear(np.array([[1.0], [-1.0], [0.5]])), np.array([0.7, 0.1, 0.2]), np.arange(1, 4)
+    _, starts = _starts(experiment, measured, roots, 5, Search())
+    _, every = _starts(experiment, measured, roots, 5, Search(most=100))
+    assert (len(starts), len(every)) == (16, 64)
+    assert [q[0] for q in starts] == [q[0] for q in every[:16]]
+    costs = [abs(0.7 - q) + 2 * abs(0.1 + q) + 3 * abs(0.2 - q / 2) for (q,) in every]
+    assert costs == sorted(costs)
+    assert -1 < min(every)[0] < -0.8 < 0.8 < max(every)[0] < 1
+
+
+@dataclass(frozen=True)
+class Restless(Linear):
+    """Never simulated accurately enough."""
+
+    asked: list
+
+    def resolved(self, fitted, accuracy):
+        self.asked.append((fitted, accuracy))
+        return replace(self)
+
+
+def test_steps_suit_the_scatter_between_samples_first_and_no_more_than_six_rounds_follow():
+    """Second differences of noise scatter by the root of six times as much; those of a line not at all."""
+    asked = []
+    noise = 0.01 * np.random.default_rng(2).standard_normal(4000)
+    fit(Restless(line(4000).matrix, asked), noise + 0.5 * np.arange(4000), seed=0)
+    assert len(asked) == 2 + 6
+    assert asked[0][0].tolist() == [0.0, 0.0]
+    assert [accuracy for _, accuracy in asked[:2]] == pytest.approx([0.01, 0.01], rel=0.05)
+    assert asked[-1][1] == pytest.approx(3e-3 * 0.01, rel=0.05)
+    asked.clear()
+    _starts(Restless(line(9).matrix, asked), np.arange(9.0), np.ones(9), 0, Search())
+    assert [accuracy for _, accuracy in asked] == [1e-9, 1e-9]
+
+
+def test_slopes_without_a_value_are_none():
+    assert _finite(np.array([np.inf, -np.inf, np.nan, 2.0])).tolist() == [0.0, 0.0, 0.0, 2.0]
 
 
 def test_where_there_is_no_experiment_between_the_ends_nothing_is_fitted():
@@ -104,7 +153,7 @@ def test_where_there_is_no_experiment_between_the_ends_nothing_is_fitted():
 
 def test_what_is_fixed_stays_and_what_has_no_weight_does_not_count():
     """With a slope of 2 held, the best height is the mean of y - 2x, weighted by squares."""
-    measured, weights = np.array([1.0, 2.0, 7.0, 900.0]), np.array([1.0, 2.0, 1.0, 0.0])
+    measured, weights = np.array([1.0, 2.0, 7.0, np.nan]), np.array([1.0, 2.0, 1.0, 0.0])
     start, held = np.array([0.0, 2.0]), np.array([False, True])
     at, squares = minimised(line(4), measured, weights, start, fixed=held)
     height = (1 * 1 + 4 * 0 + 1 * 3) / 6
@@ -177,6 +226,35 @@ def test_samples_that_follow_each_other_count_as_fewer():
         sums.append(sums[-1] + 2 * covariance[len(sums)] / covariance[0])
     assert told == pytest.approx(sums[-1], rel=1e-9)
     assert told == pytest.approx(9, rel=0.25)
+
+
+@pytest.mark.parametrize("samples", [8, 9, 16, 33, 64])
+def test_few_samples_are_summed_over_half_of_them_at_most_and_not_around_their_ends(samples):
+    """What drifts is like itself over the whole record, or alike at both ends."""
+    draw = np.random.default_rng(samples).standard_normal(samples)
+    ends = np.concatenate([[3.0, 3.0], draw[4:], [3.0, 3.0]])
+    for found in (np.cumsum(draw), ends, np.arange(samples) - 2.0):
+        covariance = [float(np.dot(found[: samples - lag], found[lag:])) for lag in range(samples // 2)]
+        sums = [2 * sum(covariance[: lag + 1]) / covariance[0] - 1 for lag in range(samples // 2)]
+        far = [total for lag, total in enumerate(sums) if lag >= 5 * total]
+        expected = max(1.0, far[0] if far else sums[-1])
+        assert made(Linear(np.ones((samples, 1))), found).correlation == pytest.approx(expected, rel=1e-9)
+
+
+def test_samples_that_follow_each_other_widen_what_is_allowed():
+    """Four samples for an independent one: twice the deviation, a quarter of the excess; counts weigh the samples."""
+    counts, measured = np.array([1.0, 4.0, 1.0, 4.0]), np.array([2.0, 1.0, -2.0, -1.0])
+    found = made(Linear(np.ones((4, 1))), measured, counts=counts)
+    vars(found)["correlation"] = 4.0
+    noise = ((4 + 4 + 4 + 4) / 3) ** 0.5
+    assert found.noise == pytest.approx(noise, rel=1e-14)
+    assert found.excess(16 + 3.0) == pytest.approx(3.0 / (4 * noise**2), rel=1e-14)
+    assert found.distance(np.array([0.5])) == pytest.approx(10 * 0.25 / (4 * noise**2), rel=1e-12)
+    assert found.distance(np.array([np.nan])) == np.inf
+    assert found.deviations == pytest.approx([2 * noise / 10**0.5], rel=1e-12)
+    across = made(Linear(np.array([[1.0, 1], [1, -1], [1, 1], [1, -1]])), np.array([3.0, 1.0, -3.0, -1.0]))
+    vars(across)["correlation"] = 1.0
+    assert across.deviations == pytest.approx([across.noise / 2, across.noise / 2], rel=1e-12)
 
 
 def test_deviations_are_those_of_the_inverse_and_infinite_along_what_is_not_told():

@@ -8,7 +8,7 @@ import pytest
 from quakedesign.controllers import control_law, published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.loop.actuators import Actuator, Delay, Lag, RateLimit, Saturation
+from quakedesign.loop.actuators import Actuator, Delay, Diffusion, Lag, RateLimit, Saturation
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.steps import discrete_law
 from quakedesign.loop.steps.no_clock import NoClock
@@ -56,7 +56,7 @@ def test_an_authority_is_positive_and_finite(authority):
         Explicit(authority=authority)
 
 
-def stepped(scheme, law, state, step, *, counter=0, plant=None):
+def stepped(scheme, law, state, step, *, counter=0, plant=None, method=ClassicRungeKutta):
     """Pressure at the start of a step [Pa], and slip, rate and states of the law at its end."""
     loop = ClosedLoop(LAB, law)
     if plant is not None:
@@ -64,7 +64,7 @@ def stepped(scheme, law, state, step, *, counter=0, plant=None):
     memory = scheme.memory(loop, step)
     given = ca.SX.sym("given", 2 + len(loop.integrals) + len(memory))
     asked = scheme.pressure(loop, counter, given, step)
-    end = scheme.advance(loop, ClassicRungeKutta, counter, given, step)
+    end = scheme.advance(loop, method, counter, given, step)
     found = ca.Function("step", [given], [asked, end])([*state, *[0] * len(loop.integrals), *memory.values()])
     return float(found[0]), found[1].full().ravel()[: 2 + len(loop.integrals)]
 
@@ -113,6 +113,42 @@ def test_what_is_held_acts_from_its_part_of_the_step_on_and_time_goes_on_within_
     assert end[1] == pytest.approx((2.5**2 - 2**2) / 2, rel=1e-13)
 
 
+class Euler:
+    """One explicit step of first order, whose error tells how many there are."""
+
+    @staticmethod
+    def advance(field, state, step):
+        return state + step * field(0.0, state)
+
+
+@pytest.mark.parametrize(
+    ("substeps", "part", "lengths"),
+    [(1, 0.0, [1.0]), (4, 0.0, [0.25] * 4), (3, 0.25, [0.25] * 4), (4, 0.125, [0.125] + [0.21875] * 4)],
+)
+def test_every_section_of_a_step_takes_its_share_of_the_substeps_rounded_up(substeps, part, lengths):
+    scheme = Explicit(substeps=substeps, actuator=Actuator(stages=(Delay(samples=0, part=part),)))
+    found = stepped(scheme, linear(), (0.0, 0.0), 1.0, plant=lambda t, *_: ca.vertcat(t, 1), method=Euler)[1]
+    begins = [sum(lengths[:i]) for i in range(len(lengths))]
+    assert found[0] == pytest.approx(sum(t * h for t, h in zip(begins, lengths, strict=True)), rel=1e-13)
+    assert found[1] == pytest.approx(1, rel=1e-13)
+
+
+def test_a_stage_too_fast_for_its_substeps_and_a_sensor_of_another_period_are_refused():
+    """Steps of at most 2.5 time constants."""
+    lag, loop = Actuator(stages=(Lag(time_constant=0.1),)), ClosedLoop(LAB, linear())
+    assert Explicit(substeps=4, actuator=lag).memory(loop, 0.999)
+    with pytest.raises(ParameterError, match="substep"):
+        Explicit(substeps=4, actuator=lag).memory(loop, 1.001)
+    with pytest.raises(ParameterError, match="that of the sensor"):
+        Explicit(measurement=SENSOR).memory(loop, 1e-3)
+
+
+def test_the_input_gain_that_a_scheme_takes_for_granted_is_the_smallest():
+    loop = ClosedLoop(LAB.with_box("ten-percent"), linear())
+    least = LAB.friction.bounds[0] * LAB.authority * 0.9
+    assert Explicit().nominal(loop) == pytest.approx(least, rel=1e-12)
+
+
 @pytest.mark.parametrize(("slip", "winds"), [(-1.0, False), (1.0, False), (-1e-3, True), (1e-3, True)])
 def test_what_a_law_sums_up_stays_where_a_limit_keeps_the_pressure_from_following(slip, winds):
     """Gains of 1 Pa/m and 1 Pa/(m s), a limit of 0.5 Pa: an error of 1 m is not added, one of 1 mm is."""
@@ -128,5 +164,23 @@ def test_outputs_and_settings_are_those_of_what_lies_around_the_law():
     assert Explicit().settings == {"substeps": 1}
     lagged = Explicit(actuator=Actuator(stages=(Lag(time_constant=1.0),)), authority=2.0)
     assert lagged.described == {"well_pressure": ("pressure at the well", "Pa")}
-    assert lagged.settings["authority"] == 2.0
-    assert "Lag" in lagged.settings["actuator"]
+    assert lagged.settings == {"substeps": 1, "actuator": "Lag(time_constant=1.0)", "authority": 2.0}
+    rock = Actuator(stages=(Diffusion(length=2.0, diffusivity=3.0, storage=0.1),))
+    assert len(Explicit(actuator=rock).described) == 3
+    told = Explicit(clock=NoClock(shortest=1, longest=2), measurement=SENSOR).settings
+    assert told == {"substeps": 1, "clock": "NoClock(shortest=1, longest=2, seed=0)", "measurement": repr(SENSOR)}
+
+
+def test_the_well_has_what_the_pump_holds_and_the_fault_what_the_rock_lets_through():
+    """With a delay within the step the well still has, at its start, what was held before."""
+    for part, well in ((0.0, 1.0), (0.5, 0.0)):
+        stages = (Saturation(lowest=-1.0, highest=1.0), Delay(samples=0, part=part), Lag(time_constant=1.0))
+        scheme, loop = Explicit(actuator=Actuator(stages=stages)), ClosedLoop(LAB, linear(**{SLIP: 1e6}))
+        memory = scheme.memory(loop, 0.25)
+        given = ca.SX.sym("given", 2 + len(loop.integrals) + len(memory))
+        outputs = scheme.outputs(loop, 0, given, 0.25)
+        assert list(outputs) == ["well_pressure"]
+        read = ca.Function("read", [given], [outputs["well_pressure"], scheme.pressure(loop, 0, given, 0.25)])
+        found = read([-1.0, 0.0, *[0] * len(loop.integrals), *memory.values()])
+        assert [abs(float(value)) for value in found] == [well, 0.0]
+    assert Explicit().outputs(loop, 0, given, 0.25) == {}
