@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import time
 from concurrent.futures import BrokenExecutor, Future
 
 import pytest
@@ -162,3 +163,27 @@ def test_one_worker_is_enough_and_none_is_refused():
 def test_what_many_tasks_take_is_handed_on_as_it_is():
     value = object()
     assert Mortal().shared(value) is value
+
+
+def test_cores_are_those_that_this_process_may_use_else_all_and_one_where_nobody_knows(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3, 5, 7} if process == 0 else set(), raising=False)
+    assert cores() == 3
+    monkeypatch.delattr(os, "sched_getaffinity")
+    for count, expected in ((6, 6), (None, 1)):
+        monkeypatch.setattr(os, "cpu_count", lambda count=count: count)
+        assert cores() == expected
+
+
+def test_an_error_in_the_block_ends_processes_at_once_and_renewal_begins_with_others():
+    crew = Processes(1)
+    assert crew.submit(divmod, 9, 7).result() == (1, 2)
+    (first,) = crew._context._started
+    crew.renew()
+    assert not first.is_alive()
+    assert crew.submit(divmod, 9, 7).result() == (1, 2)
+    (second,) = crew._context._started
+    crew.submit(time.sleep, 1000)
+    crew.__exit__(RuntimeError, RuntimeError("enough"), None)
+    second.join(10)
+    assert not second.is_alive()
+    assert crew._context._started == []

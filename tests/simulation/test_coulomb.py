@@ -12,7 +12,7 @@ from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
 from quakedesign.simulation import Metrics, natural_earthquake, simulate
-from quakedesign.simulation.coulomb import CoulombLoop, _onset, _stop
+from quakedesign.simulation.coulomb import CoulombLoop, _Course, _onset, _stop
 from quakedesign.simulation.integrators.rk4 import ClassicRungeKutta
 
 REAL = load_fault("real-fault")
@@ -375,3 +375,38 @@ def test_friction_that_differs_from_the_nominal_opposes_motion_all_the_same(symb
     found = ca.Function("found", [given], [backward - forward, stress])(list(numbers))
     assert float(found[0]) == pytest.approx(2.4 * STRENGTH, rel=1e-12)
     assert float(found[1]) == pytest.approx(0.5 * BLOCK.friction.residual * BLOCK.effective_normal_stress, rel=1e-12)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("length", [0.25, 1.0, 4.0])
+def test_where_the_cubic_misses_the_stop_a_linear_step_comes_closer(length, sense):
+    """x2 = 0.6 - s - 2 s⁴ at share s, which RK4 carries exactly; the root of the cubic is off by some 0.06."""
+
+    def directed(time, x, _, now):
+        return ca.fabs(now) * ca.vertcat(x[1], -sense * (1 + 8 * (time / length) ** 3) / length)
+
+    def motion(plant, passed, now):
+        return plant(passed * length, now[:2], 0)
+
+    course, rate = _Course(directed, ClassicRungeKutta, motion, length), np.polynomial.Polynomial([0.6, -1, 0, 0, -2])
+    root = next(z.real for z in rate.roots() if abs(z.imag) < 1e-9 and 0 < z.real < 1)
+    start = ca.DM([0, sense * 0.6])
+    ahead = course.move(sense, 0.0, 1.0, start)
+    assert float(ahead[1]) == pytest.approx(sense * rate(1), rel=1e-12)
+    share, turning = course.stop(sense, start, ahead, -1)
+    assert float(share) == pytest.approx(root, abs=0.01)
+    assert float(turning[1]) == 0
+    known, turning = course.stop(sense, start, ahead, 0.47)
+    rest = -rate(0.47) / rate.deriv()(0.47)
+    assert float(known) == pytest.approx(0.47 + rest, rel=1e-12)
+    reached = course.move(sense, 0.0, 0.47, start)
+    assert float(turning[0] - reached[0]) == pytest.approx(sense * length * rest * rate(0.47), rel=1e-10)
+    for onset in (0.0, 1.0):
+        assert 0 <= float(course.stop(sense, start, ahead, onset)[0]) <= 1
+
+
+def test_damping_does_not_keep_a_fault_at_rest():
+    loop = CoulombLoop(REAL)
+    vars(loop)["directed"] = lambda _, x, __, sense: ca.fabs(sense) * ca.vertcat(x[1], 3 - 5 * x[1] - sense)
+    moved = loop.advance(ClassicRungeKutta, lambda plant, passed, now: plant(passed, now, 0), ca.DM([0, 0]), 0.1).full()
+    assert moved[1, 0] == pytest.approx(0.4 * (1 - math.exp(-0.5)), rel=1e-2)
