@@ -181,6 +181,31 @@ def test_more_than_two_in_a_row_are_no_accident(run, left_out):
         )
 
 
+def test_runs_are_told_apart():
+    residuals = np.resize([1.0, -1.0], 40)
+    residuals[[3, 10, 11, 12, 20, 21, 30, 31, 32, 33, 38]] = -50.0
+    assert outliers(residuals, 2).nonzero()[0].tolist() == [3, 20, 21, 38]
+
+
+@dataclass(frozen=True)
+class Watched(Linear):
+    """Simulated accurately enough from the start; counts how often it is asked."""
+
+    asked: list
+
+    def resolved(self, _fitted, _accuracy):
+        self.asked.append(None)
+        return self
+
+
+@pytest.mark.parametrize(("outlier", "rounds"), [(0.0, 1), (0.1, 2)])
+def test_rounds_end_when_one_has_left_out_nothing_new(outlier, rounds):
+    measured, asked = np.resize([1e-3, -1e-3], 30), []
+    measured[12] += outlier
+    assert fit(Watched(line(30).matrix, asked), measured, seed=1).kept.all() == (rounds == 1)
+    assert len(asked) == 2 + rounds
+
+
 def test_a_fit_without_an_outlier_is_that_of_the_others():
     draw = np.random.default_rng(5)
     measured = 0.5 + 0.01 * np.arange(30) + 1e-3 * draw.standard_normal(30)
@@ -270,10 +295,10 @@ def test_deviations_are_those_of_the_inverse_and_infinite_along_what_is_not_told
 
 
 def test_the_advantage_is_of_the_samples_that_both_count():
-    """Squares of 4 and of 8 over three samples, all independent: 3 ln 2."""
+    """Squares of 4 and of 8 over three samples, two for an independent one: 3/2 ln 2."""
     matrix = Linear(np.ones((5, 1)))
     one = made(matrix, np.array([1.0, -1.0, 2**0.5, -9.0, 0.1]), kept=np.array([1, 1, 1, 0, 1], dtype=bool))
     other = replace(one, measured=2**0.5 * one.measured, kept=np.array([1, 1, 1, 1, 0], dtype=bool))
-    vars(one)["correlation"], vars(other)["correlation"] = 1.0, 3.0
-    assert advantage(one, other) == pytest.approx((2.0, 3 * np.log(2)), rel=1e-12)
-    assert advantage(other, one) == pytest.approx((0.5, -3 * np.log(2)), rel=1e-12)
+    vars(one)["correlation"], vars(other)["correlation"] = 2.0, 3.0
+    assert advantage(one, other) == pytest.approx((2.0, 3 / 2 * np.log(2)), rel=1e-12)
+    assert advantage(other, one) == pytest.approx((0.5, -3 / 2 * np.log(2)), rel=1e-12)

@@ -324,7 +324,16 @@ def test_a_standstill_at_the_start_stops_at_once_and_a_straight_fall_where_the_l
 
 @pytest.mark.parametrize(
     ("before", "after", "share"),
-    [(-1.0, 3.0, 0.25), (-1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (1.0, 2.0, 0.0), (-1.0, -2.0, 0.0), (1.0, -1.0, 0.0)],
+    [
+        (-1.0, 3.0, 0.25),
+        (-1.0, 0.5, 1 / 1.5),
+        (0.5, 2.0, 0.0),
+        (-1.0, 0.0, 0.0),
+        (0.0, 2.0, 0.0),
+        (1.0, 2.0, 0.0),
+        (-1.0, -2.0, 0.0),
+        (1.0, -1.0, 0.0),
+    ],
 )
 def test_a_push_that_ends_positive_has_left_zero_on_its_secant(before, after, share):
     assert float(_onset(ca.DM(before), ca.DM(after))) == share

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import casadi as ca
+import numpy as np
 import pytest
 
 from quakedesign.controllers import control_law, published
@@ -184,3 +185,28 @@ def test_the_well_has_what_the_pump_holds_and_the_fault_what_the_rock_lets_throu
         found = read([-1.0, 0.0, *[0] * len(loop.integrals), *memory.values()])
         assert [abs(float(value)) for value in found] == [well, 0.0]
     assert Explicit().outputs(loop, 0, given, 0.25) == {}
+
+
+def test_behind_a_lag_slip_feels_what_has_come_through():
+    """Rates of p and 1: under a pressure held p = held·(1 - exp(-t/τ)), which slip sums up but for RK4's t⁵/(120 τ⁴) of it."""
+    scheme, loop = Explicit(actuator=Actuator(stages=(Lag(time_constant=2.0),))), ClosedLoop(LAB, linear(**{SLIP: 8.0}))
+    vars(loop)["plant"] = lambda _, __, p: ca.vertcat(p, 1)
+    held, _ = stepped(Explicit(), loop.controller, (-1.0, 0.0), 0.25)
+    memory = scheme.memory(loop, 0.25)
+    before = [-1.0, 0.0, *[0.0] * len(loop.integrals), *memory.values()]
+    given = ca.SX.sym("given", len(before))
+    end = scheme.advance(loop, ClassicRungeKutta, 0, given, 0.25)
+    after = ca.Function("step", [given], [end])(before).full().ravel()
+    come = -np.expm1(-0.25 / 2.0)
+    assert len(after) == len(before)
+    assert after[:2] == pytest.approx([-1 + held * (0.25 - 2.0 * come), 0.25], abs=abs(held) * 0.25**5 / (100 * 2**4))
+    assert after[-1] == pytest.approx(held * come, rel=1e-6)
+    changed = [name for name, a, b in zip(memory, before[-len(memory) :], after[-len(memory) :], strict=True) if a != b]
+    assert changed == ["held_0", "flow_0"]
+    assert after[-2] == pytest.approx(held, rel=1e-14)
+
+
+def test_an_authority_that_is_told_is_remembered_in_place_of_the_nominal_one():
+    loop = ClosedLoop(LAB, linear())
+    assert Explicit(authority=2.0).memory(loop, 0.25)["authority_0"] == 2.0
+    assert Explicit().memory(loop, 0.25)["authority_0"] == Explicit().nominal(loop) != 2.0
