@@ -419,3 +419,19 @@ def test_damping_does_not_keep_a_fault_at_rest():
     vars(loop)["directed"] = lambda _, x, __, sense: ca.fabs(sense) * ca.vertcat(x[1], 3 - 5 * x[1] - sense)
     moved = loop.advance(ClassicRungeKutta, lambda plant, passed, now: plant(passed, now, 0), ca.DM([0, 0]), 0.1).full()
     assert moved[1, 0] == pytest.approx(0.4 * (1 - math.exp(-0.5)), rel=1e-2)
+
+
+@pytest.mark.parametrize("length", [0.25, 4.0])
+@pytest.mark.parametrize(("onset", "share"), [(0.9, 1.0), (0.25, 1.0)])
+def test_a_stop_is_never_later_than_the_step(length, onset, share):
+    """x2 = 2 - s at share s, with a linear step that would lead to a stop at 2."""
+
+    def motion(plant, passed, now):
+        return plant(passed * length, now[:2], 0)
+
+    course = _Course(lambda _, x, __, sense: ca.vertcat(x[1], -sense / length), ClassicRungeKutta, motion, length)
+    start = ca.DM([0, 2])
+    found, turning = course.stop(1, start, course.move(1, 0.0, 1.0, start), onset)
+    assert float(found) == pytest.approx(share, rel=1e-14)
+    slip = 2 * onset - onset**2 / 2 + (share - onset) * (2 - onset)
+    assert float(turning[0]) == pytest.approx(length * slip, rel=1e-12)
