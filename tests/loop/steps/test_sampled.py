@@ -160,6 +160,35 @@ def test_what_a_law_sums_up_stays_where_a_limit_keeps_the_pressure_from_followin
     assert end[2] == pytest.approx(0.25 * slip if winds else 0.0, rel=1e-9)
 
 
+def test_a_sum_that_moves_no_pressure_goes_on_while_a_limit_holds():
+    scheme = Explicit(actuator=Actuator(stages=(Saturation(lowest=-0.5, highest=0.5),)))
+    for slip in (-1.0, 1.0):
+        assert stepped(scheme, linear(**{SLIP: 1.0}), (slip, 0.0), 0.25)[1][2] == pytest.approx(0.25 * slip, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["elqr", None])
+def test_between_samples_by_no_clock_nothing_of_the_law_moves(law):
+    """A sample at every second step, while slip grows: pressure and sum change there alone."""
+    loop = ClosedLoop(LAB, linear(**{SLIP: 8.0, SLIP_INTEGRAL: 1.0}) if law else None, 5.0)
+    vars(loop)["plant"] = lambda *_: ca.DM([1, 0])
+    scheme = Explicit(clock=NoClock(shortest=2, longest=2))
+    memory, count = scheme.memory(loop, 0.25), len(loop.integrals)
+    given, number = ca.SX.sym("given", 2 + count + len(memory)), ca.SX.sym("number")
+    parts = [scheme.pressure(loop, number, given, 0.25), scheme.advance(loop, ClassicRungeKutta, number, given, 0.25)]
+    step, state, pressures, sums = ca.Function("step", [number, given], parts), [1.0, 0.0], [], []
+    state += [0.0] * count + list(memory.values())
+    for k in range(6):
+        pressure, after = step(k, state)
+        pressures.append(float(pressure))
+        state = after.full().ravel().tolist()
+        sums.append(state[2])
+    if law:
+        assert [abs(p) for p in pressures[::2]] == pytest.approx([8.0, 12.0 + 0.5, 16.0 + 0.5 + 0.75], rel=1e-3)
+        assert sums[::2] == pytest.approx([0.5, 0.5 + 0.75, 0.5 + 0.75 + 1.0], rel=1e-3)
+        assert sums[1::2] == sums[::2]
+    assert pressures[1::2] == pressures[::2] if law else pressures == [5.0] * 6
+
+
 def test_outputs_and_settings_are_those_of_what_lies_around_the_law():
     assert Explicit().described == {}
     assert Explicit().settings == {"substeps": 1}
