@@ -189,6 +189,15 @@ def test_between_samples_by_no_clock_nothing_of_the_law_moves(law):
     assert pressures[1::2] == pressures[::2] if law else pressures == [5.0] * 6
 
 
+def test_two_sections_of_as_many_substeps_are_two_repetitions_in_a_run():
+    """They differ in pressure and time alone, and machine code knows a repetition by what it is given."""
+    halves = Actuator(stages=(Delay(samples=0, part=0.5),))
+    setting = {"substeps": 4, "scheme": "explicit", "actuator": halves, "duration": 0.01, "compiled": False}
+    run = simulate(LAB, published("lab-fault")["elqr"], **setting)
+    assert run.metrics.peak_slip_rate > 0
+    assert "diverged" not in run.events
+
+
 def test_outputs_and_settings_are_those_of_what_lies_around_the_law():
     assert Explicit().described == {}
     assert Explicit().settings == {"substeps": 1}
@@ -219,7 +228,7 @@ def test_the_well_has_what_the_pump_holds_and_the_fault_what_the_rock_lets_throu
 def test_behind_a_lag_slip_feels_what_has_come_through():
     """Rates of p and 1: under a pressure held p = held·(1 - exp(-t/τ)), up to what RK4 leaves out, (t/τ)⁵/120 of it."""
     scheme, loop = Explicit(actuator=Actuator(stages=(Lag(time_constant=2.0),))), ClosedLoop(LAB, linear(**{SLIP: 8.0}))
-    vars(loop)["plant"] = lambda _, __, p: ca.vertcat(p, 1)
+    vars(loop)["plant"] = lambda _, x, p: ca.vertcat(p, x.shape[0] - 1)
     held, _ = stepped(Explicit(), loop.controller, (-1.0, 0.0), 0.25)
     memory = scheme.memory(loop, 0.25)
     before = [-1.0, 0.0, *[0.0] * len(loop.integrals), *memory.values()]
