@@ -192,7 +192,7 @@ def test_between_samples_by_no_clock_nothing_of_the_law_moves(law):
 def test_two_sections_of_as_many_substeps_are_two_repetitions_in_a_run():
     """They differ in pressure and time alone, and machine code knows a repetition by what it is given."""
     halves = Actuator(stages=(Delay(samples=0, part=0.5),))
-    setting = {"substeps": 4, "scheme": "explicit", "actuator": halves, "duration": 0.01, "compiled": False}
+    setting = {"substeps": 4, "scheme": "explicit", "actuator": halves, "duration": 0.01}
     run = simulate(LAB, published("lab-fault")["elqr"], **setting)
     assert run.metrics.peak_slip_rate > 0
     assert "diverged" not in run.events
