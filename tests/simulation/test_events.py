@@ -36,7 +36,8 @@ def test_no_figure_of_any_run_is_not_a_number(law, gains, sticks):
         assert np.all(np.isfinite(values))
     if "diverged" in run.events:
         assert run.energy is None
-        assert {name for name, value in told.items() if value is not None} == {"settled_from", "steps", "seconds"}
+        known = {name for name, value in told.items() if value is not None}
+        assert known - {"peak_slip_rate"} == {"settled_from", "steps", "seconds"}  # the plant may have stayed finite
         assert max(run.events.values()) == run.events["diverged"]
     else:
         assert all(math.isfinite(value) for value in run.energy.to_dict().values())
@@ -78,7 +79,7 @@ def test_a_singular_perturbation_ends_the_run_there():
     late = sp.sqrt(3 - sp.Symbol("time"))
     run = simulate(REAL, step=0.1, duration=10.0, compiled=False, load=Load(perturbation=late * 1e-3))
     assert 2.8 < run.events["diverged"] < 3.3
-    assert run.metrics.peak_slip_rate is None
+    assert 1e-3 < run.metrics.peak_slip_rate < 2e-3 * 3**0.5  # of the plant until then: below the integral 2e-3·√3
 
 
 def test_what_comes_after_a_divergence_did_not_happen():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from quakedesign.controllers import published
+from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.simulation import Metrics, simulate
 
@@ -61,10 +62,9 @@ def test_without_control_only_the_peak_is_given():
     }
 
 
-def test_nothing_settled_means_no_settled_figures(law):
-    found = simulate(REAL, law, duration=30.0, settled_from=31.0).metrics
-    assert found.rms_pressure is None
-    assert found.peak_slip_rate > 0
+def test_errors_that_count_from_the_end_of_the_run_on_are_refused(law):
+    with pytest.raises(ParameterError, match="settled_from must be from 0 to below the duration, 30"):
+        simulate(REAL, law, duration=30.0, settled_from=31.0)
 
 
 def test_every_figure_has_a_unit():
